@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace visual_localization {
+
+/// Where a SIFT feature was found.
+struct SiftKeypoint {
+  float x_px = 0.0F;       ///< image column, 0 = centre of the leftmost pixel
+  float y_px = 0.0F;       ///< image row, 0 = centre of the top pixel
+  float size_px = 0.0F;    ///< diameter of the described neighbourhood
+  float angle_deg = 0.0F;  ///< dominant gradient orientation, [0, 360), clockwise in the image
+};
+
+/// The local features of one image: n keypoints and n descriptors, index by index.
+class SiftFeatures {
+ public:
+  static constexpr std::size_t kDescriptorSize = 128;  ///< bytes of one descriptor (4 x 4 x 8 bins)
+
+  SiftFeatures() = default;
+  /// `descriptors` holds keypoints.size() x 128 bytes, row by row; throws std::invalid_argument otherwise.
+  SiftFeatures(std::vector<SiftKeypoint> keypoints, std::vector<std::uint8_t> descriptors);
+
+  std::size_t size() const { return keypoints_.size(); }
+  bool empty() const { return keypoints_.empty(); }
+  const std::vector<SiftKeypoint>& keypoints() const { return keypoints_; }
+  const std::vector<std::uint8_t>& descriptors() const { return descriptors_; }
+  const std::uint8_t* descriptor(std::size_t i) const { return descriptors_.data() + i * kDescriptorSize; }
+
+  /// The features at `indices`, in that order.
+  SiftFeatures subset(const std::vector<std::size_t>& indices) const;
+
+ private:
+  std::vector<SiftKeypoint> keypoints_;
+  std::vector<std::uint8_t> descriptors_;
+};
+
+}  // namespace visual_localization

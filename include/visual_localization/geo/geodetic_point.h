@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+
+namespace visual_localization {
+
+/// A position on the WGS84 ellipsoid.
+struct GeodeticPoint {
+  double latitude_deg = 0.0;   ///< north positive, [-90, 90]
+  double longitude_deg = 0.0;  ///< east positive, [-180, 180]
+  double altitude_m = 0.0;     ///< above the ellipsoid
+};
+
+/// One reading of a GPS receiver. Whatever the receiver reported is kept: cleaning decides what to believe.
+struct Fix {
+  std::int64_t stamp_ns = 0;  ///< nanoseconds since the epoch of the recording
+  GeodeticPoint position;     ///< may hold NaN when there is no fix
+  bool has_fix = false;       ///< the receiver's own claim
+};
+
+/// Seconds from `from_ns` to `to_ns`.
+inline double secondsBetween(std::int64_t from_ns, std::int64_t to_ns) {
+  return static_cast<double>(to_ns - from_ns) * 1e-9;
+}
+
+}  // namespace visual_localization

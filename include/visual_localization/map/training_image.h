@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "visual_localization/features/sift_features.h"
+
+namespace visual_localization {
+
+/// One image of the map: where it was taken and what it looked like.
+struct TrainingImage {
+  std::int64_t stamp_ns = 0;
+  int session = 0;                                       ///< which of MapHeader::sessions it came from
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north in the map frame
+  double yaw_rad = 0.0;                                  ///< direction of travel, 0 = east, counter-clockwise
+  SiftFeatures sift;                                     ///< after pruning
+  std::vector<std::uint8_t> preview_jpeg;                ///< small grey JPEG for people; may be empty
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace visual_localization {
+
+/// What a user needs to know about one parameter besides its value and range.
+struct ParameterInfo {
+  std::string name;         ///< relative name as in the YAML file and on the parameter server, e.g. "dpso/inertia"
+  std::string unit;         ///< SI symbol, "px", "1" for a pure number; empty for names and switches
+  std::string description;  ///< one sentence, with the papers' symbol where there is one
+};
+
+/// Walks over the fields of a configuration. Every configuration struct has a member
+/// `void declare(ParameterVisitor&)` that names each field once, with unit, range and meaning; reading
+/// from YAML or a parameter server, range checks and the documentation table are visitors over that one list.
+class ParameterVisitor {
+ public:
+  virtual ~ParameterVisitor() = default;
+
+  virtual void real(const ParameterInfo& info, double& field, double min, double max) = 0;
+  virtual void integer(const ParameterInfo& info, int& field, int min, int max) = 0;
+  virtual void flag(const ParameterInfo& info, bool& field) = 0;
+  virtual void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) = 0;
+  virtual void text(const ParameterInfo& info, std::string& field) = 0;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "visual_localization/parameters/parameter_visitor.h"
+
+namespace visual_localization {
+
+/// A parameter as a file or a parameter server delivers it.
+using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
+/// Values by full parameter name, nested names joined with '/'.
+using ParameterValues = std::map<std::string, ParameterValue>;
+
+/// A parameter that is unknown, of the wrong type or outside its range. The text names the parameter, the
+/// value and what would be allowed, in one line.
+class ParameterError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+namespace parameters {
+
+/// Presents every field of one configuration to a visitor.
+using Declaration = std::function<void(ParameterVisitor&)>;
+
+/// Sets the fields that `values` names. Throws ParameterError at the first value that is unknown, of the
+/// wrong type or out of range, before any field has changed.
+void assign(const Declaration& declare, const ParameterValues& values);
+
+/// All fields that lie outside their declared range, in words; empty when the configuration is valid.
+std::vector<std::string> violations(const Declaration& declare);
+
+/// The current value of every field.
+ParameterValues values(const Declaration& declare);
+
+/// A Markdown table of all parameters: name, default, unit, allowed values, meaning.
+std::string markdownTable(const Declaration& declare);
+
+/// Reads a YAML file of nested mappings. Throws ParameterError naming the file and the key for anything that
+/// is not a mapping of names to scalars.
+ParameterValues readYaml(const std::string& path);
+
+/// Interprets text as a YAML scalar: true/false, an integer, a number, otherwise a string.
+ParameterValue parseScalar(const std::string& text);
+
+/// The value as a user would type it.
+std::string toString(const ParameterValue& value);
+
+}  // namespace parameters
+
+/// Sets the named fields of `config`; strong guarantee, see parameters::assign. Constraints that span fields
+/// are checked by the configuration's own `violations()`.
+template <class Config>
+void assignParameters(Config& config, const ParameterValues& values) {
+  Config changed = config;
+  parameters::assign([&changed](ParameterVisitor& visitor) { changed.declare(visitor); }, values);
+  const std::vector<std::string> wrong = changed.violations();
+  if (!wrong.empty()) throw ParameterError(wrong.front());
+  config = changed;
+}
+
+/// Range violations of every field of `config`, in words.
+template <class Config>
+std::vector<std::string> rangeViolations(const Config& config) {
+  Config copy = config;
+  return parameters::violations([&copy](ParameterVisitor& visitor) { copy.declare(visitor); });
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,61 @@
+#include "visual_localization/features/sift_extractor.h"
+
+#include <opencv2/core/version.hpp>
+#include <opencv2/features2d.hpp>
+#include <stdexcept>
+#include <utility>
+
+namespace visual_localization {
+namespace {
+
+constexpr int kSmallestSide = 16;
+
+void requireGrey(const cv::Mat& grey) {
+  if (grey.type() != CV_8UC1) throw std::invalid_argument("SIFT: image must be 8-bit with one channel");
+  if (grey.rows < kSmallestSide || grey.cols < kSmallestSide) {
+    throw std::invalid_argument("SIFT: image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
+                                ", must be at least 16x16");
+  }
+}
+
+class OpenCvSiftExtractor : public SiftExtractor {
+ public:
+  explicit OpenCvSiftExtractor(const SiftConfig& config)
+      : sift_(cv::SIFT::create(config.max_features, config.octave_layers, config.contrast_threshold,
+                               config.edge_threshold, config.sigma_px, CV_8U)) {}
+
+  SiftFeatures extract(const cv::Mat& grey) override {
+    requireGrey(grey);
+    sift_->detectAndCompute(grey, cv::noArray(), found_, descriptors_);
+    std::vector<SiftKeypoint> keypoints;
+    keypoints.reserve(found_.size());
+    for (const auto& point : found_) keypoints.push_back({point.pt.x, point.pt.y, point.size, point.angle});
+    std::vector<std::uint8_t> bytes;
+    if (!found_.empty()) bytes.assign(descriptors_.datastart, descriptors_.dataend);
+    return SiftFeatures(std::move(keypoints), std::move(bytes));
+  }
+
+ private:
+  cv::Ptr<cv::SIFT> sift_;
+  std::vector<cv::KeyPoint> found_;
+  cv::Mat descriptors_;
+};
+
+}  // namespace
+
+void SiftConfig::declare(ParameterVisitor& visitor) {
+  visitor.integer({"sift/octave_layers", "1", "scale samples per octave"}, octave_layers, 1, 10);
+  visitor.real({"sift/contrast_threshold", "1", "weakest accepted extremum, as a share of full intensity"},
+               contrast_threshold, 0.0, 1.0);
+  visitor.real({"sift/edge_threshold", "1", "largest accepted ratio of principal curvatures"}, edge_threshold, 1.0,
+               1000.0);
+  visitor.real({"sift/sigma", "px", "blur of the first scale"}, sigma_px, 0.5, 10.0);
+  visitor.integer({"sift/max_features", "1", "keep only the strongest so many features; 0 keeps all"}, max_features, 0,
+                  100000);
+}
+
+std::unique_ptr<SiftExtractor> makeSiftExtractor(const SiftConfig& config) {
+  return std::make_unique<OpenCvSiftExtractor>(config);
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,29 @@
+#include "visual_localization/features/sift_features.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace visual_localization {
+
+SiftFeatures::SiftFeatures(std::vector<SiftKeypoint> keypoints, std::vector<std::uint8_t> descriptors)
+    : keypoints_(std::move(keypoints)), descriptors_(std::move(descriptors)) {
+  if (descriptors_.size() != keypoints_.size() * kDescriptorSize) {
+    throw std::invalid_argument("SIFT features: " + std::to_string(keypoints_.size()) + " keypoints but " +
+                                std::to_string(descriptors_.size()) + " descriptor bytes");
+  }
+}
+
+SiftFeatures SiftFeatures::subset(const std::vector<std::size_t>& indices) const {
+  std::vector<SiftKeypoint> keypoints;
+  std::vector<std::uint8_t> descriptors;
+  keypoints.reserve(indices.size());
+  descriptors.reserve(indices.size() * kDescriptorSize);
+  for (const std::size_t i : indices) {
+    keypoints.push_back(keypoints_.at(i));
+    descriptors.insert(descriptors.end(), descriptor(i), descriptor(i) + kDescriptorSize);
+  }
+  return SiftFeatures(std::move(keypoints), std::move(descriptors));
+}
+
+}  // namespace visual_localization

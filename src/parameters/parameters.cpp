@@ -1,0 +1,250 @@
+#include "visual_localization/parameters/parameters.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+#include <sstream>
+
+namespace visual_localization::parameters {
+namespace {
+
+std::string number(double value) {
+  std::ostringstream out;
+  out.precision(std::numeric_limits<double>::max_digits10 - 2);
+  out << value;
+  return out.str();
+}
+
+std::string range(double min, double max) { return "[" + number(min) + ", " + number(max) + "]"; }
+
+std::string oneOf(const std::vector<std::string>& options) {
+  std::string text;
+  for (const auto& option : options) text += (text.empty() ? "" : ", ") + option;
+  return "one of " + text;
+}
+
+bool contains(const std::vector<std::string>& options, const std::string& value) {
+  for (const auto& option : options) {
+    if (option == value) return true;
+  }
+  return false;
+}
+
+[[noreturn]] void refuse(const std::string& name, const std::string& value, const std::string& allowed) {
+  throw ParameterError("parameter '" + name + "' = " + value + " is not allowed: must be " + allowed);
+}
+
+/// Checks all values first, so that a later error cannot leave a half-changed configuration.
+class Assigner : public ParameterVisitor {
+ public:
+  Assigner(const ParameterValues& values, bool write) : values_(values), write_(write) {}
+
+  void real(const ParameterInfo& info, double& field, double min, double max) override {
+    const ParameterValue* value = find(info.name);
+    if (value == nullptr) return;
+    double wanted = 0.0;
+    if (const auto* as_real = std::get_if<double>(value)) {
+      wanted = *as_real;
+    } else if (const auto* as_integer = std::get_if<std::int64_t>(value)) {
+      wanted = static_cast<double>(*as_integer);
+    } else {
+      refuse(info.name, toString(*value), "a number in " + range(min, max));
+    }
+    if (!(wanted >= min && wanted <= max)) refuse(info.name, number(wanted), "in " + range(min, max));
+    if (write_) field = wanted;
+  }
+
+  void integer(const ParameterInfo& info, int& field, int min, int max) override {
+    const ParameterValue* value = find(info.name);
+    if (value == nullptr) return;
+    const auto* wanted = std::get_if<std::int64_t>(value);
+    if (wanted == nullptr || *wanted < min || *wanted > max) {
+      refuse(info.name, toString(*value), "an integer in " + range(min, max));
+    }
+    if (write_) field = static_cast<int>(*wanted);
+  }
+
+  void flag(const ParameterInfo& info, bool& field) override {
+    const ParameterValue* value = find(info.name);
+    if (value == nullptr) return;
+    const auto* wanted = std::get_if<bool>(value);
+    if (wanted == nullptr) refuse(info.name, toString(*value), "true or false");
+    if (write_) field = *wanted;
+  }
+
+  void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) override {
+    const ParameterValue* value = find(info.name);
+    if (value == nullptr) return;
+    const auto* wanted = std::get_if<std::string>(value);
+    if (wanted == nullptr || !contains(options, *wanted)) refuse(info.name, toString(*value), oneOf(options));
+    if (write_) field = *wanted;
+  }
+
+  void text(const ParameterInfo& info, std::string& field) override {
+    const ParameterValue* value = find(info.name);
+    if (value == nullptr) return;
+    const auto* wanted = std::get_if<std::string>(value);
+    if (wanted == nullptr) refuse(info.name, toString(*value), "a string");
+    if (write_) field = *wanted;
+  }
+
+  void refuseUnknown() const {
+    for (const auto& [name, value] : values_) {
+      if (known_.count(name) != 0) continue;
+      std::string all;
+      for (const auto& known : known_) all += (all.empty() ? "" : ", ") + known;
+      throw ParameterError("parameter '" + name + "' = " + toString(value) + " is unknown; known are " + all);
+    }
+  }
+
+ private:
+  const ParameterValue* find(const std::string& name) {
+    known_.insert(name);
+    const auto found = values_.find(name);
+    return found == values_.end() ? nullptr : &found->second;
+  }
+
+  const ParameterValues& values_;
+  bool write_;
+  std::set<std::string> known_;
+};
+
+class RangeChecker : public ParameterVisitor {
+ public:
+  void real(const ParameterInfo& info, double& field, double min, double max) override {
+    if (!(field >= min && field <= max)) report(info.name, number(field), "in " + range(min, max));
+  }
+  void integer(const ParameterInfo& info, int& field, int min, int max) override {
+    if (field < min || field > max) report(info.name, std::to_string(field), "an integer in " + range(min, max));
+  }
+  void flag(const ParameterInfo&, bool&) override {}
+  void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) override {
+    if (!contains(options, field)) report(info.name, field, oneOf(options));
+  }
+  void text(const ParameterInfo&, std::string&) override {}
+
+  std::vector<std::string> violations;
+
+ private:
+  void report(const std::string& name, const std::string& value, const std::string& allowed) {
+    violations.push_back("parameter '" + name + "' = " + value + " is not allowed: must be " + allowed);
+  }
+};
+
+class Collector : public ParameterVisitor {
+ public:
+  void real(const ParameterInfo& info, double& field, double, double) override { collected[info.name] = field; }
+  void integer(const ParameterInfo& info, int& field, int, int) override {
+    collected[info.name] = std::int64_t{field};
+  }
+  void flag(const ParameterInfo& info, bool& field) override { collected[info.name] = field; }
+  void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>&) override {
+    collected[info.name] = field;
+  }
+  void text(const ParameterInfo& info, std::string& field) override { collected[info.name] = field; }
+
+  ParameterValues collected;
+};
+
+class TableWriter : public ParameterVisitor {
+ public:
+  void real(const ParameterInfo& info, double& field, double min, double max) override {
+    row(info, number(field), range(min, max));
+  }
+  void integer(const ParameterInfo& info, int& field, int min, int max) override {
+    row(info, std::to_string(field), range(min, max));
+  }
+  void flag(const ParameterInfo& info, bool& field) override { row(info, field ? "true" : "false", "true, false"); }
+  void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) override {
+    row(info, field, oneOf(options));
+  }
+  void text(const ParameterInfo& info, std::string& field) override { row(info, "\"" + field + "\"", "text"); }
+
+  std::string table = "| parameter | default | unit | allowed | meaning |\n|---|---|---|---|---|\n";
+
+ private:
+  void row(const ParameterInfo& info, const std::string& value, const std::string& allowed) {
+    table += "| `" + info.name + "` | " + value + " | " + info.unit + " | " + allowed + " | " + info.description + " |\n";
+  }
+};
+
+void flatten(const YAML::Node& node, const std::string& prefix, const std::string& path, ParameterValues& out) {
+  for (const auto& entry : node) {
+    const auto key = entry.first.as<std::string>();
+    const std::string name = prefix.empty() ? key : prefix + "/" + key;
+    if (entry.second.IsMap()) {
+      flatten(entry.second, name, path, out);
+    } else if (entry.second.IsScalar()) {
+      // A quoted scalar carries the tag "!": it stays a string even when it looks like a number.
+      const std::string text = entry.second.Scalar();
+      out[name] = entry.second.Tag() == "!" ? ParameterValue(text) : parseScalar(text);
+    } else {
+      throw ParameterError(path + ": key '" + name + "' must be a single value or a mapping");
+    }
+  }
+}
+
+}  // namespace
+
+void assign(const Declaration& declare, const ParameterValues& values) {
+  Assigner check(values, false);
+  declare(check);
+  check.refuseUnknown();
+  Assigner write(values, true);
+  declare(write);
+}
+
+std::vector<std::string> violations(const Declaration& declare) {
+  RangeChecker checker;
+  declare(checker);
+  return checker.violations;
+}
+
+ParameterValues values(const Declaration& declare) {
+  Collector collector;
+  declare(collector);
+  return collector.collected;
+}
+
+std::string markdownTable(const Declaration& declare) {
+  TableWriter writer;
+  declare(writer);
+  return writer.table;
+}
+
+ParameterValues readYaml(const std::string& path) {
+  try {
+    const YAML::Node root = YAML::LoadFile(path);
+    ParameterValues out;
+    if (root.IsNull()) return out;
+    if (!root.IsMap()) throw ParameterError(path + ": must be a mapping of parameter names to values");
+    flatten(root, "", path, out);
+    return out;
+  } catch (const YAML::BadFile&) {
+    throw ParameterError(path + ": cannot be opened");
+  } catch (const YAML::Exception& error) {
+    throw ParameterError(path + ": not valid YAML: " + error.what());
+  }
+}
+
+ParameterValue parseScalar(const std::string& text) {
+  const YAML::Node node(text);
+  bool flag = false;
+  std::int64_t integer = 0;
+  double real = 0.0;
+  if (YAML::convert<bool>::decode(node, flag)) return flag;
+  if (YAML::convert<std::int64_t>::decode(node, integer)) return integer;
+  if (YAML::convert<double>::decode(node, real)) return real;
+  return text;
+}
+
+std::string toString(const ParameterValue& value) {
+  if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) return std::to_string(*integer);
+  if (const auto* real = std::get_if<double>(&value)) return number(*real);
+  return std::get<std::string>(value);
+}
+
+}  // namespace visual_localization::parameters
