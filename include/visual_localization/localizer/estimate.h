@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/similarity/similarity.h"
+#include "visual_localization/tracking/tracker.h"
+
+namespace visual_localization {
+
+/// How far an estimate may be trusted.
+enum class LocalizationState : std::uint8_t {
+  kNoMap = 0,
+  kInitializing = 1,  ///< the position was unknown and has not been confirmed yet
+  kTracking = 2,      ///< recognised images confirm the position
+  kUncertain = 3,     ///< the last images do not confirm it
+  kRecovering = 4,    ///< taken to be lost; the tracker searches
+};
+
+/// "NO_MAP", "INITIALIZING", ...
+std::string toString(LocalizationState state);
+
+/// Which features an estimate rests on.
+enum class FeatureKind : std::uint8_t { kSift = 0, kGlobal = 1 };
+
+/// "SIFT", "GLOBAL".
+std::string toString(FeatureKind kind);
+
+/// Position and heading in the map frame.
+struct PoseEstimate {
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();         ///< east, north
+  double yaw_rad = 0.0;                                         ///< of the training image, 0 = east, ccw
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< of the position
+  double yaw_variance_rad2 = 0.0;
+  GeodeticPoint geodetic;                                       ///< the same position by the map's datum
+};
+
+/// Wall-clock milliseconds of each stage of one image.
+struct StageTimes {
+  double extract_ms = 0.0;  ///< feature extraction and pruning
+  double match_ms = 0.0;    ///< comparisons with training images
+  double update_ms = 0.0;   ///< the tracker without the comparisons
+};
+
+/// Everything that is known after one image.
+struct Estimate {
+  std::int64_t stamp_ns = 0;  ///< of the image
+  LocalizationState state = LocalizationState::kInitializing;
+  PoseEstimate pose;
+  Score best;                         ///< best match among the training images compared
+  std::size_t best_image = 0;         ///< that training image
+  FeatureKind features = FeatureKind::kSift;
+  std::size_t comparisons = 0;        ///< distinct training images compared
+  std::size_t features_extracted = 0; ///< in the current image, before pruning
+  std::size_t features_kept = 0;      ///< after pruning
+  TrackerTuning tuning;
+  Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();  ///< sigma x, y of the cloud
+  StageTimes times;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/localizer/state_assessor.h"
+#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/tracking/dpso.h"
+#include "visual_localization/tracking/fitness.h"
+
+namespace visual_localization {
+
+/// Everything a user can set about localisation. How features are extracted is not here: the map says it.
+struct LocalizerConfig {
+  std::string tracker = "dpso";
+  std::string features = "sift";
+  int seed = 1;                   ///< same seed, images and map: same track
+  bool prune = true;              ///< keep only features that the image before showed as well
+  double max_image_gap_s = 10.0;  ///< longer pauses between images make the earlier one useless for pruning
+  MatchConfig match;
+  FitnessConfig fitness;
+  StateConfig state;
+  DpsoConfig dpso;
+
+  void declare(ParameterVisitor& visitor);
+  std::vector<std::string> violations() const;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "visual_localization/map/training_map.h"
+#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/similarity/score_cache.h"
+
+namespace visual_localization {
+
+/// How fitness falls off beside the recorded path, and from which match on a place counts as recognised.
+struct FitnessConfig {
+  double distance_sigma_m = 3.0;     ///< std of zeta in Kronfeld et al. (journal), Eq. 3
+  double recognised_similarity = 0.05; ///< m below this is a bad match (journal, section 5: 5 % of the features)
+
+  void declare(ParameterVisitor& visitor);
+  std::vector<std::string> violations() const { return {}; }
+};
+
+/// f(x, t) and the training image it rests on.
+struct Fitness {
+  double value = 0.0;
+  std::size_t training_image = 0;
+  Score score;
+};
+
+/// f(x, t) = m(i_M(x), s(t)) * zeta(distance to i_M(x)), Kronfeld et al. (journal), Eq. 3, zeta a Gaussian of
+/// height one.
+Fitness evaluateFitness(const Eigen::Vector2d& position_m, const TrainingMap& map, ScoreCache& scores,
+                        const FitnessConfig& config);
+
+}  // namespace visual_localization

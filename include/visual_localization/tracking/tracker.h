@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "visual_localization/similarity/score_cache.h"
+#include "visual_localization/tracking/particle.h"
+#include "visual_localization/tracking/prior.h"
+
+namespace visual_localization {
+
+/// What a tracker believes after an image.
+struct TrackerEstimate {
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();        ///< east, north in the map frame
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity(); ///< of the mode of the cloud that `position_m` is in
+  Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();          ///< sigma_x, sigma_y of the cloud (Weiss et al., Eq. 2)
+  std::size_t training_image = 0;                              ///< nearest to `position_m`
+  Score best;                                                  ///< best score among the training images compared
+  std::size_t best_image = 0;                                  ///< the training image of `best`
+};
+
+/// How the tracker is tuned at the moment, for people to see.
+struct TrackerTuning {
+  double v0 = 0.0;             ///< speed limit, share of the area's range per image
+  double speed_ema = 0.0;      ///< smoothed speed of the swarm, same unit
+  double quantum_share = 0.0;  ///< share of quantum particles
+  double phi2 = 0.0;           ///< attraction of the best particle
+  bool recovering = false;     ///< the position is taken to be lost
+};
+
+/// Follows the position from image to image without odometry.
+class Tracker {
+ public:
+  virtual ~Tracker() = default;
+  /// Forgets the past; the particles of the next image are drawn from `prior`.
+  virtual void reset(const Prior& prior) = 0;
+  /// One image: moves the particles, scores them, estimates.
+  virtual TrackerEstimate update(ScoreCache& scores) = 0;
+  virtual const std::vector<Particle>& particles() const = 0;
+  virtual TrackerTuning tuning() const = 0;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,18 @@
+#include "visual_localization/localizer/estimate.h"
+
+namespace visual_localization {
+
+std::string toString(LocalizationState state) {
+  switch (state) {
+    case LocalizationState::kNoMap: return "NO_MAP";
+    case LocalizationState::kInitializing: return "INITIALIZING";
+    case LocalizationState::kTracking: return "TRACKING";
+    case LocalizationState::kUncertain: return "UNCERTAIN";
+    case LocalizationState::kRecovering: return "RECOVERING";
+  }
+  return "UNKNOWN";
+}
+
+std::string toString(FeatureKind kind) { return kind == FeatureKind::kSift ? "SIFT" : "GLOBAL"; }
+
+}  // namespace visual_localization

@@ -1,0 +1,228 @@
+#include "visual_localization/tracking/dpso.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "visual_localization/tracking/cloud.h"
+
+namespace visual_localization {
+namespace {
+
+/// Keeps a particle inside the area and stops the velocity that led out of it.
+void confine(Particle& particle, const Area& area) {
+  for (int axis = 0; axis < 2; ++axis) {
+    const double inside = std::clamp(particle.position_m[axis], area.min_m[axis], area.max_m[axis]);
+    if (inside != particle.position_m[axis]) particle.velocity_m[axis] = 0.0;
+    particle.position_m[axis] = inside;
+  }
+}
+
+/// Length of a displacement in shares of the area's range; an axis without range cannot be travelled.
+double relativeLength(const Eigen::Vector2d& displacement_m, const Eigen::Vector2d& range_m) {
+  double squared = 0.0;
+  for (int axis = 0; axis < 2; ++axis) {
+    if (range_m[axis] <= 0.0) continue;
+    const double share = displacement_m[axis] / range_m[axis];
+    squared += share * share;
+  }
+  return std::sqrt(squared);
+}
+
+double approach(double from, double to, double start, double share) {
+  const double step = std::abs(to - start) * share;
+  return from < to ? std::min(to, from + step) : std::max(to, from - step);
+}
+
+}  // namespace
+
+void DpsoConfig::declare(ParameterVisitor& visitor) {
+  visitor.integer({"dpso/particles", "1", "size of the swarm"}, particles, 2, 100000);
+  visitor.real({"dpso/inertia", "1", "share of the velocity that is kept (omega)"}, inertia, 0.0, 1.0);
+  visitor.real({"dpso/phi0", "1", "weight of the random perturbation"}, phi0, 0.0, 10.0);
+  visitor.real({"dpso/phi2", "1", "weight of the attraction to the best particle"}, phi2, 0.0, 4.0);
+  visitor.real({"dpso/quantum_share", "1", "share of quantum particles (q_r)"}, quantum_share, 0.0, 1.0);
+  visitor.real({"dpso/quantum_std", "1", "spread of quantum particles, share of the area's range (q_d)"}, quantum_std,
+               0.0, 1.0);
+  visitor.real({"dpso/high_energy_share", "1", "share of particles allowed a higher speed (h_r)"}, high_energy_share,
+               0.0, 1.0);
+  visitor.real({"dpso/high_energy_factor", "1", "their speed limit in multiples of v0"}, high_energy_factor, 1.0, 100.0);
+  visitor.real({"dpso/v0", "1", "initial speed limit per image, share of the area's range"}, v0, 1e-6, 1.0);
+  visitor.flag({"dpso/adapt_speed", "", "keep v0 at about twice the speed of the swarm"}, adapt_speed);
+  visitor.real({"dpso/v0_min", "1", "lower limit of the speed adaptation"}, v0_min, 1e-6, 1.0);
+  visitor.real({"dpso/ema_alpha", "1", "weight of the newest speed in its moving average (alpha)"}, ema_alpha, 0.001,
+               1.0);
+  visitor.flag({"dpso/recover", "", "raise the diversity of the swarm when the position is lost"}, recover);
+  visitor.integer({"dpso/recovery_patience", "1", "bad images in a row before recovery starts"}, recovery_patience, 1,
+                  1000);
+  visitor.real({"dpso/recovery_step", "1", "share of the way to the limits taken per bad image"}, recovery_step, 0.01,
+               1.0);
+  visitor.real({"dpso/v0_max", "1", "speed limit in recovery and of the speed adaptation"}, v0_max, 1e-6, 1.0);
+  visitor.real({"dpso/quantum_share_max", "1", "share of quantum particles in recovery"}, quantum_share_max, 0.0, 1.0);
+  visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);
+  visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
+               1000.0);
+}
+
+std::vector<std::string> DpsoConfig::violations() const {
+  std::vector<std::string> wrong;
+  if (v0_min > v0) wrong.emplace_back("parameter 'dpso/v0_min' must not exceed 'dpso/v0'");
+  if (v0 > v0_max) wrong.emplace_back("parameter 'dpso/v0' must not exceed 'dpso/v0_max'");
+  if (quantum_share > quantum_share_max) {
+    wrong.emplace_back("parameter 'dpso/quantum_share' must not exceed 'dpso/quantum_share_max'");
+  }
+  if (phi2_min > phi2) wrong.emplace_back("parameter 'dpso/phi2_min' must not exceed 'dpso/phi2'");
+  if (quantum_share_max + high_energy_share > 1.0) {
+    wrong.emplace_back("'dpso/quantum_share_max' + 'dpso/high_energy_share' must not exceed 1");
+  }
+  return wrong;
+}
+
+Dpso::Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed)
+    : map_(map), config_(config), fitness_config_(fitness), random_(seed), area_(map.area()) {
+  particles_.resize(static_cast<std::size_t>(config.particles));
+  fitness_.resize(particles_.size());
+  reset(anywhere(area_));
+}
+
+void Dpso::reset(const Prior& prior) {
+  tuning_ = {config_.v0, 0.0, config_.quantum_share, config_.phi2, false};
+  attractor_m_.reset();
+  centre_of_mass_m_.reset();
+  speed_known_ = false;
+  bad_images_ = 0;
+  for (Particle& particle : particles_) {
+    particle = Particle();
+    particle.position_m = prior(random_);
+    for (int axis = 0; axis < 2; ++axis) {
+      particle.velocity_m[axis] = random_.uniform(-1.0, 1.0) * config_.v0 * area_.range()[axis];
+    }
+    particle.weight = 1.0 / static_cast<double>(particles_.size());
+    confine(particle, area_);
+  }
+  assignKinds();
+}
+
+TrackerEstimate Dpso::update(ScoreCache& scores) {
+  if (attractor_m_) {
+    for (Particle& particle : particles_) {
+      particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
+      confine(particle, area_);
+    }
+  }
+  const std::size_t best = evaluate(scores);
+  const TrackerEstimate result = estimate(best);
+  attractor_m_ = result.position_m;
+  adaptSpeed();
+  adaptDiversity(result.best);
+  assignKinds();
+  return result;
+}
+
+/// The first particles are the quantum ones, the last the high-energy ones, so that a growing quantum share
+/// takes from the standard ones.
+void Dpso::assignKinds() {
+  const auto count = static_cast<double>(particles_.size());
+  const auto quantum = static_cast<std::size_t>(std::lround(tuning_.quantum_share * count));
+  const auto high_energy = static_cast<std::size_t>(std::lround(config_.high_energy_share * count));
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    particles_[i].kind = i < quantum                                ? ParticleKind::kQuantum
+                         : i + high_energy >= particles_.size() ? ParticleKind::kHighEnergy
+                                                                    : ParticleKind::kStandard;
+  }
+}
+
+/// Kronfeld et al. (journal), Eq. 4 and 5, with r0 in [-1, 1] so that the swarm does not drift one way.
+void Dpso::move(Particle& particle) {
+  const double factor = particle.kind == ParticleKind::kHighEnergy ? config_.high_energy_factor : 1.0;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double range = area_.range()[axis];
+    const double perturbation = config_.phi0 * random_.uniform(-1.0, 1.0) * range * tuning_.v0;
+    const double attraction =
+        tuning_.phi2 * random_.uniform(0.0, 1.0) * ((*attractor_m_)[axis] - particle.position_m[axis]);
+    const double limit = factor * tuning_.v0 * range;
+    const double wanted = config_.inertia * particle.velocity_m[axis] + perturbation + attraction;
+    particle.velocity_m[axis] = std::clamp(wanted, -limit, limit);
+  }
+  particle.position_m += particle.velocity_m;
+}
+
+/// Kronfeld et al. (journal), Eq. 6.
+void Dpso::moveQuantum(Particle& particle) {
+  particle.velocity_m.setZero();
+  particle.position_m = *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * area_.range()));
+}
+
+std::size_t Dpso::evaluate(ScoreCache& scores) {
+  std::size_t best = 0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    fitness_[i] = evaluateFitness(particles_[i].position_m, map_, scores, fitness_config_);
+    particles_[i].weight = fitness_[i].value;
+    if (fitness_[i].value > fitness_[best].value) best = i;
+  }
+  normaliseWeights(particles_);
+  return best;
+}
+
+TrackerEstimate Dpso::estimate(std::size_t best) const {
+  TrackerEstimate result;
+  result.position_m = particles_[best].position_m;
+  result.training_image = fitness_[best].training_image;
+  result.covariance_m2 = covarianceAbout(result.position_m, config_.mode_radius_m, particles_);
+  result.spread_m = momentsOf(particles_).spread();
+  for (const Fitness& fitness : fitness_) {
+    if (fitness.score.similarity < result.best.similarity) continue;
+    result.best = fitness.score;
+    result.best_image = fitness.training_image;
+  }
+  return result;
+}
+
+/// v_sw: the quantum particles do not travel, so they do not count.
+Eigen::Vector2d Dpso::centreOfMass() const {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double count = 0.0;
+  for (const Particle& particle : particles_) {
+    if (particle.kind == ParticleKind::kQuantum) continue;
+    sum += particle.position_m;
+    count += 1.0;
+  }
+  return count > 0.0 ? Eigen::Vector2d(sum / count) : *attractor_m_;
+}
+
+/// Holds v0 at about twice the speed of the swarm (journal, section 5, "Self-adaptive parameters").
+void Dpso::adaptSpeed() {
+  const Eigen::Vector2d centre = centreOfMass();
+  if (centre_of_mass_m_) {
+    const double speed = relativeLength(centre - *centre_of_mass_m_, area_.range());
+    tuning_.speed_ema =
+        speed_known_ ? (1.0 - config_.ema_alpha) * tuning_.speed_ema + config_.ema_alpha * speed : speed;
+    speed_known_ = true;
+  }
+  centre_of_mass_m_ = centre;
+  if (!config_.adapt_speed || tuning_.recovering || !speed_known_) return;
+  const double ratio = tuning_.speed_ema / tuning_.v0;
+  if (ratio > 0.6) tuning_.v0 *= 1.1;
+  if (ratio < 0.4) tuning_.v0 *= 0.9;
+  tuning_.v0 = std::clamp(tuning_.v0, config_.v0_min, config_.v0_max);
+}
+
+/// Recovery phase of the same section: a best match that stays bad boosts the diversity step by step; the
+/// first good one ends it.
+void Dpso::adaptDiversity(const Score& best) {
+  if (!config_.recover) return;
+  const bool bad = best.similarity < fitness_config_.recognised_similarity;
+  bad_images_ = bad ? bad_images_ + 1 : 0;
+  if (!bad && tuning_.recovering) {
+    tuning_.v0 = config_.v0;
+    tuning_.quantum_share = config_.quantum_share;
+    tuning_.phi2 = config_.phi2;
+  }
+  tuning_.recovering = bad_images_ >= config_.recovery_patience;
+  if (!tuning_.recovering) return;
+  tuning_.v0 = approach(tuning_.v0, config_.v0_max, config_.v0, config_.recovery_step);
+  tuning_.quantum_share =
+      approach(tuning_.quantum_share, config_.quantum_share_max, config_.quantum_share, config_.recovery_step);
+  tuning_.phi2 = approach(tuning_.phi2, config_.phi2_min, config_.phi2, config_.recovery_step);
+}
+
+}  // namespace visual_localization

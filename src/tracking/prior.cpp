@@ -1,0 +1,50 @@
+#include "visual_localization/tracking/prior.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <stdexcept>
+
+namespace visual_localization {
+
+Prior anywhere(const Area& area) {
+  return [area](Random& random) {
+    const double x = random.uniform(0.0, 1.0);
+    const double y = random.uniform(0.0, 1.0);
+    return Eigen::Vector2d(area.min_m + Eigen::Vector2d(x, y).cwiseProduct(area.range()));
+  };
+}
+
+Prior around(const Eigen::Vector2d& centre_m, double radius_m) {
+  if (!centre_m.allFinite()) throw std::invalid_argument("the centre must be finite");
+  if (!std::isfinite(radius_m) || radius_m < 0.0) {
+    throw std::invalid_argument("the radius must be finite and not negative, in metres");
+  }
+  return [centre_m, radius_m](Random& random) {
+    constexpr double kPi = 3.14159265358979323846;
+    const double angle = random.uniform(-kPi, kPi);
+    const double distance = radius_m * std::sqrt(random.uniform(0.0, 1.0));
+    return Eigen::Vector2d(centre_m + distance * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+  };
+}
+
+Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& covariance_m2) {
+  if (!mean_m.allFinite() || !covariance_m2.allFinite()) {
+    throw std::invalid_argument("position and covariance must be finite");
+  }
+  const double scale = std::max(1.0, covariance_m2.cwiseAbs().maxCoeff());
+  const double tolerance = 1e-6 * scale;
+  if (std::abs(covariance_m2(0, 1) - covariance_m2(1, 0)) > tolerance) {
+    throw std::invalid_argument("the covariance must be symmetric");
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance_m2);
+  if (solver.eigenvalues().minCoeff() < -tolerance) {
+    throw std::invalid_argument("the covariance must be positive semi-definite");
+  }
+  const Eigen::Matrix2d root =
+      solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return [mean_m, root](Random& random) {
+    return Eigen::Vector2d(mean_m + root * random.normal(Eigen::Vector2d(1.0, 1.0)));
+  };
+}
+
+}  // namespace visual_localization
