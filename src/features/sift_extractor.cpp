@@ -1,9 +1,10 @@
 #include "visual_localization/features/sift_extractor.h"
 
-#include <opencv2/core/version.hpp>
-#include <opencv2/features2d.hpp>
 #include <stdexcept>
 #include <utility>
+
+#include <opencv2/core/version.hpp>
+#include <opencv2/features2d.hpp>
 
 namespace visual_localization {
 namespace {

@@ -1,8 +1,9 @@
 #include "visual_localization/localizer/front_end.h"
 
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <utility>
+
+#include <opencv2/imgproc.hpp>
 
 #include "visual_localization/features/pruning.h"
 #include "visual_localization/geo/geodetic_point.h"

@@ -1,6 +1,7 @@
 #include "visual_localization/localizer/localizer.h"
 
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "visual_localization/parameters/parameters.h"
@@ -29,12 +30,11 @@ std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const LocalizerConf
 Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
     : map_(std::move(map)),
       config_(validated(config)),
-      front_end_(map_->header().sift, config_.match, map_->header().image_size, config_.prune,
-                 config_.max_image_gap_s),
+      front_end_(map_->header().sift, config_.match, map_->header().image_size, config_.prune, config_.max_image_gap_s),
       similarity_(std::make_unique<SiftSimilarity>(config_.match)),
       scores_(map_->size()),
       tracker_(makeTracker(*map_, config_)),
-      assessor_(config_.state, config_.fitness.recognised_similarity) {}
+      assessor_(config_.state) {}
 
 Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const auto start = Clock::now();
@@ -58,9 +58,9 @@ Estimate Localizer::process(const Observation& observation) {
 
   Estimate estimate;
   estimate.stamp_ns = observation.stamp_ns;
-  estimate.pose = poseOf(tracked);
   estimate.tuning = tracker_->tuning();
   estimate.state = assessor_.assess(tracked, estimate.tuning.recovering);
+  estimate.pose = poseOf(tracked, estimate.state);
   estimate.best = tracked.best;
   estimate.best_image = tracked.best_image;
   estimate.comparisons = scores_.comparisons();
@@ -79,14 +79,32 @@ void Localizer::relocalize(const Prior& prior) {
   assessor_.reset();
 }
 
-PoseEstimate Localizer::poseOf(const TrackerEstimate& estimate) const {
+/// While the images confirm the position the covariance is that of its mode; otherwise that of the whole cloud
+/// about it, so that nothing downstream trusts a guess.
+PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) const {
+  const double floor_m2 = config_.min_position_std_m * config_.min_position_std_m;
   PoseEstimate pose;
-  pose.position_m = estimate.position_m;
-  pose.covariance_m2 = estimate.covariance_m2;
-  pose.yaw_rad = map_->image(estimate.training_image).yaw_rad;
-  pose.yaw_variance_rad2 = 0.0;
-  pose.geodetic = map_->frame().toGeodetic(estimate.position_m);
+  pose.position_m = tracked.position_m;
+  pose.covariance_m2 = state == LocalizationState::kTracking ? tracked.mode_covariance_m2 : tracked.cloud_covariance_m2;
+  pose.covariance_m2 += floor_m2 * Eigen::Matrix2d::Identity();
+  pose.yaw_rad = map_->image(tracked.training_image).yaw_rad;
+  pose.yaw_variance_rad2 = yawVariance(tracked);
+  pose.geodetic = map_->frame().toGeodetic(tracked.position_m);
   return pose;
+}
+
+/// How much the headings of the training images around the position differ from the one that is reported.
+double Localizer::yawVariance(const TrackerEstimate& tracked) const {
+  constexpr std::size_t kNeighbours = 5;
+  const auto neighbours = map_->nearest(tracked.position_m, kNeighbours);
+  double squares = 0.0;
+  for (const Neighbour& neighbour : neighbours) {
+    const double difference = std::remainder(
+        map_->image(neighbour.image).yaw_rad - map_->image(tracked.training_image).yaw_rad, 2.0 * EIGEN_PI);
+    squares += difference * difference;
+  }
+  const double floor_rad2 = config_.min_yaw_std_rad * config_.min_yaw_std_rad;
+  return floor_rad2 + squares / static_cast<double>(neighbours.size());
 }
 
 }  // namespace visual_localization

@@ -12,8 +12,11 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"seed", "1", "of the random generator; the same seed, map and images give the same track"}, seed, 0,
                   std::numeric_limits<int>::max());
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);
-  visitor.real({"max_image_gap", "s", "after a longer pause the image before is not used for pruning"},
-               max_image_gap_s, 0.001, 3600.0);
+  visitor.real({"max_image_gap", "s", "after a longer pause the image before is not used for pruning"}, max_image_gap_s,
+               0.001, 3600.0);
+  visitor.real({"min_position_std", "m", "no pose claims to be more accurate than this"}, min_position_std_m, 0.0,
+               1000.0);
+  visitor.real({"min_yaw_std", "rad", "no heading claims to be more accurate than this"}, min_yaw_std_rad, 0.0, 3.2);
   match.declare(visitor);
   fitness.declare(visitor);
   state.declare(visitor);
@@ -22,6 +25,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
 
 std::vector<std::string> LocalizerConfig::violations() const {
   std::vector<std::string> wrong = rangeViolations(*this);
+  for (const auto& violation : state.violations()) wrong.push_back(violation);
   for (const auto& violation : dpso.violations()) wrong.push_back(violation);
   return wrong;
 }

@@ -1,11 +1,11 @@
 #include "visual_localization/parameters/parameters.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <cmath>
 #include <limits>
 #include <set>
 #include <sstream>
+
+#include <yaml-cpp/yaml.h>
 
 namespace visual_localization::parameters {
 namespace {
@@ -136,9 +136,7 @@ class RangeChecker : public ParameterVisitor {
 class Collector : public ParameterVisitor {
  public:
   void real(const ParameterInfo& info, double& field, double, double) override { collected[info.name] = field; }
-  void integer(const ParameterInfo& info, int& field, int, int) override {
-    collected[info.name] = std::int64_t{field};
-  }
+  void integer(const ParameterInfo& info, int& field, int, int) override { collected[info.name] = std::int64_t{field}; }
   void flag(const ParameterInfo& info, bool& field) override { collected[info.name] = field; }
   void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>&) override {
     collected[info.name] = field;
@@ -166,7 +164,8 @@ class TableWriter : public ParameterVisitor {
 
  private:
   void row(const ParameterInfo& info, const std::string& value, const std::string& allowed) {
-    table += "| `" + info.name + "` | " + value + " | " + info.unit + " | " + allowed + " | " + info.description + " |\n";
+    table +=
+        "| `" + info.name + "` | " + value + " | " + info.unit + " | " + allowed + " | " + info.description + " |\n";
   }
 };
 

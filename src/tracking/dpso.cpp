@@ -45,7 +45,8 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
                0.0, 1.0);
   visitor.real({"dpso/high_energy_share", "1", "share of particles allowed a higher speed (h_r)"}, high_energy_share,
                0.0, 1.0);
-  visitor.real({"dpso/high_energy_factor", "1", "their speed limit in multiples of v0"}, high_energy_factor, 1.0, 100.0);
+  visitor.real({"dpso/high_energy_factor", "1", "their speed limit in multiples of v0"}, high_energy_factor, 1.0,
+               100.0);
   visitor.real({"dpso/v0", "1", "initial speed limit per image, share of the area's range"}, v0, 1e-6, 1.0);
   visitor.flag({"dpso/adapt_speed", "", "keep v0 at about twice the speed of the swarm"}, adapt_speed);
   visitor.real({"dpso/v0_min", "1", "lower limit of the speed adaptation"}, v0_min, 1e-6, 1.0);
@@ -110,8 +111,9 @@ TrackerEstimate Dpso::update(ScoreCache& scores) {
     }
   }
   const std::size_t best = evaluate(scores);
-  const TrackerEstimate result = estimate(best);
-  attractor_m_ = result.position_m;
+  // An image that matches nothing says nothing about where to go: the attractor stays where it was.
+  if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
+  const TrackerEstimate result = estimate();
   adaptSpeed();
   adaptDiversity(result.best);
   assignKinds();
@@ -125,9 +127,9 @@ void Dpso::assignKinds() {
   const auto quantum = static_cast<std::size_t>(std::lround(tuning_.quantum_share * count));
   const auto high_energy = static_cast<std::size_t>(std::lround(config_.high_energy_share * count));
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    particles_[i].kind = i < quantum                                ? ParticleKind::kQuantum
+    particles_[i].kind = i < quantum                            ? ParticleKind::kQuantum
                          : i + high_energy >= particles_.size() ? ParticleKind::kHighEnergy
-                                                                    : ParticleKind::kStandard;
+                                                                : ParticleKind::kStandard;
   }
 }
 
@@ -163,14 +165,18 @@ std::size_t Dpso::evaluate(ScoreCache& scores) {
   return best;
 }
 
-TrackerEstimate Dpso::estimate(std::size_t best) const {
+/// The best particle; before any image was recognised, the middle of the cloud.
+TrackerEstimate Dpso::estimate() const {
+  const CloudMoments cloud = momentsOf(particles_);
   TrackerEstimate result;
-  result.position_m = particles_[best].position_m;
-  result.training_image = fitness_[best].training_image;
-  result.covariance_m2 = covarianceAbout(result.position_m, config_.mode_radius_m, particles_);
-  result.spread_m = momentsOf(particles_).spread();
+  result.position_m = attractor_m_.value_or(cloud.mean_m);
+  result.training_image = map_.nearest(result.position_m).image;
+  result.mode_covariance_m2 = covarianceAbout(result.position_m, particles_, config_.mode_radius_m);
+  result.cloud_covariance_m2 = covarianceAbout(result.position_m, particles_);
+  result.spread_m = cloud.spread();
+  result.best_image = result.training_image;
   for (const Fitness& fitness : fitness_) {
-    if (fitness.score.similarity < result.best.similarity) continue;
+    if (fitness.score.similarity <= result.best.similarity) continue;
     result.best = fitness.score;
     result.best_image = fitness.training_image;
   }
@@ -186,7 +192,7 @@ Eigen::Vector2d Dpso::centreOfMass() const {
     sum += particle.position_m;
     count += 1.0;
   }
-  return count > 0.0 ? Eigen::Vector2d(sum / count) : *attractor_m_;
+  return count > 0.0 ? Eigen::Vector2d(sum / count) : momentsOf(particles_).mean_m;
 }
 
 /// Holds v0 at about twice the speed of the swarm (journal, section 5, "Self-adaptive parameters").

@@ -1,8 +1,9 @@
 #include "visual_localization/tracking/prior.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <stdexcept>
+
+#include <Eigen/Eigenvalues>
 
 namespace visual_localization {
 
@@ -36,12 +37,12 @@ Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& 
   if (std::abs(covariance_m2(0, 1) - covariance_m2(1, 0)) > tolerance) {
     throw std::invalid_argument("the covariance must be symmetric");
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance_m2);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(covariance_m2);
   if (solver.eigenvalues().minCoeff() < -tolerance) {
     throw std::invalid_argument("the covariance must be positive semi-definite");
   }
-  const Eigen::Matrix2d root =
-      solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const Eigen::Matrix2d root = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   return [mean_m, root](Random& random) {
     return Eigen::Vector2d(mean_m + root * random.normal(Eigen::Vector2d(1.0, 1.0)));
   };

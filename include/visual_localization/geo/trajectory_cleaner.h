@@ -14,10 +14,10 @@ namespace visual_localization {
 /// What became of one fix.
 enum class FixVerdict {
   kKept,
-  kNoFix,      ///< the receiver said so, or the coordinates are not finite or out of range
-  kDisordered, ///< stamp not after the one before
-  kSpike,      ///< single outlier
-  kBend,       ///< slow deviation from the smooth path although the receiver claims a fix (multipath)
+  kNoFix,       ///< the receiver said so, or the coordinates are not finite or out of range
+  kDisordered,  ///< stamp not after the one before
+  kSpike,       ///< single outlier
+  kBend,        ///< slow deviation from the smooth path although the receiver claims a fix (multipath)
 };
 
 std::string toString(FixVerdict verdict);

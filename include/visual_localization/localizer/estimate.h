@@ -1,10 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+
+#include <Eigen/Core>
 
 #include "visual_localization/geo/geodetic_point.h"
 #include "visual_localization/similarity/similarity.h"
@@ -36,7 +37,7 @@ struct PoseEstimate {
   double yaw_rad = 0.0;                                         ///< of the training image, 0 = east, ccw
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< of the position
   double yaw_variance_rad2 = 0.0;
-  GeodeticPoint geodetic;                                       ///< the same position by the map's datum
+  GeodeticPoint geodetic;  ///< the same position by the map's datum
 };
 
 /// Wall-clock milliseconds of each stage of one image.
@@ -51,12 +52,12 @@ struct Estimate {
   std::int64_t stamp_ns = 0;  ///< of the image
   LocalizationState state = LocalizationState::kInitializing;
   PoseEstimate pose;
-  Score best;                         ///< best match among the training images compared
-  std::size_t best_image = 0;         ///< that training image
+  Score best;                  ///< best match among the training images compared
+  std::size_t best_image = 0;  ///< that training image
   FeatureKind features = FeatureKind::kSift;
-  std::size_t comparisons = 0;        ///< distinct training images compared
-  std::size_t features_extracted = 0; ///< in the current image, before pruning
-  std::size_t features_kept = 0;      ///< after pruning
+  std::size_t comparisons = 0;         ///< distinct training images compared
+  std::size_t features_extracted = 0;  ///< in the current image, before pruning
+  std::size_t features_kept = 0;       ///< after pruning
   TrackerTuning tuning;
   Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();  ///< sigma x, y of the cloud
   StageTimes times;

@@ -3,8 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <optional>
+
+#include <opencv2/core.hpp>
 
 #include "visual_localization/features/image_features.h"
 #include "visual_localization/features/sift_extractor.h"

@@ -2,8 +2,9 @@
 
 #include <cstdint>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <vector>
+
+#include <opencv2/core.hpp>
 
 #include "visual_localization/localizer/estimate.h"
 #include "visual_localization/localizer/front_end.h"
@@ -40,7 +41,8 @@ class Localizer {
   const ImageFeatures& lastFeatures() const { return last_features_; }
 
  private:
-  PoseEstimate poseOf(const TrackerEstimate& estimate) const;
+  PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state) const;
+  double yawVariance(const TrackerEstimate& tracked) const;
 
   std::shared_ptr<const TrainingMap> map_;
   LocalizerConfig config_;

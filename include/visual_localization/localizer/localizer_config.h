@@ -15,9 +15,11 @@ namespace visual_localization {
 struct LocalizerConfig {
   std::string tracker = "dpso";
   std::string features = "sift";
-  int seed = 1;                   ///< same seed, images and map: same track
-  bool prune = true;              ///< keep only features that the image before showed as well
-  double max_image_gap_s = 10.0;  ///< longer pauses between images make the earlier one useless for pruning
+  int seed = 1;                     ///< same seed, images and map: same track
+  bool prune = true;                ///< keep only features that the image before showed as well
+  double max_image_gap_s = 10.0;    ///< longer pauses between images make the earlier one useless for pruning
+  double min_position_std_m = 0.5;  ///< accuracy of the map's own positions: no covariance claims more
+  double min_yaw_std_rad = 0.1;     ///< the camera is never mounted and driven exactly along the path
   MatchConfig match;
   FitnessConfig fitness;
   StateConfig state;

@@ -1,9 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <cstddef>
+#include <deque>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "visual_localization/localizer/estimate.h"
 #include "visual_localization/parameters/parameter_visitor.h"
@@ -12,33 +14,33 @@ namespace visual_localization {
 
 /// When a position counts as confirmed.
 struct StateConfig {
-  int min_matches = 4;            ///< fewer matched features are no evidence, whatever their share
-  int images_to_confirm = 3;      ///< recognised images in a row before TRACKING
-  int images_to_doubt = 2;        ///< unrecognised images in a row before UNCERTAIN
-  double max_step_m = 10.0;       ///< a larger jump between two images breaks the row
+  double min_similarity = 0.08;  ///< a weaker best match does not confirm a position
+  int min_matches = 5;           ///< fewer matched SIFT features are no evidence, whatever their share
+  int window = 5;                ///< so many of the last images are looked at
+  int images_to_confirm = 4;     ///< so many of them must confirm the position
+  double max_step_m = 10.0;      ///< a larger jump between two images makes what came before worthless
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const { return {}; }
+  std::vector<std::string> violations() const;
 };
 
 /// Turns the evidence of successive images into a state. The cloud alone cannot tell whether a robot is lost;
 /// the image match is independent evidence.
 class StateAssessor {
  public:
-  StateAssessor(const StateConfig& config, double recognised_similarity);
+  explicit StateAssessor(const StateConfig& config) : config_(config) {}
   /// The position is unknown again.
   void reset();
   /// The state after one more image.
   LocalizationState assess(const TrackerEstimate& estimate, bool recovering);
 
  private:
+  bool confirms(const TrackerEstimate& estimate) const;
+
   StateConfig config_;
-  double recognised_similarity_;
-  int recognised_ = 0;    ///< in a row
-  int unrecognised_ = 0;  ///< in a row
-  bool confirmed_ = false;
-  bool has_last_ = false;
-  Eigen::Vector2d last_position_m_ = Eigen::Vector2d::Zero();
+  std::deque<bool> confirmations_;  ///< of the last images, newest at the back
+  bool ever_confirmed_ = false;     ///< since the last reset
+  std::optional<Eigen::Vector2d> last_position_m_;
 };
 
 }  // namespace visual_localization

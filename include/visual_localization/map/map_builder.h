@@ -4,10 +4,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <opencv2/core.hpp>
 
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
@@ -18,9 +19,9 @@ namespace visual_localization {
 
 /// How a recorded round becomes training images.
 struct MapBuilderConfig {
-  double min_spacing_m = 0.0;     ///< skip an image closer than this to the last kept one of its session
-  bool prune = true;              ///< keep only features seen again in a neighbouring training image
-  int preview_width_px = 80;      ///< width of the stored preview; 0 = none
+  double min_spacing_m = 0.0;  ///< skip an image closer than this to the last kept one of its session
+  bool prune = true;           ///< keep only features seen again in a neighbouring training image
+  int preview_width_px = 80;   ///< width of the stored preview; 0 = none
   SiftConfig sift;
   MatchConfig match;
   TrajectoryCleanerConfig trajectory;

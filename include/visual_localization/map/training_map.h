@@ -1,11 +1,12 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
 
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/geo/local_frame.h"

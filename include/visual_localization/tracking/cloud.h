@@ -1,7 +1,9 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <limits>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "visual_localization/tracking/particle.h"
 
@@ -17,8 +19,10 @@ struct CloudMoments {
 
 /// Moments of the whole cloud.
 CloudMoments momentsOf(const std::vector<Particle>& particles);
-/// Second moments about `centre_m` of the particles within `radius_m` of it; zero when there is none.
-Eigen::Matrix2d covarianceAbout(const Eigen::Vector2d& centre_m, double radius_m, const std::vector<Particle>& particles);
+/// Second moments about `centre_m` of the particles within `radius_m` of it (default: all); zero when their
+/// weights sum to zero.
+Eigen::Matrix2d covarianceAbout(const Eigen::Vector2d& centre_m, const std::vector<Particle>& particles,
+                                double radius_m = std::numeric_limits<double>::infinity());
 /// Scales the weights to sum one; all equal when their sum is not positive.
 void normaliseWeights(std::vector<Particle>& particles);
 

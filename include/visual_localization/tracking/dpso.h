@@ -14,24 +14,24 @@ namespace visual_localization {
 /// Parameters of the dynamic particle swarm; names and defaults of Kronfeld et al. (journal), section 5.
 struct DpsoConfig {
   int particles = 80;
-  double inertia = 0.99;             ///< omega
-  double phi0 = 0.3;                 ///< weight of the random perturbation
-  double phi2 = 0.6;                 ///< weight of the attraction to the best particle
-  double quantum_share = 0.10;       ///< q_r
-  double quantum_std = 0.15;         ///< q_d, share of the area's range
-  double high_energy_share = 0.10;   ///< h_r
-  double high_energy_factor = 3.0;   ///< speed limit of high-energy particles, times v0
-  double v0 = 0.015;                 ///< speed limit, share of the area's range per image
-  bool adapt_speed = true;           ///< follow the speed of the swarm with v0
-  double v0_min = 0.002;             ///< speed adaptation never goes below
-  double ema_alpha = 0.125;          ///< alpha of the moving average of the swarm's speed
-  bool recover = true;               ///< boost diversity when the position is lost
-  int recovery_patience = 3;         ///< bad images in a row before recovery starts
-  double recovery_step = 0.25;       ///< share of the way to the limits per bad image
+  double inertia = 0.99;            ///< omega
+  double phi0 = 0.3;                ///< weight of the random perturbation
+  double phi2 = 0.6;                ///< weight of the attraction to the best particle
+  double quantum_share = 0.10;      ///< q_r
+  double quantum_std = 0.15;        ///< q_d, share of the area's range
+  double high_energy_share = 0.10;  ///< h_r
+  double high_energy_factor = 3.0;  ///< speed limit of high-energy particles, times v0
+  double v0 = 0.015;                ///< speed limit, share of the area's range per image
+  bool adapt_speed = true;          ///< follow the speed of the swarm with v0
+  double v0_min = 0.002;            ///< speed adaptation never goes below
+  double ema_alpha = 0.125;         ///< alpha of the moving average of the swarm's speed
+  bool recover = true;              ///< boost diversity when the position is lost
+  int recovery_patience = 2;        ///< bad images in a row before recovery starts
+  double recovery_step = 0.5;       ///< share of the way to the limits per bad image
   double v0_max = 0.1;
   double quantum_share_max = 0.20;
   double phi2_min = 0.01;
-  double mode_radius_m = 5.0;        ///< particles this close to the best one make up its mode
+  double mode_radius_m = 5.0;  ///< particles this close to the best one make up its mode
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const;
@@ -54,7 +54,7 @@ class Dpso : public Tracker {
   void move(Particle& particle);
   void moveQuantum(Particle& particle);
   std::size_t evaluate(ScoreCache& scores);
-  TrackerEstimate estimate(std::size_t best) const;
+  TrackerEstimate estimate() const;
   void adaptSpeed();
   void adaptDiversity(const Score& best);
   Eigen::Vector2d centreOfMass() const;

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
+
+#include <Eigen/Core>
 
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/parameters/parameter_visitor.h"
@@ -11,8 +12,8 @@ namespace visual_localization {
 
 /// How fitness falls off beside the recorded path, and from which match on a place counts as recognised.
 struct FitnessConfig {
-  double distance_sigma_m = 3.0;     ///< std of zeta in Kronfeld et al. (journal), Eq. 3
-  double recognised_similarity = 0.05; ///< m below this is a bad match (journal, section 5: 5 % of the features)
+  double distance_sigma_m = 10.0;       ///< std of zeta in Kronfeld et al. (journal), Eq. 3
+  double recognised_similarity = 0.05;  ///< m below this is a bad match (journal, section 5: 5 % of the features)
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const { return {}; }

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <functional>
+
+#include <Eigen/Core>
 
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/tracking/random.h"

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <random>
+
+#include <Eigen/Core>
 
 namespace visual_localization {
 
