@@ -1,0 +1,194 @@
+// Localises the images of a recorded round against a map: what the robot does, without a robot.
+
+#include <cstdio>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "app_support.h"
+#include "progress_bar.h"
+#include "visual_localization/evaluation/error_statistics.h"
+#include "visual_localization/evaluation/image_order.h"
+#include "visual_localization/evaluation/track_csv.h"
+#include "visual_localization/geo/trajectory.h"
+#include "visual_localization/io/partial_file.h"
+#include "visual_localization/localizer/localizer.h"
+#include "visual_localization/map/map_store.h"
+#include "visual_localization/parameters/parameters.h"
+#include "visual_localization/ros/bag_reader.h"
+#include "visual_localization/ros/image_conversion.h"
+
+namespace visual_localization::apps {
+namespace {
+
+struct Options {
+  std::string map;
+  std::string bag;
+  std::string output;
+  std::string config;
+  std::string tracker;
+  std::string features;
+  std::string image_topic = "/stereo/left/image_raw";
+  std::string truth_topic;
+  std::optional<std::int64_t> particles;
+  std::optional<std::int64_t> seed;
+  std::size_t start_index = 0;
+  std::optional<std::size_t> kidnap_at;
+  std::optional<std::size_t> kidnap_to;
+};
+
+void declareOptions(CLI::App& app, Options& options) {
+  app.add_option("--map", options.map, "Map file")->required();
+  app.add_option("--bag", options.bag, "Recorded round")->required();
+  app.add_option("--output", options.output, "Track to write, CSV")->required();
+  app.add_option("--config", options.config, "Parameters, YAML (see config/localizer.yaml)");
+  app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
+  app.add_option("--features", options.features, "Features (parameter 'features')");
+  app.add_option("--particles", options.particles, "Number of particles of the tracker");
+  app.add_option("--seed", options.seed, "Seed of the random generator (parameter 'seed')");
+  app.add_option("--start-index", options.start_index, "First image; the round is closed, indices wrap");
+  auto* at = app.add_option("--kidnap-at", options.kidnap_at, "Jump after so many images ...");
+  auto* to = app.add_option("--kidnap-to", options.kidnap_to, "... to this image of the round");
+  at->needs(to);
+  to->needs(at);
+  app.add_option("--image-topic", options.image_topic, "Raw topic, or the one that '/compressed' belongs to")
+      ->capture_default_str();
+  app.add_option("--truth-topic", options.truth_topic, "NavSatFix topic with true positions: prints the error");
+}
+
+LocalizerConfig configOf(const Options& options) {
+  LocalizerConfig config;
+  if (!options.config.empty()) {
+    try {
+      assignParameters(config, parameters::readYaml(options.config));
+    } catch (const ParameterError& error) {
+      throw ParameterError(options.config + ": " + error.what());
+    }
+  }
+  ParameterValues given;
+  if (!options.tracker.empty()) given["tracker"] = options.tracker;
+  if (!options.features.empty()) given["features"] = options.features;
+  if (options.seed) given["seed"] = *options.seed;
+  if (options.particles) given["dpso/particles"] = *options.particles;
+  try {
+    assignParameters(config, given);
+  } catch (const ParameterError& error) {
+    throw UsageError(error.what());
+  }
+  return config;
+}
+
+std::vector<std::size_t> orderOf(const Options& options, std::size_t images) {
+  std::optional<Kidnapping> kidnapping;
+  if (options.kidnap_at) kidnapping = Kidnapping{*options.kidnap_at, *options.kidnap_to};
+  try {
+    return imageOrder(images, options.start_index, kidnapping);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(error.what());
+  }
+}
+
+/// The true positions as a function of time; fixes that are not believable are left out.
+Trajectory truthOf(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
+  std::vector<TrajectoryPoint> points;
+  for (const Fix& fix : bag.fixes(topic)) {
+    if (!fix.has_fix || !isValid(fix.position)) continue;
+    if (!points.empty() && fix.stamp_ns <= points.back().stamp_ns) continue;
+    points.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), 0.0});
+  }
+  if (points.empty()) throw BagError(bag.path() + ": topic " + topic + " holds no believable fix");
+  return Trajectory(std::move(points));
+}
+
+/// What a run adds up to.
+struct Totals {
+  std::size_t images = 0;
+  std::size_t unusable = 0;
+  std::size_t tracking = 0;
+  double comparisons = 0.0;
+  StageTimes times;
+
+  void add(const Estimate& estimate) {
+    ++images;
+    if (estimate.state == LocalizationState::kTracking) ++tracking;
+    comparisons += static_cast<double>(estimate.comparisons);
+    times.extract_ms += estimate.times.extract_ms;
+    times.match_ms += estimate.times.match_ms;
+    times.update_ms += estimate.times.update_ms;
+  }
+};
+
+void print(const Totals& totals) {
+  const auto images = static_cast<double>(totals.images);
+  const StageTimes& times = totals.times;
+  std::printf("images %zu, not usable %zu, TRACKING %.1f %%\n", totals.images, totals.unusable,
+              100.0 * static_cast<double>(totals.tracking) / images);
+  std::printf("comparisons per image %.1f\n", totals.comparisons / images);
+  std::printf("ms per image %.2f (extract %.2f, match %.2f, update %.3f)\n",
+              (times.extract_ms + times.match_ms + times.update_ms) / images, times.extract_ms / images,
+              times.match_ms / images, times.update_ms / images);
+}
+
+void print(const ErrorStatistics& errors) {
+  std::printf("error: mean %.2f m, median %.2f m, within 5 m %.1f %% of %zu images with a true position\n",
+              errors.mean_m, errors.median_m, 100.0 * errors.within_5m, errors.count);
+}
+
+/// One image; nothing when it cannot be used, which is said once per image and does not end the run.
+std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index, Localizer& localizer) {
+  try {
+    const BagImage image = images.read(index);
+    return localizer.process(image.stamp_ns, image.decode());
+  } catch (const ImageError& error) {
+    std::cerr << "image " << index << ": " << error.what() << '\n';
+  } catch (const std::invalid_argument& error) {
+    std::cerr << "image " << index << ": " << error.what() << '\n';
+  }
+  return std::nullopt;
+}
+
+void run(const Options& options) {
+  const LocalizerConfig config = configOf(options);
+  Localizer localizer(loadMap(options.map), config);
+  const BagReader bag(options.bag);
+  const BagImages images = bag.images(options.image_topic);
+  const std::vector<std::size_t> order = orderOf(options, images.size());
+  std::optional<Trajectory> truth;
+  if (!options.truth_topic.empty()) truth = truthOf(bag, options.truth_topic, localizer.map().frame());
+
+  std::string track = trackCsvHeader();
+  std::vector<double> errors_m;
+  Totals totals;
+  ProgressBar progress("localize");
+  for (std::size_t step = 0; step < order.size(); ++step) {
+    progress.show(step, order.size());
+    const std::optional<Estimate> estimate = localizeImage(images, order[step], localizer);
+    if (!estimate) {
+      ++totals.unusable;
+      continue;
+    }
+    track += trackCsvRow(*estimate);
+    totals.add(*estimate);
+    const auto true_point = truth ? truth->at(estimate->stamp_ns) : std::nullopt;
+    if (true_point) errors_m.push_back((estimate->pose.position_m - true_point->position_m).norm());
+  }
+  progress.show(order.size(), order.size());
+  if (totals.images == 0) throw BagError(options.bag + ": no usable image on " + images.topic());
+  writeFile(options.output, track);
+  print(totals);
+  if (truth) print(summarise(std::move(errors_m)));
+}
+
+}  // namespace
+}  // namespace visual_localization::apps
+
+int main(int argc, char** argv) {
+  using namespace visual_localization::apps;
+  CLI::App app("Localises the images of a recorded round against a map and writes the track as CSV.", "localize");
+  Options options;
+  declareOptions(app, options);
+  return runProgram(app, argc, argv, [&options] { run(options); });
+}
