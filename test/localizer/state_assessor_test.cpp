@@ -1,0 +1,70 @@
+#include "visual_localization/localizer/state_assessor.h"
+
+#include <gtest/gtest.h>
+
+namespace visual_localization {
+namespace {
+
+TrackerEstimate seen(double similarity, std::size_t matches, double x = 0.0) {
+  TrackerEstimate estimate;
+  estimate.best = {similarity, matches};
+  estimate.position_m = {x, 0.0};
+  return estimate;
+}
+
+const TrackerEstimate kGood = seen(0.3, 30);
+const TrackerEstimate kBad = seen(0.01, 1);
+
+LocalizationState afterGood(StateAssessor& assessor, int images) {
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < images; ++i) state = assessor.assess(kGood, false);
+  return state;
+}
+
+TEST(StateAssessor, EnoughGoodImagesConfirmAPosition) {
+  StateAssessor assessor{StateConfig()};
+  EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kInitializing);
+  EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, OneBadImageIsForgivenTwoAreNot) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.assess(kBad, false), LocalizationState::kTracking);
+  EXPECT_EQ(assessor.assess(kBad, false), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(kBad, true), LocalizationState::kRecovering);
+}
+
+TEST(StateAssessor, AfterALossThePositionMustBeConfirmedAgain) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  for (int i = 0; i < 5; ++i) assessor.assess(kBad, true);
+  EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kUncertain);
+  EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, AJumpVoidsEarlierConfirmations) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.assess(seen(0.3, 30, 60.0), false), LocalizationState::kUncertain);
+}
+
+TEST(StateAssessor, AShareOfFewFeaturesIsNoEvidence) {
+  StateAssessor assessor{StateConfig()};
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(assessor.assess(seen(0.5, 2), false), LocalizationState::kInitializing);
+}
+
+TEST(StateAssessor, ResetForgets) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  assessor.reset();
+  EXPECT_EQ(assessor.assess(kGood, false), LocalizationState::kInitializing);
+}
+
+TEST(StateAssessor, NamesOfTheStates) {
+  EXPECT_EQ(toString(LocalizationState::kNoMap), "NO_MAP");
+  EXPECT_EQ(toString(LocalizationState::kRecovering), "RECOVERING");
+}
+
+}  // namespace
+}  // namespace visual_localization

@@ -1,0 +1,233 @@
+#include "visual_localization/tracking/dpso.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "test/support/synthetic.h"
+
+namespace visual_localization {
+namespace {
+
+/// A world without images: how alike two places look depends on their distance only.
+class World {
+ public:
+  explicit World(std::shared_ptr<const TrainingMap> map) : map_(std::move(map)), scores_(map_->size()) {}
+
+  /// What the robot sees from here.
+  ScoreCache& from(const Eigen::Vector2d& robot_m) {
+    scores_.startImage([this, robot_m](std::size_t image) {
+      const double distance = (map_->image(image).position_m - robot_m).norm() / 2.0;
+      const double similarity = 0.5 * std::exp(-0.5 * distance * distance);
+      return Score{similarity, static_cast<std::size_t>(100.0 * similarity)};
+    });
+    return scores_;
+  }
+
+  ScoreCache& inTheDark() {
+    scores_.startImage([](std::size_t) { return Score{}; });
+    return scores_;
+  }
+
+  const TrainingMap& map() const { return *map_; }
+
+ private:
+  std::shared_ptr<const TrainingMap> map_;
+  ScoreCache scores_;
+};
+
+World roundWorld() { return World(test::mapAt(test::circle(200, 30.0))); }
+
+Eigen::Vector2d onCircle(double arc_m) {
+  return 30.0 * Eigen::Vector2d(std::cos(arc_m / 30.0), std::sin(arc_m / 30.0));
+}
+
+double sumOfWeights(const std::vector<Particle>& particles) {
+  return std::accumulate(particles.begin(), particles.end(), 0.0,
+                         [](double sum, const Particle& particle) { return sum + particle.weight; });
+}
+
+std::size_t countOf(const std::vector<Particle>& particles, ParticleKind kind) {
+  return static_cast<std::size_t>(
+      std::count_if(particles.begin(), particles.end(), [kind](const Particle& p) { return p.kind == kind; }));
+}
+
+TEST(Dpso, FindsAndFollowsARobot) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  double error_sum_m = 0.0;
+  for (int step = 0; step < 200; ++step) {
+    const Eigen::Vector2d robot = onCircle(0.6 * step);
+    const TrackerEstimate estimate = tracker.update(world.from(robot));
+    if (step >= 60) error_sum_m += (estimate.position_m - robot).norm();
+  }
+  EXPECT_LT(error_sum_m / 140.0, 1.5);
+}
+
+TEST(Dpso, WeightsSumToOneAndParticlesStayInTheArea) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 2);
+  const Area& area = world.map().area();
+  for (int step = 0; step < 50; ++step) {
+    tracker.update(step % 10 == 9 ? world.inTheDark() : world.from(onCircle(0.6 * step)));
+    EXPECT_NEAR(sumOfWeights(tracker.particles()), 1.0, 1e-9);
+    for (const Particle& particle : tracker.particles()) {
+      ASSERT_TRUE(particle.position_m.allFinite());
+      ASSERT_TRUE((particle.position_m.array() >= area.min_m.array()).all());
+      ASSERT_TRUE((particle.position_m.array() <= area.max_m.array()).all());
+      ASSERT_GE(particle.weight, 0.0);
+    }
+  }
+}
+
+TEST(Dpso, TheSameSeedGivesTheSameTrack) {
+  World world = roundWorld();
+  Dpso first(world.map(), DpsoConfig(), FitnessConfig(), 3);
+  Dpso second(world.map(), DpsoConfig(), FitnessConfig(), 3);
+  Dpso other(world.map(), DpsoConfig(), FitnessConfig(), 4);
+  bool differs = false;
+  for (int step = 0; step < 30; ++step) {
+    const Eigen::Vector2d robot = onCircle(0.6 * step);
+    const Eigen::Vector2d position = first.update(world.from(robot)).position_m;
+    EXPECT_EQ(position, second.update(world.from(robot)).position_m);
+    differs = differs || position != other.update(world.from(robot)).position_m;
+  }
+  EXPECT_TRUE(differs);
+}
+
+TEST(Dpso, TheSharesOfTheKindsAreKept) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  EXPECT_EQ(countOf(tracker.particles(), ParticleKind::kQuantum), 8u);
+  EXPECT_EQ(countOf(tracker.particles(), ParticleKind::kHighEnergy), 8u);
+  EXPECT_EQ(countOf(tracker.particles(), ParticleKind::kStandard), 64u);
+}
+
+TEST(Dpso, NobodyFliesFasterThanAllowed) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.adapt_speed = false;
+  Dpso tracker(world.map(), config, FitnessConfig(), 5);
+  const Eigen::Vector2d range = world.map().area().range();
+  for (int step = 0; step < 40; ++step) {
+    tracker.update(world.from(onCircle(0.6 * step)));
+    for (const Particle& particle : tracker.particles()) {
+      const double factor = particle.kind == ParticleKind::kHighEnergy ? 3.0 : 1.0;
+      for (int axis = 0; axis < 2; ++axis) {
+        ASSERT_LE(std::abs(particle.velocity_m[axis]), factor * config.v0 * range[axis] * (1.0 + 1e-12));
+      }
+    }
+  }
+}
+
+TEST(Dpso, AStraightStreetHasNoSecondAxis) {
+  World world(test::mapAt(test::street(50, 2.0)));
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  TrackerEstimate estimate;
+  for (int step = 0; step < 40; ++step) estimate = tracker.update(world.from({20.0 + 0.6 * step, 0.0}));
+  EXPECT_NEAR(estimate.position_m.x(), 20.0 + 0.6 * 39, 3.0);
+  EXPECT_EQ(estimate.position_m.y(), 0.0);
+  EXPECT_TRUE(estimate.mode_covariance_m2.allFinite());
+  EXPECT_TRUE(std::isfinite(tracker.tuning().v0));
+}
+
+TEST(Dpso, AMapOfOneImageWorks) {
+  World world(test::mapAt({{3.0, 4.0}}));
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  for (int step = 0; step < 5; ++step) {
+    const TrackerEstimate estimate = tracker.update(world.from({3.0, 4.0}));
+    EXPECT_EQ(estimate.position_m, Eigen::Vector2d(3.0, 4.0));
+  }
+}
+
+TEST(Dpso, SpeedLimitFollowsTheRobot) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.recover = false;
+  Dpso tracker(world.map(), config, FitnessConfig(), 1);
+  for (int step = 0; step < 150; ++step) tracker.update(world.from(onCircle(0.3 * step)));
+  const double slow = tracker.tuning().v0;
+  for (int step = 0; step < 150; ++step) tracker.update(world.from(onCircle(45.0 + 1.5 * step)));
+  const double fast = tracker.tuning().v0;
+  EXPECT_GT(fast, 1.5 * slow);
+  EXPECT_LE(fast, config.v0_max);
+  EXPECT_GE(slow, config.v0_min);
+}
+
+TEST(Dpso, ABadMatchStartsRecoveryAndAGoodOneEndsIt) {
+  World world = roundWorld();
+  DpsoConfig config;
+  Dpso tracker(world.map(), config, FitnessConfig(), 1);
+  for (int step = 0; step < 60; ++step) tracker.update(world.from(onCircle(0.0)));
+  EXPECT_FALSE(tracker.tuning().recovering);
+  for (int step = 0; step < config.recovery_patience - 1; ++step) tracker.update(world.inTheDark());
+  EXPECT_FALSE(tracker.tuning().recovering);
+  for (int step = 0; step < 10; ++step) tracker.update(world.inTheDark());
+  EXPECT_TRUE(tracker.tuning().recovering);
+  EXPECT_DOUBLE_EQ(tracker.tuning().v0, config.v0_max);
+  EXPECT_DOUBLE_EQ(tracker.tuning().quantum_share, config.quantum_share_max);
+  EXPECT_DOUBLE_EQ(tracker.tuning().phi2, config.phi2_min);
+  EXPECT_EQ(countOf(tracker.particles(), ParticleKind::kQuantum), 16u);
+  for (int step = 0; step < 60 && tracker.tuning().recovering; ++step) tracker.update(world.from(onCircle(0.0)));
+  EXPECT_FALSE(tracker.tuning().recovering);
+  EXPECT_DOUBLE_EQ(tracker.tuning().quantum_share, config.quantum_share);
+  EXPECT_DOUBLE_EQ(tracker.tuning().phi2, config.phi2);
+}
+
+TEST(Dpso, FindsAKidnappedRobotAgain) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  for (int step = 0; step < 60; ++step) tracker.update(world.from(onCircle(0.6 * step)));
+  TrackerEstimate estimate;
+  int step = 60;
+  const double half_m = 30.0 * EIGEN_PI;
+  for (; step < 260; ++step) {
+    estimate = tracker.update(world.from(onCircle(half_m + 0.6 * step)));
+    if ((estimate.position_m - onCircle(half_m + 0.6 * step)).norm() < 3.0) break;
+  }
+  EXPECT_LT(step, 260);
+}
+
+TEST(Dpso, AnImageThatMatchesNothingMovesNoEstimate) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  for (int step = 0; step < 60; ++step) tracker.update(world.from(onCircle(0.0)));
+  const Eigen::Vector2d before = tracker.update(world.from(onCircle(0.0))).position_m;
+  EXPECT_EQ(tracker.update(world.inTheDark()).position_m, before);
+}
+
+TEST(Dpso, ResetDrawsFromThePrior) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  tracker.reset(around({20.0, 5.0}, 2.0));
+  for (const Particle& particle : tracker.particles()) {
+    EXPECT_LE((particle.position_m - Eigen::Vector2d(20.0, 5.0)).norm(), 2.0);
+  }
+}
+
+TEST(Dpso, CountsAtMostOneComparisonAParticle) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.particles = 30;
+  Dpso tracker(world.map(), config, FitnessConfig(), 1);
+  for (int step = 0; step < 20; ++step) {
+    ScoreCache& scores = world.from(onCircle(0.6 * step));
+    tracker.update(scores);
+    EXPECT_LE(scores.comparisons(), 30u);
+    EXPECT_GE(scores.comparisons(), 1u);
+  }
+}
+
+TEST(DpsoConfig, SaysWhichConstraintIsViolated) {
+  EXPECT_TRUE(DpsoConfig().violations().empty());
+  DpsoConfig config;
+  config.v0 = 0.5;
+  config.phi2_min = 0.9;
+  config.high_energy_share = 0.9;
+  EXPECT_EQ(config.violations().size(), 3u);
+}
+
+}  // namespace
+}  // namespace visual_localization
