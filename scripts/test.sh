@@ -19,7 +19,7 @@ step() { printf '\n== %s\n' "$*"; }
 check_style() {
   step "Style"
   cd "$repo"
-  find include src test -name '*.h' -o -name '*.cpp' | xargs clang-format --dry-run -Werror
+  find include src test \( -name '*.h' -o -name '*.cpp' \) -print0 | xargs -0 clang-format --dry-run -Werror
   echo "clang-format: clean"
   scripts/check_imports.py
   shellcheck scripts/*.sh .ci/run
