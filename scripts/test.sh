@@ -34,7 +34,9 @@ build() {
   cmake --preset "$preset" >"$build.configure.log" 2>&1 || { cat "$build.configure.log"; exit 1; }
   cmake --build "$build" --parallel "$(nproc)"
   # catkin keeps the programs of its rostests out of `all`.
-  if cmake --build "$build" --target help | grep -qx '\.\.\. tests'; then
+  local targets
+  targets=$(cmake --build "$build" --target help)
+  if grep -qx '\.\.\. tests' <<<"$targets"; then
     cmake --build "$build" --target tests --parallel "$(nproc)"
   fi
 }
@@ -45,18 +47,24 @@ print_counts() {
 import sys, xml.etree.ElementTree as xml
 from pathlib import Path
 
-def count(paths):
+def is_skipped(case):
+    return case.find('skipped') is not None or case.get('status') == 'notrun' or case.get('result') == 'skipped'
+
+def is_failed(case):
+    return case.find('failure') is not None or case.find('error') is not None
+
+def show(title, paths):
     cases = [case for path in paths for case in xml.parse(path).iter('testcase')]
-    skipped = [case for case in cases if case.find('skipped') is not None or case.get('status') == 'notrun']
-    failed = [case for case in cases if case.find('failure') is not None or case.find('error') is not None]
-    return len(cases), len(cases) - len(failed) - len(skipped), len(failed), len(skipped)
+    skipped, failed = [sum(map(test, cases)) for test in (is_skipped, is_failed)]
+    print(f'{title}: {len(cases)} tests, {len(cases) - failed - skipped} passed, {failed} failed, {skipped} skipped')
+    return [case for case in cases if is_skipped(case)]
 
 build = Path(sys.argv[1])
-line = '{}: {} tests, {} passed, {} failed, {} skipped'
-print(line.format('ctest', *count([build / 'ctest.xml'])))
+show('ctest', [build / 'ctest.xml'])
 reports = sorted(build.glob('test_results/**/rosunit-*.xml'))
 if reports:
-    print(line.format('inside the rostests', *count(reports)))
+    for case in show('inside the rostests', reports):
+        print(f'  skipped: {case.get("classname")}.{case.get("name")}')
 PYTHON
 }
 
