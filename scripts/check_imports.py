@@ -2,7 +2,7 @@
 """Checks that imports run one way, and that only ros/ and apps/ know ROS.
 
 A folder of src/ and include/visual_localization/ may include its own headers and those of the folders before it:
-parameters <- geo <- features <- map <- similarity <- tracking <- localizer <- evaluation <- ros <- apps.
+io <- parameters <- geo <- features <- map <- similarity <- tracking <- localizer <- evaluation <- ros <- apps.
 """
 import argparse
 import re
@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Iterator, Optional, Tuple
 
 PACKAGE = 'visual_localization'
-ORDER = ['parameters', 'geo', 'features', 'map', 'similarity', 'tracking', 'localizer', 'evaluation', 'ros', 'apps']
+ORDER = ['io', 'parameters', 'geo', 'features', 'map', 'similarity', 'tracking', 'localizer', 'evaluation', 'ros',
+         'apps']
 KNOWS_ROS = {'ros', 'apps'}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 ROS_HEADER = re.compile(

@@ -19,7 +19,11 @@ import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import NavSatFix
-from visual_localization.msg import LocalizationStatus
+
+try:
+    from visual_localization.msg import LocalizationStatus
+except ImportError:
+    sys.exit('record_track: source the devel/setup.bash of the workspace first: no messages of visual_localization')
 
 COLUMNS = ['stamp', 'east_m', 'north_m', 'yaw_rad', 'latitude_deg', 'longitude_deg', 'state', 'similarity', 'features',
            'comparisons', 'extract_ms', 'match_ms', 'update_ms', 'true_latitude_deg', 'true_longitude_deg', 'error_m',

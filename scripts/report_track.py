@@ -68,6 +68,8 @@ def read_map(path: Optional[Path]) -> Optional[Tuple[np.ndarray, np.ndarray]]:
     if path is None:
         return None
     rows = read_csv(path)
+    if not rows or not {'east_m', 'north_m'} <= rows[0].keys():
+        raise SystemExit(f'report_track: {path} has no columns east_m and north_m')
     return np.array([float(row['east_m']) for row in rows]), np.array([float(row['north_m']) for row in rows])
 
 
@@ -171,6 +173,9 @@ def main() -> int:
     print('\n'.join(summary(track)))
     paths = plot(track, read_map(args.map_csv), args.plot or args.track.with_suffix(''))
     print('plot             ' + ' and '.join(str(path) for path in paths))
+    if track.dropped:
+        print(f'report_track: {track.dropped} images came too fast and were dropped; play the bag slower',
+              file=sys.stderr)
     reason = failure(track, args.max_median_error)
     if reason:
         print(f'report_track: not localised: {reason}', file=sys.stderr)

@@ -16,8 +16,10 @@ USAGE
 # The files to check, one a line, relative to the repository.
 select_files() {
   if [[ -n $changed_since ]]; then
-    { git -C "$repo" diff --name-only --diff-filter=d "$changed_since"; git -C "$repo" ls-files --others --exclude-standard; } \
-      | grep -E '^(src|test)/.*\.cpp$' || true
+    {
+      git -C "$repo" diff --name-only --diff-filter=d "$changed_since"
+      git -C "$repo" ls-files --others --exclude-standard
+    } | grep -E '^(src|test)/.*\.cpp$' || true
   else
     (cd "$repo" && find src test -name '*.cpp' | sort)
   fi
