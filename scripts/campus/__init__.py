@@ -1,0 +1,1 @@
+"""A procedural campus: its textures, its geometry and the drive around its main building."""

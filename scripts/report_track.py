@@ -1,0 +1,187 @@
+#!/usr/bin/python3
+"""Judges and plots a track that record_track.py wrote.
+
+Prints error, cost and states, and draws track, error and state over time as PNG and SVG. Exit code 1 when the robot was
+not localised: no pose, never tracking, or a median error above --max-median-error.
+"""
+import argparse
+import csv
+import math
+import sys
+from pathlib import Path
+from typing import Dict, List, Optional, Tuple
+
+import matplotlib
+matplotlib.use('Agg')
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+
+STATES = ['INITIALIZING', 'TRACKING', 'UNCERTAIN', 'RECOVERING']
+COLOURS = {'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e', 'RECOVERING': '#d62728'}
+
+
+class Track:
+    """The columns of a track; NaN where a cell is empty."""
+
+    def __init__(self, rows: List[Dict[str, str]]):
+        self.count = len(rows)
+        self.stamps = self._column(rows, 'stamp')
+        self.seconds = self.stamps - self.stamps[0]
+        self.east, self.north = self._column(rows, 'east_m'), self._column(rows, 'north_m')
+        self.error = self._column(rows, 'error_m')
+        self.comparisons = self._column(rows, 'comparisons')
+        self.milliseconds = sum(self._column(rows, name) for name in ('extract_ms', 'match_ms', 'update_ms'))
+        self.states = np.array([row['state'] for row in rows])
+        self.dropped = int(np.nanmax(self._column(rows, 'images_dropped')))
+        self.refused = int(np.nanmax(self._column(rows, 'images_refused')))
+        self.true_east, self.true_north = self._truth(rows)
+
+    @staticmethod
+    def _column(rows: List[Dict[str, str]], name: str) -> np.ndarray:
+        return np.array([float(row[name] or 'nan') for row in rows])
+
+    def _truth(self, rows: List[Dict[str, str]]) -> Tuple[np.ndarray, np.ndarray]:
+        """The exact positions in the map frame, which one image with both pose and fix ties to the ellipsoid."""
+        latitude, longitude = self._column(rows, 'latitude_deg'), self._column(rows, 'longitude_deg')
+        known = np.flatnonzero(np.isfinite(self.east) & np.isfinite(latitude))
+        if not known.size:
+            return np.full(self.count, math.nan), np.full(self.count, math.nan)
+        tie = known[0]
+        sine = math.sin(math.radians(latitude[tie]))
+        ratio = 1 - 0.00669437999014 * sine * sine
+        prime_vertical = 6378137.0 / math.sqrt(ratio)
+        meridian = prime_vertical * (1 - 0.00669437999014) / ratio
+        north = np.radians(self._column(rows, 'true_latitude_deg') - latitude[tie]) * meridian
+        east = np.radians(self._column(rows, 'true_longitude_deg') - longitude[tie])
+        east = east * prime_vertical * math.cos(math.radians(latitude[tie]))
+        return self.east[tie] + east, self.north[tie] + north
+
+
+def read_csv(path: Path) -> List[Dict[str, str]]:
+    """Rows of a CSV file by column name."""
+    with open(path, newline='', encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+def read_map(path: Optional[Path]) -> Optional[Tuple[np.ndarray, np.ndarray]]:
+    """East and north of the training images from `map_info --export-csv`."""
+    if path is None:
+        return None
+    rows = read_csv(path)
+    if not rows or not {'east_m', 'north_m'} <= rows[0].keys():
+        raise SystemExit(f'report_track: {path} has no columns east_m and north_m')
+    return np.array([float(row['east_m']) for row in rows]), np.array([float(row['north_m']) for row in rows])
+
+
+def summary(track: Track) -> List[str]:
+    """What came out, in lines for people."""
+    judged = track.error[np.isfinite(track.error)]
+    poses = int(np.isfinite(track.east).sum())
+    lines = [f'images           {track.count} answered, {poses} with a pose, {track.dropped} dropped, '
+             f'{track.refused} refused']
+    if judged.size:
+        lines.append(f'error            mean {judged.mean():.2f} m, median {np.median(judged):.2f} m, '
+                     f'within 5 m {100 * np.mean(judged < 5):.1f} %')
+        tracking = track.error[(track.states == 'TRACKING') & np.isfinite(track.error)]
+        if tracking.size:
+            lines.append(f'  while tracking mean {tracking.mean():.2f} m, median {np.median(tracking):.2f} m')
+    lines.append(f'comparisons      {np.nanmean(track.comparisons):.1f} per image')
+    lines.append(f'time             {np.nanmean(track.milliseconds):.1f} ms per image')
+    shares = [(state, 100 * np.mean(track.states == state)) for state in STATES]
+    lines.append('states           ' + ', '.join(f'{state} {share:.1f} %' for state, share in shares if share))
+    return lines
+
+
+def failure(track: Track, max_median_error_m: float) -> Optional[str]:
+    """Why this counts as not localised, in words; None when it was."""
+    judged = track.error[np.isfinite(track.error)]
+    if not judged.size:
+        return 'no pose whose exact position is known'
+    if not (track.states == 'TRACKING').any():
+        return 'the localizer never reached TRACKING'
+    if np.median(judged) > max_median_error_m:
+        return f'the median error of {np.median(judged):.2f} m is above {max_median_error_m:.2f} m'
+    return None
+
+
+def plot_track(axes: plt.Axes, track: Track, training: Optional[Tuple[np.ndarray, np.ndarray]]) -> None:
+    """The map, the exact path and the estimates, coloured by state."""
+    if training:
+        axes.plot(*training, '.', color='#c7d5e5', markersize=6, label='training images')
+    axes.plot(track.true_east, track.true_north, '-', color='black', linewidth=1, label='exact path')
+    for state in STATES:
+        chosen = (track.states == state) & np.isfinite(track.east)
+        if chosen.any():
+            axes.plot(track.east[chosen], track.north[chosen], '.', color=COLOURS[state], markersize=4,
+                      label=state.lower())
+    axes.set(xlabel='east [m]', ylabel='north [m]', aspect='equal', title='Track')
+    axes.legend(fontsize='small', loc='center')
+    axes.grid(alpha=.3)
+
+
+def plot_error(axes: plt.Axes, track: Track) -> None:
+    """Error over time; logarithmic, since being lost is worse by magnitudes."""
+    axes.plot(track.seconds, np.maximum(track.error, .01), color='#1f77b4', linewidth=1)
+    axes.axhline(5, color='black', linewidth=.8, linestyle='--')
+    axes.set(yscale='log', ylabel='error [m]', title='Error')
+    axes.grid(alpha=.3, which='both')
+
+
+def plot_states(axes: plt.Axes, track: Track) -> None:
+    """State over time."""
+    for level, state in enumerate(STATES):
+        chosen = track.states == state
+        axes.plot(track.seconds[chosen], np.full(chosen.sum(), level), '|', color=COLOURS[state], markersize=10)
+    axes.set(xlabel='time [s]', yticks=range(len(STATES)), ylim=(-.6, len(STATES) - .4), title='State')
+    axes.set_yticklabels([state.lower() for state in STATES])
+    axes.grid(alpha=.3)
+
+
+def plot(track: Track, training: Optional[Tuple[np.ndarray, np.ndarray]], prefix: Path) -> List[Path]:
+    """Draws everything into PREFIX.png and PREFIX.svg."""
+    figure = plt.figure(figsize=(13, 6), constrained_layout=True)
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.3, 1], height_ratios=[1.6, 1])
+    plot_track(figure.add_subplot(grid[:, 0]), track, training)
+    over_time = figure.add_subplot(grid[0, 1])
+    plot_error(over_time, track)
+    plot_states(figure.add_subplot(grid[1, 1], sharex=over_time), track)
+    paths = [prefix.with_name(prefix.name + suffix) for suffix in ('.png', '.svg')]
+    for path in paths:
+        figure.savefig(path, dpi=110)
+    plt.close(figure)
+    return paths
+
+
+def parse_arguments() -> argparse.Namespace:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('track', type=Path, help='CSV that record_track.py wrote')
+    parser.add_argument('--map-csv', type=Path, help='what map_info --export-csv wrote')
+    parser.add_argument('--plot', type=Path, help='path of the plots without suffix (default: beside the track)')
+    parser.add_argument('--max-median-error', type=float, default=10.0, help='metres (default: %(default)s)')
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Prints, plots, judges."""
+    args = parse_arguments()
+    rows = read_csv(args.track)
+    if not rows:
+        print(f'report_track: {args.track} holds no image', file=sys.stderr)
+        return 1
+    track = Track(rows)
+    print('\n'.join(summary(track)))
+    paths = plot(track, read_map(args.map_csv), args.plot or args.track.with_suffix(''))
+    print('plot             ' + ' and '.join(str(path) for path in paths))
+    if track.dropped:
+        print(f'report_track: {track.dropped} images came too fast and were dropped; play the bag slower',
+              file=sys.stderr)
+    reason = failure(track, args.max_median_error)
+    if reason:
+        print(f'report_track: not localised: {reason}', file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
