@@ -1,10 +1,10 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
-
-#include <Eigen/Core>
 
 namespace visual_localization {
 
@@ -19,18 +19,23 @@ struct TrajectoryPoint {
 class Trajectory {
  public:
   Trajectory() = default;
-  /// Points must be in strictly increasing order of stamp; throws std::invalid_argument otherwise.
-  explicit Trajectory(std::vector<TrajectoryPoint> points);
+  /// Points must be finite and in strictly increasing order of stamp; throws std::invalid_argument otherwise.
+  /// Nothing is known between points that are more than `max_gap_s` apart.
+  explicit Trajectory(std::vector<TrajectoryPoint> points,
+                      double max_gap_s = std::numeric_limits<double>::infinity());
 
-  /// Linear interpolation (yaw along the shorter arc); nothing outside the recorded time.
+  /// Linear interpolation (yaw along the shorter arc); nothing outside the recorded time or inside a gap.
   std::optional<TrajectoryPoint> at(std::int64_t stamp_ns) const;
 
   const std::vector<TrajectoryPoint>& points() const { return points_; }
-  /// Length of the path in metres.
+  /// Length of the path in metres, gaps not counted.
   double length() const;
 
  private:
+  bool isGap(const TrajectoryPoint& before, const TrajectoryPoint& after) const;
+
   std::vector<TrajectoryPoint> points_;
+  double max_gap_s_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace visual_localization
