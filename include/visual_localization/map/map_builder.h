@@ -42,13 +42,16 @@ struct MapBuildReport {
   std::vector<CleanedTrajectory> sessions;  ///< one per recorded round
 };
 
+/// Called while a map is made: so many of so many images are done.
+using BuildProgress = std::function<void(std::size_t done, std::size_t total)>;
+
 /// Collects rounds and makes the map: first all fixes of a session, then its images in order of time.
 class MapBuilder {
  public:
   explicit MapBuilder(const MapBuilderConfig& config);
   ~MapBuilder();
 
-  /// Starts a round: cleans its fixes. The first valid fix ever given becomes the datum. Throws
+  /// Starts a round: cleans its fixes. The first believable fix ever given becomes the datum. Throws
   /// std::runtime_error naming the session when the fixes are not enough for a path.
   void beginSession(const std::string& name, const std::vector<Fix>& fixes);
   /// True when the image at `stamp_ns` has a position and is far enough from the last one: only then is it
@@ -56,8 +59,8 @@ class MapBuilder {
   bool wants(std::int64_t stamp_ns);
   /// `grey`: 8-bit, one channel; resized to the size of the first image. An empty one counts as unusable.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
-  /// Prunes and indexes. Throws std::runtime_error when no image was kept.
-  std::shared_ptr<const TrainingMap> build();
+  /// Prunes and indexes; the builder can go on afterwards. Throws std::runtime_error when no image was kept.
+  std::shared_ptr<const TrainingMap> build(const BuildProgress& progress = {});
 
   const MapBuildReport& report() const { return report_; }
 
@@ -66,7 +69,7 @@ class MapBuilder {
   MapBuildReport report_;
   std::optional<LocalFrame> frame_;
   MapHeader header_;
-  std::vector<TrainingImage> images_;
+  std::vector<TrainingImage> images_;  ///< not pruned yet
   std::unique_ptr<SiftExtractor> extractor_;
   std::optional<std::int64_t> last_stamp_ns_;
   std::optional<Eigen::Vector2d> last_kept_m_;

@@ -25,4 +25,10 @@ void saveMap(const TrainingMap& map, const std::string& path);
 /// range. The file is opened read-only and its schema is not trusted. Throws MapStoreError.
 std::shared_ptr<const TrainingMap> loadMap(const std::string& path);
 
+/// Verifies everything that loadMap() verifies and the structure of the file besides. Throws MapStoreError.
+void checkMap(const std::string& path);
+
+/// Version of this package that wrote the map. Throws MapStoreError.
+std::string packageVersionOf(const std::string& path);
+
 }  // namespace visual_localization

@@ -10,6 +10,7 @@
 
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/geo/local_frame.h"
+#include "visual_localization/map/position_index.h"
 #include "visual_localization/map/training_image.h"
 
 namespace visual_localization {
@@ -29,12 +30,6 @@ struct Area {
   Eigen::Vector2d range() const { return max_m - min_m; }
 };
 
-/// A training image and how far it is from the place asked about.
-struct Neighbour {
-  std::size_t image = 0;
-  double distance_m = 0.0;
-};
-
 /// The map in memory: training images with a spatial index over their positions. Immutable, so that it can be
 /// shared between threads.
 class TrainingMap {
@@ -42,7 +37,6 @@ class TrainingMap {
   /// Throws std::invalid_argument, in one line, when there is no image, the image size is not positive, a
   /// position or heading is not finite or a session index is out of range.
   TrainingMap(MapHeader header, std::vector<TrainingImage> images);
-  ~TrainingMap();
   TrainingMap(const TrainingMap&) = delete;
   TrainingMap& operator=(const TrainingMap&) = delete;
 
@@ -54,19 +48,18 @@ class TrainingMap {
   /// Bounding box of the training positions.
   const Area& area() const { return area_; }
 
-  /// i_M(x) of Kronfeld et al. (journal), Eq. 3: the training image nearest to `position_m`.
+  /// i_M(x) of Kronfeld et al. (journal), Eq. 3: the training image nearest to `position_m`, the first of equals.
+  /// Throws std::invalid_argument when `position_m` is not finite.
   Neighbour nearest(const Eigen::Vector2d& position_m) const;
   /// The `count` nearest, closest first; fewer when the map has fewer.
   std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const;
 
  private:
-  class Index;
-
   MapHeader header_;
   LocalFrame frame_;
   std::vector<TrainingImage> images_;
   Area area_;
-  std::unique_ptr<Index> index_;
+  PositionIndex index_;
 };
 
 }  // namespace visual_localization

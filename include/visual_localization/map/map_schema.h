@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "visual_localization/features/sift_features.h"
+#include "visual_localization/map/sqlite.h"
+#include "visual_localization/map/training_map.h"
+#include "visual_localization/parameters/parameters.h"
+
+/// What is where in a map file; shared by its reader and its writer.
+namespace visual_localization::map_schema {
+
+/// "vlmp" in the file's header (PRAGMA application_id): tells a map from any other SQLite file.
+constexpr std::int64_t kApplicationId = 0x766C6D70;
+constexpr std::int64_t kMaxImages = 100'000'000;
+constexpr std::int64_t kMaxFeaturesPerImage = 1'000'000;
+constexpr std::int64_t kMaxImageSide_px = 32768;
+/// 128 values of four bytes.
+constexpr std::size_t kGlobalDescriptorBytes = 512;
+constexpr std::size_t kKeypointBytes = 16;
+
+struct Table {
+  const char* name;
+  const char* sql;
+};
+
+/// All that may be in a map's schema, in order of name.
+extern const std::array<Table, 4> kTables;
+
+/// CRC-32 over a sequence of values, each in one byte order on every machine.
+class Checksum {
+ public:
+  void add(std::int64_t value);
+  void add(double value);
+  void add(const std::string& value);
+  void add(const std::optional<sqlite::Bytes>& value);
+  void add(const ParameterValues& values);
+  std::int64_t value() const { return value_; }
+
+ private:
+  void addRaw(const std::uint8_t* data, std::size_t size);
+  std::uint32_t value_ = 0;
+};
+
+/// CRC-32 of some bytes, continuing from `previous`.
+std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous = 0);
+
+/// One row of the table `images`: everything about an image that is small.
+struct ImageRow {
+  std::int64_t id = 0;
+  std::int64_t session = 0;
+  std::int64_t stamp_ns = 0;
+  double east_m = 0.0;
+  double north_m = 0.0;
+  double yaw_rad = 0.0;
+  std::int64_t feature_count = 0;
+  std::optional<sqlite::Bytes> wgoh;
+  std::optional<sqlite::Bytes> wgii;
+  std::int64_t features_crc32 = 0;  ///< of the keypoints followed by the descriptors
+  std::int64_t preview_crc32 = 0;   ///< of the preview; 0 without one
+
+  void addTo(Checksum& checksum) const;
+};
+
+/// The header as rows of the table `meta`, without the checksum.
+ParameterValues toMeta(const MapHeader& header);
+/// Inverse of toMeta(). Throws std::runtime_error when a value is missing, unknown, of the wrong type or out of
+/// range.
+MapHeader toHeader(ParameterValues meta);
+
+/// Four little-endian 32-bit floats a keypoint: x, y, size, angle.
+std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints);
+/// Inverse of packKeypoints(). Throws std::runtime_error when a value is not finite.
+std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes);
+
+}  // namespace visual_localization::map_schema

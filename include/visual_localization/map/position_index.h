@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace visual_localization {
+
+/// A training image and how far it is from the place asked about.
+struct Neighbour {
+  std::size_t image = 0;
+  double distance_m = 0.0;
+};
+
+/// Finds the nearest of many positions: a k-d tree. Of equally distant positions the one with the lower index
+/// comes first, so that the answer does not depend on how the tree was split.
+class PositionIndex {
+ public:
+  /// `positions_m`: finite, at least one; throws std::invalid_argument otherwise.
+  explicit PositionIndex(std::vector<Eigen::Vector2d> positions_m);
+  ~PositionIndex();
+  PositionIndex(const PositionIndex&) = delete;
+  PositionIndex& operator=(const PositionIndex&) = delete;
+
+  /// The `count` nearest, closest first; fewer when there are fewer. A position that is not finite has none.
+  std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const;
+
+ private:
+  class Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+}  // namespace visual_localization

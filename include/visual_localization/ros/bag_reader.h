@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+#include <rosbag/bag.h>
+#include <rosbag/message_instance.h>
+
+#include "visual_localization/geo/geodetic_point.h"
+
+namespace visual_localization {
+
+/// A bag that cannot be read. The text is one line and begins with the path.
+class BagError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One image of a bag, not decoded yet.
+struct BagImage {
+  std::int64_t stamp_ns = 0;        ///< of the header, or when it was recorded if the header has none
+  std::function<cv::Mat()> decode;  ///< 8-bit grey image; throws ImageError when the message is unusable
+};
+
+/// The images of one topic in the order of recording; each is read from the bag only when asked for. Must not
+/// outlive its BagReader.
+class BagImages {
+ public:
+  std::size_t size() const { return messages_.size(); }
+  /// The topic that was found.
+  const std::string& topic() const { return topic_; }
+  /// Throws BagError when the bag is damaged at this place.
+  BagImage read(std::size_t i) const;
+
+ private:
+  friend class BagReader;
+  std::string path_;
+  std::string topic_;
+  bool compressed_ = false;
+  std::vector<rosbag::MessageInstance> messages_;
+};
+
+/// Reads images and fixes from a bag that may come from anyone: a damaged one gives a BagError.
+class BagReader {
+ public:
+  /// Throws BagError when there is no readable, indexed bag at `path`.
+  explicit BagReader(const std::string& path);
+
+  /// Finds `topic` as sensor_msgs/Image, or `topic` or `<topic>/compressed` as sensor_msgs/CompressedImage, in
+  /// this order. Throws BagError naming the image topics that the bag does have.
+  BagImages images(const std::string& topic) const;
+
+  /// All fixes of a sensor_msgs/NavSatFix topic in the order of recording, believable or not. Throws BagError
+  /// naming the fix topics that the bag does have.
+  std::vector<Fix> fixes(const std::string& topic) const;
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+  rosbag::Bag bag_;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <stdexcept>
+
+#include <opencv2/core.hpp>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+
+namespace visual_localization {
+
+/// An image message that cannot be used. The text is the reason, in one line.
+class ImageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Largest width and height that is taken for an image.
+constexpr int kMaxImageSide_px = 16384;
+
+/// 8-bit grey image of a message with encoding mono8, mono16, bgr8, rgb8, bgra8, rgba8 or bayer_*8. Sixteen bits
+/// become eight by the full range (divided by 257) and not by the brightest pixel, so that the same scene has the
+/// same contrast in every image. Throws ImageError for any other encoding, and when size, step and data do not
+/// agree.
+cv::Mat toGrey(const sensor_msgs::Image& message);
+
+/// 8-bit grey image of a JPEG or PNG message. Throws ImageError when it is neither, broken or cut off.
+cv::Mat toGrey(const sensor_msgs::CompressedImage& message);
+
+}  // namespace visual_localization

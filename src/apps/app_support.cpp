@@ -1,0 +1,62 @@
+#include "app_support.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <iostream>
+#include <new>
+
+#include "visual_localization/io/partial_file.h"
+
+namespace visual_localization::apps {
+namespace {
+
+int fail(const CLI::App& app, std::string reason, int code) {
+  std::replace(reason.begin(), reason.end(), '\n', ' ');
+  std::cout.flush();
+  std::cerr << app.get_name() << ": " << reason << std::endl;
+  return code;
+}
+
+int runBody(const CLI::App& app, const std::function<void()>& body) {
+  try {
+    body();
+    std::cout.flush();
+    return std::cout ? kSuccess : fail(app, "standard output cannot be written", kFailedRun);
+  } catch (const UsageError& error) {
+    return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
+  } catch (const std::bad_alloc&) {
+    return fail(app, "out of memory", kFailedRun);
+  } catch (const std::exception& error) {
+    return fail(app, error.what(), kFailedRun);
+  }
+}
+
+}  // namespace
+
+int runProgram(CLI::App& app, int argc, char** argv, const std::function<void()>& body) {
+  app.set_version_flag("--version", app.get_name() + " " + VISUAL_LOCALIZATION_VERSION);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
+  }
+  removePartialFilesOnSignals();
+  return runBody(app, body);
+}
+
+std::string humanSize(double bytes) {
+  static const std::array<const char*, 4> units{"B", "kB", "MB", "GB"};
+  std::size_t unit = 0;
+  while (bytes >= 1000.0 && unit + 1 < units.size()) {
+    bytes /= 1000.0;
+    ++unit;
+  }
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), unit == 0 ? "%.0f %s" : "%.1f %s", bytes, units[unit]);
+  return text.data();
+}
+
+}  // namespace visual_localization::apps

@@ -1,0 +1,192 @@
+#include "visual_localization/map/map_schema.h"
+
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include <zlib.h>
+
+namespace visual_localization::map_schema {
+namespace {
+
+/// Removes `key` from `meta` and returns its value.
+template <class T>
+T take(ParameterValues& meta, const std::string& key) {
+  const auto found = meta.find(key);
+  if (found == meta.end()) throw std::runtime_error("meta value '" + key + "' is missing");
+  const T* value = std::get_if<T>(&found->second);
+  if (value == nullptr) throw std::runtime_error("meta value '" + key + "' is of the wrong type");
+  T taken = *value;
+  meta.erase(found);
+  return taken;
+}
+
+int takeSide(ParameterValues& meta, const std::string& key) {
+  const auto side = take<std::int64_t>(meta, key);
+  if (side < 1 || side > kMaxImageSide_px) {
+    throw std::runtime_error("meta value '" + key + "' = " + std::to_string(side) + " is not in [1, " +
+                             std::to_string(kMaxImageSide_px) + "]");
+  }
+  return static_cast<int>(side);
+}
+
+SiftConfig takeSift(ParameterValues& meta) {
+  SiftConfig sift;
+  ParameterValues values = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
+  for (auto& [name, value] : values) {
+    const auto found = meta.find(name);
+    if (found == meta.end()) throw std::runtime_error("meta value '" + name + "' is missing");
+    value = found->second;
+    meta.erase(found);
+  }
+  assignParameters(sift, values);
+  return sift;
+}
+
+std::string sessionKey(std::size_t session) { return "session/" + std::to_string(session); }
+
+std::vector<std::string> takeSessions(ParameterValues& meta) {
+  std::vector<std::string> names;
+  while (meta.count(sessionKey(names.size())) != 0) names.push_back(take<std::string>(meta, sessionKey(names.size())));
+  return names;
+}
+
+template <class Unsigned>
+void putLittleEndian(Unsigned value, std::uint8_t* to) {
+  for (std::size_t i = 0; i < sizeof(value); ++i) to[i] = static_cast<std::uint8_t>(value >> (8 * i));
+}
+
+float getFloat(const std::uint8_t* from) {
+  const std::uint32_t bits = std::uint32_t{from[0]} | std::uint32_t{from[1]} << 8U | std::uint32_t{from[2]} << 16U |
+                             std::uint32_t{from[3]} << 24U;
+  float value = 0.0F;
+  std::memcpy(&value, &bits, sizeof(value));
+  if (!std::isfinite(value)) throw std::runtime_error("a keypoint is not finite");
+  return value;
+}
+
+void putFloat(float value, std::uint8_t* to) {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(bits));
+  putLittleEndian(bits, to);
+}
+
+}  // namespace
+
+const std::array<Table, 4> kTables{{
+    {"features",
+     "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL)"},
+    {"images",
+     "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
+     "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL, "
+     "wgoh BLOB, wgii BLOB, features_crc32 INTEGER NOT NULL, preview_crc32 INTEGER NOT NULL)"},
+    {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
+    {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL)"},
+}};
+
+std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous) {
+  // SQLite's own limit of 2 GiB a value keeps every size within zlib's 32 bits.
+  if (bytes.size == 0) return previous;
+  return static_cast<std::int64_t>(::crc32(static_cast<uLong>(previous), bytes.data, static_cast<uInt>(bytes.size)));
+}
+
+void Checksum::addRaw(const std::uint8_t* data, std::size_t size) {
+  value_ = static_cast<std::uint32_t>(crc32Of({data, size}, value_));
+}
+
+void Checksum::add(std::int64_t value) {
+  std::array<std::uint8_t, 8> bytes{};
+  putLittleEndian(static_cast<std::uint64_t>(value), bytes.data());
+  addRaw(bytes.data(), bytes.size());
+}
+
+void Checksum::add(double value) {
+  // SQLite does not keep the sign of zero.
+  const double normal = value == 0.0 ? 0.0 : value;
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &normal, sizeof(bits));
+  add(static_cast<std::int64_t>(bits));
+}
+
+void Checksum::add(const std::string& value) {
+  add(static_cast<std::int64_t>(value.size()));
+  addRaw(reinterpret_cast<const std::uint8_t*>(value.data()), value.size());
+}
+
+void Checksum::add(const std::optional<sqlite::Bytes>& value) {
+  add(value ? static_cast<std::int64_t>(value->size) : std::int64_t{-1});
+  if (value) addRaw(value->data, value->size);
+}
+
+void Checksum::add(const ParameterValues& values) {
+  add(static_cast<std::int64_t>(values.size()));
+  for (const auto& [key, value] : values) {
+    add(key);
+    add(static_cast<std::int64_t>(value.index()));
+    if (const auto* integer = std::get_if<std::int64_t>(&value)) add(*integer);
+    if (const auto* real = std::get_if<double>(&value)) add(*real);
+    if (const auto* text = std::get_if<std::string>(&value)) add(*text);
+    // A switch would come back from SQLite as an integer.
+    if (std::holds_alternative<bool>(value)) throw std::logic_error("map: '" + key + "' has no form in a map file");
+  }
+}
+
+void ImageRow::addTo(Checksum& checksum) const {
+  for (const std::int64_t value : {id, session, stamp_ns, feature_count, features_crc32, preview_crc32}) {
+    checksum.add(value);
+  }
+  for (const double value : {east_m, north_m, yaw_rad}) checksum.add(value);
+  checksum.add(wgoh);
+  checksum.add(wgii);
+}
+
+ParameterValues toMeta(const MapHeader& header) {
+  SiftConfig sift = header.sift;
+  ParameterValues meta = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
+  meta["datum/latitude_deg"] = header.datum.latitude_deg;
+  meta["datum/longitude_deg"] = header.datum.longitude_deg;
+  meta["datum/altitude_m"] = header.datum.altitude_m;
+  meta["image/width_px"] = std::int64_t{header.image_size.width};
+  meta["image/height_px"] = std::int64_t{header.image_size.height};
+  meta["package_version"] = std::string(VISUAL_LOCALIZATION_VERSION);
+  for (std::size_t i = 0; i < header.sessions.size(); ++i) meta[sessionKey(i)] = header.sessions[i];
+  return meta;
+}
+
+MapHeader toHeader(ParameterValues meta) {
+  MapHeader header;
+  header.datum.latitude_deg = take<double>(meta, "datum/latitude_deg");
+  header.datum.longitude_deg = take<double>(meta, "datum/longitude_deg");
+  header.datum.altitude_m = take<double>(meta, "datum/altitude_m");
+  header.image_size = {takeSide(meta, "image/width_px"), takeSide(meta, "image/height_px")};
+  take<std::string>(meta, "package_version");
+  header.sift = takeSift(meta);
+  header.sessions = takeSessions(meta);
+  if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");
+  return header;
+}
+
+std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints) {
+  std::vector<std::uint8_t> bytes(keypoints.size() * kKeypointBytes);
+  std::uint8_t* to = bytes.data();
+  for (const SiftKeypoint& keypoint : keypoints) {
+    for (const float value : {keypoint.x_px, keypoint.y_px, keypoint.size_px, keypoint.angle_deg}) {
+      putFloat(value, to);
+      to += sizeof(float);
+    }
+  }
+  return bytes;
+}
+
+std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes) {
+  std::vector<SiftKeypoint> keypoints(bytes.size / kKeypointBytes);
+  const std::uint8_t* from = bytes.data;
+  for (SiftKeypoint& keypoint : keypoints) {
+    keypoint = {getFloat(from), getFloat(from + 4), getFloat(from + 8), getFloat(from + 12)};
+    from += kKeypointBytes;
+  }
+  return keypoints;
+}
+
+}  // namespace visual_localization::map_schema

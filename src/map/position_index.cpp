@@ -1,0 +1,103 @@
+#include "visual_localization/map/position_index.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include <nanoflann.hpp>
+
+namespace visual_localization {
+namespace {
+
+/// The positions in the form that nanoflann asks for.
+struct Points {
+  std::vector<Eigen::Vector2d> positions_m;
+
+  std::size_t kdtree_get_point_count() const { return positions_m.size(); }
+  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return positions_m[i][static_cast<Eigen::Index>(axis)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+
+/// The k best so far, ordered by distance and then by index. nanoflann's own result set keeps whichever of two
+/// equally distant points the tree visits first.
+class OrderedResults {
+ public:
+  using DistanceType = double;
+
+  explicit OrderedResults(std::size_t capacity) : capacity_(capacity) { found_.reserve(capacity + 1); }
+
+  std::size_t size() const { return found_.size(); }
+  bool full() const { return found_.size() == capacity_; }
+  bool addPoint(double squared_m2, std::uint32_t index) {
+    const std::pair<double, std::uint32_t> candidate(squared_m2, index);
+    found_.insert(std::upper_bound(found_.begin(), found_.end(), candidate), candidate);
+    if (found_.size() > capacity_) found_.pop_back();
+    return true;
+  }
+  /// Slightly more than the worst distance, because points at exactly this distance are still wanted.
+  double worstDist() const {
+    if (!full()) return std::numeric_limits<double>::max();
+    return found_.back().first * (1.0 + 1e-9) + std::numeric_limits<double>::min();
+  }
+  void sort() {}
+
+  const std::vector<std::pair<double, std::uint32_t>>& found() const { return found_; }
+
+ private:
+  std::size_t capacity_;
+  std::vector<std::pair<double, std::uint32_t>> found_;
+};
+
+}  // namespace
+
+class PositionIndex::Tree {
+ public:
+  explicit Tree(std::vector<Eigen::Vector2d> positions_m)
+      : points_{std::move(positions_m)}, tree_(2, points_, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
+    // Needed up to nanoflann 1.3, where the constructor leaves the tree empty.
+    tree_.buildIndex();
+  }
+
+  std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
+    OrderedResults results(std::min(count, points_.positions_m.size()));
+    tree_.findNeighbors(results, position_m.data(), {});
+    std::vector<Neighbour> neighbours;
+    neighbours.reserve(results.size());
+    for (const auto& [squared_m2, index] : results.found()) neighbours.push_back({index, std::sqrt(squared_m2)});
+    return neighbours;
+  }
+
+ private:
+  using Metric = nanoflann::L2_Simple_Adaptor<double, Points>;
+
+  Points points_;
+  nanoflann::KDTreeSingleIndexAdaptor<Metric, Points, 2, std::uint32_t> tree_;
+};
+
+PositionIndex::PositionIndex(std::vector<Eigen::Vector2d> positions_m) {
+  if (positions_m.empty()) throw std::invalid_argument("position index: no positions");
+  if (positions_m.size() > std::numeric_limits<std::uint32_t>::max()) {
+    throw std::invalid_argument("position index: too many positions");
+  }
+  for (const auto& position : positions_m) {
+    if (!position.allFinite()) throw std::invalid_argument("position index: a position is not finite");
+  }
+  tree_ = std::make_unique<Tree>(std::move(positions_m));
+}
+
+PositionIndex::~PositionIndex() = default;
+
+std::vector<Neighbour> PositionIndex::nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
+  if (count == 0 || !position_m.allFinite()) return {};
+  return tree_->nearest(position_m, count);
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,153 @@
+#include "visual_localization/map/map_builder.h"
+
+#include <limits>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr int kFixes = 40;
+
+/// Five fixes a second for eight seconds, eastwards at 0.7 m/s.
+std::vector<Fix> straightRound() {
+  const LocalFrame frame({48.5, 9.05, 0.0});
+  std::vector<Fix> fixes;
+  for (int i = 0; i < kFixes; ++i) fixes.push_back({i * kSecond_ns / 5, frame.toGeodetic({0.14 * i, 0.0}), true});
+  return fixes;
+}
+
+/// Blobs of random size and brightness; `shift_px` moves the scene.
+cv::Mat scene(std::uint64_t seed, int shift_px) {
+  cv::RNG random(seed);
+  cv::Mat image(240, 320, CV_8UC1, cv::Scalar(128));
+  for (int i = 0; i < 150; ++i) {
+    const cv::Point centre(random.uniform(0, 400) - shift_px, random.uniform(0, 240));
+    cv::circle(image, centre, random.uniform(2, 14), cv::Scalar(random.uniform(0, 255)), cv::FILLED, cv::LINE_AA);
+  }
+  return image;
+}
+
+TEST(MapBuilder, ImagesGetThePositionOfTheirStamp) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound());
+  for (int i = 0; i < 7; ++i) {
+    ASSERT_TRUE(builder.wants(i * kSecond_ns));
+    builder.addImage(i * kSecond_ns, scene(1, 4 * i));
+  }
+  const auto map = builder.build();
+  ASSERT_EQ(map->size(), 7U);
+  for (std::size_t i = 0; i < map->size(); ++i) {
+    EXPECT_NEAR((map->image(i).position_m - map->image(0).position_m).norm(), 0.7 * static_cast<double>(i), 0.1);
+    EXPECT_NEAR(map->image(i).yaw_rad, 0.0, 0.1);
+    EXPECT_FALSE(map->image(i).preview_jpeg.empty());
+  }
+  EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
+  EXPECT_THAT(map->header().sessions, testing::ElementsAre("round"));
+}
+
+TEST(MapBuilder, CountsWhyImagesAreDropped) {
+  MapBuilderConfig config;
+  config.min_spacing_m = 1.0;
+  MapBuilder builder(config);
+  builder.beginSession("round", straightRound());
+  EXPECT_FALSE(builder.wants(-kSecond_ns));
+  ASSERT_TRUE(builder.wants(1 * kSecond_ns));
+  builder.addImage(1 * kSecond_ns, scene(1, 0));
+  EXPECT_FALSE(builder.wants(1 * kSecond_ns));
+  EXPECT_FALSE(builder.wants(2 * kSecond_ns));
+  ASSERT_TRUE(builder.wants(3 * kSecond_ns));
+  builder.addImage(3 * kSecond_ns, {});
+  ASSERT_TRUE(builder.wants(4 * kSecond_ns));
+  builder.addImage(4 * kSecond_ns, cv::Mat(240, 320, CV_8UC3));
+  ASSERT_TRUE(builder.wants(5 * kSecond_ns));
+  builder.addImage(5 * kSecond_ns, cv::Mat(8, 320, CV_8UC1));
+  EXPECT_FALSE(builder.wants(60 * kSecond_ns));
+  EXPECT_EQ(builder.report().images_kept, 1U);
+  EXPECT_EQ(builder.report().images_without_position, 2U);
+  EXPECT_EQ(builder.report().images_disordered, 1U);
+  EXPECT_EQ(builder.report().images_too_close, 1U);
+  EXPECT_EQ(builder.report().images_unusable, 3U);
+}
+
+TEST(MapBuilder, PruningDropsWhatOnlyOneImageShows) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound());
+  for (int i = 0; i < 6; ++i) builder.addImage(i * kSecond_ns, scene(i == 3 ? 99U : 1U, 3 * i));
+  const auto map = builder.build();
+  EXPECT_LT(builder.report().features_kept, builder.report().features_extracted);
+  // The odd one out shares almost nothing with its neighbours.
+  EXPECT_LT(4 * map->image(3).sift.size(), map->image(1).sift.size());
+  EXPECT_GT(map->image(1).sift.size(), 20U);
+}
+
+TEST(MapBuilder, OneImageKeepsAllItsFeatures) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound());
+  builder.addImage(kSecond_ns, scene(1, 0));
+  EXPECT_EQ(builder.build()->size(), 1U);
+  EXPECT_EQ(builder.report().features_kept, builder.report().features_extracted);
+}
+
+TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound());
+  builder.addImage(kSecond_ns, scene(1, 0));
+  cv::Mat large;
+  cv::resize(scene(1, 3), large, {640, 480});
+  builder.addImage(2 * kSecond_ns, large);
+  const auto map = builder.build();
+  EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
+  for (const SiftKeypoint& keypoint : map->image(1).sift.keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
+}
+
+TEST(MapBuilder, RoundsBecomeSessionsOfOneMap) {
+  MapBuilder builder({});
+  for (const char* name : {"first", "second"}) {
+    builder.beginSession(name, straightRound());
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_TRUE(builder.wants(i * kSecond_ns));
+      builder.addImage(i * kSecond_ns, scene(1, 3 * i));
+    }
+  }
+  const auto map = builder.build();
+  EXPECT_EQ(map->size(), 6U);
+  EXPECT_EQ(map->image(2).session, 0);
+  EXPECT_EQ(map->image(3).session, 1);
+}
+
+TEST(MapBuilder, DatumIsNotAnOutlier) {
+  std::vector<Fix> fixes = straightRound();
+  const GeodeticPoint believable = fixes[1].position;
+  fixes[0].position = {0.0, 0.0, 0.0};
+  MapBuilder builder({});
+  builder.beginSession("round", fixes);
+  builder.addImage(3 * kSecond_ns, scene(1, 0));
+  EXPECT_NEAR(builder.build()->header().datum.latitude_deg, believable.latitude_deg, 1e-3);
+}
+
+TEST(MapBuilder, SaysWhatIsMissing) {
+  MapBuilder builder({});
+  EXPECT_THROW(builder.wants(0), std::logic_error);
+  EXPECT_THROW(builder.build(), std::runtime_error);
+  std::vector<Fix> blind = straightRound();
+  for (Fix& fix : blind) fix.has_fix = false;
+  for (const auto& fixes : {std::vector<Fix>{}, blind}) {
+    try {
+      builder.beginSession("dark", fixes);
+      ADD_FAILURE() << "accepted";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr("'dark'"));
+    }
+  }
+  MapBuilderConfig config;
+  config.min_spacing_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_ANY_THROW(MapBuilder{config});
+}
+
+}  // namespace
+}  // namespace visual_localization

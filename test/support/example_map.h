@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization::test {
+
+inline SiftFeatures randomFeatures(std::size_t count, std::mt19937& random) {
+  std::uniform_int_distribution<int> byte(0, 255);
+  std::uniform_real_distribution<float> pixel(0.0F, 320.0F);
+  std::vector<SiftKeypoint> keypoints(count);
+  std::vector<std::uint8_t> descriptors(count * SiftFeatures::kDescriptorSize);
+  for (auto& keypoint : keypoints) keypoint = {pixel(random), pixel(random), 4.0F, pixel(random)};
+  for (auto& value : descriptors) value = static_cast<std::uint8_t>(byte(random));
+  return SiftFeatures(keypoints, descriptors);
+}
+
+inline MapHeader exampleHeader() {
+  MapHeader header;
+  header.datum = {48.5, 9.05, 430.25};
+  header.image_size = {320, 240};
+  header.sift.contrast_threshold = 0.03;
+  header.sessions = {"monday", "tuesday \"quoted\" \xC3\xA4"};
+  return header;
+}
+
+/// `count` images on a curve, half of them in each session; the first has neither features nor preview.
+inline std::vector<TrainingImage> exampleImages(std::size_t count, std::size_t features = 20, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::vector<TrainingImage> images(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double turn = 0.1 * static_cast<double>(i);
+    images[i].stamp_ns = 1'221'210'001'000'000'000 + static_cast<std::int64_t>(i) * 1'000'000'007;
+    images[i].session = i < count / 2 ? 0 : 1;
+    images[i].position_m = {50.0 * std::cos(turn), i == 0 ? -0.0 : 30.0 * std::sin(turn)};
+    images[i].yaw_rad = turn - 1.0 / 3.0;
+    if (i == 0) continue;
+    images[i].sift = randomFeatures(features, random);
+    images[i].preview_jpeg = {0xFF, 0xD8, static_cast<std::uint8_t>(i)};
+  }
+  return images;
+}
+
+}  // namespace visual_localization::test
