@@ -29,13 +29,11 @@ std::optional<TrajectoryPoint> Trajectory::at(std::int64_t stamp_ns) const {
   if (after == points_.begin()) return std::nullopt;
   const auto before = std::prev(after);
   if (isGap(*before, *after)) return std::nullopt;
-  const double share =
-      secondsBetween(before->stamp_ns, stamp_ns) / secondsBetween(before->stamp_ns, after->stamp_ns);
+  const double share = secondsBetween(before->stamp_ns, stamp_ns) / secondsBetween(before->stamp_ns, after->stamp_ns);
   TrajectoryPoint point;
   point.stamp_ns = stamp_ns;
   point.position_m = before->position_m + share * (after->position_m - before->position_m);
-  point.yaw_rad =
-      std::remainder(before->yaw_rad + share * angleDifference(before->yaw_rad, after->yaw_rad), 2.0 * kPi);
+  point.yaw_rad = std::remainder(before->yaw_rad + share * angleDifference(before->yaw_rad, after->yaw_rad), 2.0 * kPi);
   return point;
 }
 

@@ -1,9 +1,9 @@
 #include "visual_localization/localizer/localizer.h"
 
 #include <chrono>
-#include <cmath>
 #include <utility>
 
+#include "visual_localization/geo/angles.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -99,8 +99,8 @@ double Localizer::yawVariance(const TrackerEstimate& tracked) const {
   const auto neighbours = map_->nearest(tracked.position_m, kNeighbours);
   double squares = 0.0;
   for (const Neighbour& neighbour : neighbours) {
-    const double difference = std::remainder(
-        map_->image(neighbour.image).yaw_rad - map_->image(tracked.training_image).yaw_rad, 2.0 * EIGEN_PI);
+    const double difference =
+        angleDifference(map_->image(tracked.training_image).yaw_rad, map_->image(neighbour.image).yaw_rad);
     squares += difference * difference;
   }
   const double floor_rad2 = config_.min_yaw_std_rad * config_.min_yaw_std_rad;

@@ -5,6 +5,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "visual_localization/geo/angles.h"
+
 namespace visual_localization {
 
 Prior anywhere(const Area& area) {
@@ -21,7 +23,6 @@ Prior around(const Eigen::Vector2d& centre_m, double radius_m) {
     throw std::invalid_argument("the radius must be finite and not negative, in metres");
   }
   return [centre_m, radius_m](Random& random) {
-    constexpr double kPi = 3.14159265358979323846;
     const double angle = random.uniform(-kPi, kPi);
     const double distance = radius_m * std::sqrt(random.uniform(0.0, 1.0));
     return Eigen::Vector2d(centre_m + distance * Eigen::Vector2d(std::cos(angle), std::sin(angle)));

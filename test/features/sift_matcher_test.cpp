@@ -7,6 +7,7 @@
 
 #include "test/support/synthetic.h"
 #include "visual_localization/features/pruning.h"
+#include "visual_localization/geo/angles.h"
 
 namespace visual_localization {
 namespace {
@@ -17,7 +18,7 @@ using test::randomFeatures;
 
 /// A descriptor at `degrees` from the first axis, in the plane of the first two.
 std::vector<std::uint8_t> atAngle(double degrees) {
-  const double rad = degrees * EIGEN_PI / 180.0;
+  const double rad = degrees * kPi / 180.0;
   return descriptor(
       {static_cast<int>(std::lround(255.0 * std::cos(rad))), static_cast<int>(std::lround(255.0 * std::sin(rad)))});
 }

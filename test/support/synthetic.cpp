@@ -5,6 +5,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "visual_localization/geo/angles.h"
+
 namespace visual_localization::test {
 
 std::vector<std::uint8_t> descriptor(const std::vector<int>& first_bins) {
@@ -52,7 +54,7 @@ std::shared_ptr<const TrainingMap> mapAt(const std::vector<Eigen::Vector2d>& pos
 std::vector<Eigen::Vector2d> circle(std::size_t count, double radius_m) {
   std::vector<Eigen::Vector2d> positions(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const double angle = 2.0 * EIGEN_PI * static_cast<double>(i) / static_cast<double>(count);
+    const double angle = 2.0 * kPi * static_cast<double>(i) / static_cast<double>(count);
     positions[i] = radius_m * Eigen::Vector2d(std::cos(angle), std::sin(angle));
   }
   return positions;

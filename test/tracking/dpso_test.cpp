@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
+#include "visual_localization/geo/angles.h"
 
 namespace visual_localization {
 namespace {
@@ -182,7 +183,7 @@ TEST(Dpso, FindsAKidnappedRobotAgain) {
   for (int step = 0; step < 60; ++step) tracker.update(world.from(onCircle(0.6 * step)));
   TrackerEstimate estimate;
   int step = 60;
-  const double half_m = 30.0 * EIGEN_PI;
+  const double half_m = 30.0 * kPi;
   for (; step < 260; ++step) {
     estimate = tracker.update(world.from(onCircle(half_m + 0.6 * step)));
     if ((estimate.position_m - onCircle(half_m + 0.6 * step)).norm() < 3.0) break;

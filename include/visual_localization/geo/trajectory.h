@@ -1,10 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <vector>
+
+#include <Eigen/Core>
 
 namespace visual_localization {
 
@@ -21,8 +22,7 @@ class Trajectory {
   Trajectory() = default;
   /// Points must be finite and in strictly increasing order of stamp; throws std::invalid_argument otherwise.
   /// Nothing is known between points that are more than `max_gap_s` apart.
-  explicit Trajectory(std::vector<TrajectoryPoint> points,
-                      double max_gap_s = std::numeric_limits<double>::infinity());
+  explicit Trajectory(std::vector<TrajectoryPoint> points, double max_gap_s = std::numeric_limits<double>::infinity());
 
   /// Linear interpolation (yaw along the shorter arc); nothing outside the recorded time or inside a gap.
   std::optional<TrajectoryPoint> at(std::int64_t stamp_ns) const;

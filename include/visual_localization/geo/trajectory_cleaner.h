@@ -22,11 +22,21 @@ enum class FixVerdict {
 
 std::string toString(FixVerdict verdict);
 
-/// TODO(geo): parameters of the robust smoother; every field with unit, range and meaning.
+/// What is known of the robot's motion and of its receiver. The speed itself is estimated from the fixes.
 struct TrajectoryCleanerConfig {
+  double node_length_m = 1.3;       ///< fixes are summarised over about this much of the path
+  double speed_tolerance = 0.05;    ///< how much the speed of travel varies, as a share of it
+  double opening_cost = 8.0;        ///< evidence, in squared sigmas, that a rejected stretch must bring ...
+  double rejection_cost = 1.5;      ///< ... and as much more for each summarised position in it
+  double margin_m = 1.5;            ///< a rejected stretch grows by this much of the path at both ends
+  double smoothing_length_m = 1.5;  ///< the cleaned path follows details longer than this
+  double speed_stiffness = 0.1;     ///< how firmly the path keeps its speed, against how firmly its course
+  double outlier_distance_m = 1.0;  ///< residuals beyond this lose their influence on the path
+  double max_bridge_s = 90.0;       ///< longer stretches without believable fix are left open
+
   void declare(ParameterVisitor& visitor);
   /// Constraints that span fields, in words; empty when valid.
-  std::vector<std::string> violations() const;
+  std::vector<std::string> violations() const { return {}; }
 };
 
 /// The cleaned path and what was done to get it.
@@ -34,12 +44,13 @@ struct CleanedTrajectory {
   Trajectory trajectory;
   std::vector<FixVerdict> verdicts;  ///< one per given fix, in the given order
   std::size_t gaps_closed = 0;       ///< stretches without believable fix that were bridged
-  double longest_gap_s = 0.0;
+  double longest_gap_s = 0.0;        ///< the longest of them
 };
 
-/// Turns raw DGPS fixes into the smooth path that a robot at known, nearly constant speed must have driven
-/// (Kronfeld et al. (journal), section 6, done by hand there): drops invalid fixes, spikes and multipath
-/// bends, closes gaps. Throws std::runtime_error, in one line, when fewer than two believable fixes remain.
+/// Turns raw DGPS fixes into the smooth path that a robot at nearly constant speed must have driven (Kronfeld et
+/// al. (journal), section 6, where people did this by hand): drops invalid fixes, spikes and multipath bends,
+/// closes gaps along the smoothest path between their ends. Throws std::runtime_error, in one line, when fewer
+/// than two believable fixes remain.
 CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFrame& frame,
                                   const TrajectoryCleanerConfig& config);
 
