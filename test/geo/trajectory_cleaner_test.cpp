@@ -191,6 +191,16 @@ TEST(TrajectoryCleaner, SparseExactFixesPassUnharmed) {
   EXPECT_LT(largestOf(errorsOf(cleaned, line, 195.0)), 0.05);
 }
 
+TEST(TrajectoryCleaner, AVeryShortRoundIsARound) {
+  const Path line = [](double time_s) { return Eigen::Vector2d(0.7 * time_s, 0.0); };
+  for (const double duration_s : {0.5, 2.0, 8.0}) {
+    for (const double noise_m : {0.0, 0.1}) {
+      const std::vector<Fix> fixes = record(line, duration_s, 5.0, noise_m);
+      EXPECT_GE(2 * countOf(clean(fixes), FixVerdict::kKept), fixes.size()) << duration_s << " s";
+    }
+  }
+}
+
 TEST(TrajectoryCleaner, AFastCarPassesUnharmed) {
   const Path road = [](double time_s) { return Eigen::Vector2d(12.0 * time_s, 20.0 * std::sin(time_s / 5.0)); };
   const std::vector<Fix> fixes = record(road, 30.0, 5.0, 0.02);
