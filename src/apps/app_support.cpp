@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <iostream>
 #include <new>
+#include <string>
+#include <vector>
 
 #include "visual_localization/io/partial_file.h"
 
@@ -16,6 +18,17 @@ int fail(const CLI::App& app, std::string reason, int code) {
   std::cout.flush();
   std::cerr << app.get_name() << ": " << reason << std::endl;
   return code;
+}
+
+/// roslaunch appends "__name:=..." and "__log:=..." to every command line.
+std::vector<const char*> withoutRosNames(int argc, char** argv) {
+  std::vector<const char*> arguments(argv, argv + argc);
+  const auto is_ros_name = [](const char* argument) {
+    const std::string text = argument;
+    return text.rfind("__", 0) == 0 && text.find(":=") != std::string::npos;
+  };
+  arguments.erase(std::remove_if(arguments.begin(), arguments.end(), is_ros_name), arguments.end());
+  return arguments;
 }
 
 int runBody(const CLI::App& app, const std::function<void()>& body) {
@@ -37,7 +50,8 @@ int runBody(const CLI::App& app, const std::function<void()>& body) {
 int runProgram(CLI::App& app, int argc, char** argv, const std::function<void()>& body) {
   app.set_version_flag("--version", app.get_name() + " " + VISUAL_LOCALIZATION_VERSION);
   try {
-    app.parse(argc, argv);
+    const auto arguments = withoutRosNames(argc, argv);
+    app.parse(static_cast<int>(arguments.size()), arguments.data());
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {

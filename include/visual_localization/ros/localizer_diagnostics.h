@@ -1,0 +1,58 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
+
+#include "visual_localization/localizer/estimate.h"
+
+namespace visual_localization {
+
+/// How many images came to what end, since start.
+struct ImageCounts {
+  std::uint64_t processed = 0;
+  std::uint64_t dropped = 0;  ///< replaced by a newer one before they were processed
+  std::uint64_t refused = 0;  ///< unusable
+};
+
+/// What the node tells on /diagnostics: state, images, latency, map. Thread-safe.
+class LocalizerDiagnostics {
+ public:
+  /// `name` of the node; images older than `image_timeout_s` are a warning.
+  LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, const std::string& name,
+                       double image_timeout_s);
+
+  void imageArrived();
+  void imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts);
+  void imageRefused(const ImageCounts& counts, const std::string& reason);
+  void mapLoaded(const std::string& path, std::size_t images);
+  void publish() { updater_.force_update(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using Wrapper = diagnostic_updater::DiagnosticStatusWrapper;
+
+  void reportState(Wrapper& status);
+  void reportImages(Wrapper& status);
+  void reportMap(Wrapper& status);
+
+  const double image_timeout_s_;
+  std::mutex mutex_;
+  std::optional<Estimate> estimate_;
+  double latency_ms_ = 0.0;
+  ImageCounts counts_;
+  std::string last_refusal_;
+  std::string map_path_;
+  std::size_t map_images_ = 0;
+  std::uint64_t arrived_ = 0;  ///< since the last report
+  Clock::time_point last_report_ = Clock::now();
+  std::optional<Clock::time_point> last_arrival_;
+  diagnostic_updater::Updater updater_;  ///< last: it refers to everything above
+};
+
+}  // namespace visual_localization

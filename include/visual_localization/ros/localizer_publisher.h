@@ -1,0 +1,48 @@
+#pragma once
+
+#include <vector>
+
+#include <image_transport/image_transport.h>
+#include <opencv2/core.hpp>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <visual_localization/LocalizationStatus.h>
+
+#include "visual_localization/ros/localizer_diagnostics.h"
+#include "visual_localization/ros/node_config.h"
+#include "visual_localization/ros/shared_localizer.h"
+
+namespace visual_localization {
+
+/// All topics that the node publishes under its own name.
+class LocalizerPublisher {
+ public:
+  LocalizerPublisher(ros::NodeHandle private_node, const NodeParameters& parameters);
+
+  void publishMap(const TrainingMap& map);
+  /// That there is no map.
+  void publishNoMap(const ImageCounts& counts);
+  /// Everything that is known after an image but the drawing. `result` must be finite.
+  void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, double latency_ms,
+               const ImageCounts& counts);
+  /// Draws and publishes the matches with the best training image if somebody looks.
+  void publishMatches(const SharedLocalizer::Result& result, const cv::Mat& grey, const std_msgs::Header& header);
+
+ private:
+  void publishParticles(const std::vector<Particle>& particles, const std_msgs::Header& header);
+  void publishStatus(LocalizationStatus status, double latency_ms, const ImageCounts& counts);
+
+  const NodeParameters parameters_;
+  image_transport::ImageTransport image_transport_;
+  ros::Publisher pose_;
+  ros::Publisher fix_;
+  ros::Publisher particles_;
+  ros::Publisher particle_cloud_;
+  ros::Publisher swarm_;
+  ros::Publisher status_;
+  ros::Publisher map_path_;
+  ros::Publisher map_markers_;
+  image_transport::Publisher matches_;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "visual_localization/features/image_features.h"
+#include "visual_localization/localizer/localizer.h"
+
+namespace visual_localization {
+
+/// A Localizer for several threads, whose map may be absent and may be replaced.
+class SharedLocalizer {
+ public:
+  /// A position with its uncertainty, as people give it.
+  struct Guess {
+    Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
+    Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();
+  };
+
+  /// Everything about one image, copied out so that it can be published without holding up the next one.
+  struct Result {
+    Estimate estimate;
+    std::vector<Particle> particles;
+    ImageFeatures features;  ///< of the image, after pruning
+    std::shared_ptr<const TrainingMap> map;
+  };
+
+  explicit SharedLocalizer(const LocalizerConfig& config) : config_(config) {}
+
+  /// Starts anew in `map`, or around the guess that has been waiting for a map.
+  void setMap(std::shared_ptr<const TrainingMap> map);
+  std::shared_ptr<const TrainingMap> map() const;
+
+  /// Nothing without a map. Throws std::invalid_argument for an unusable image.
+  std::optional<Result> process(std::int64_t stamp_ns, const cv::Mat& grey);
+
+  /// False without a map. Throws std::invalid_argument for a prior that is none (see prior.h).
+  bool relocalizeAnywhere();
+  bool relocalizeAround(const Eigen::Vector2d& centre_m, double radius_m);
+  /// Without a map the guess is kept for the next one, and false is returned.
+  bool relocalizeAt(const Guess& guess);
+
+ private:
+  const LocalizerConfig config_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<const TrainingMap> map_;
+  std::unique_ptr<Localizer> localizer_;
+  std::optional<Guess> waiting_guess_;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,67 @@
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <boost/function.hpp>
+#include <boost/make_shared.hpp>
+#include <nodelet/loader.h>
+#include <ros/init.h>
+#include <ros/names.h>
+#include <ros/spinner.h>
+#include <ros/this_node.h>
+
+#include "visual_localization/ros/localizer_nodelet.h"
+
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kBadUsage = 2;
+
+const char* const kHelp =
+    "Usage: localizer_node [image:=TOPIC] [_map:=FILE] [_PARAMETER:=VALUE ...]\n"
+    "Localises with one camera in a map of training images; the nodelet\n"
+    "visual_localization/LocalizerNodelet standing alone. Needs a roscore.\n\n"
+    "  --help     this text\n"
+    "  --version  the version\n\n"
+    "Topics, services and parameters: README.md and config/localizer.yaml.\n";
+
+/// Arguments that are not for ROS, without the program's name.
+std::vector<std::string> ownArguments(int argc, char** argv) {
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  arguments.erase(arguments.begin());
+  return arguments;
+}
+
+int answer(const std::string& argument) {
+  if (argument == "--help" || argument == "-h") {
+    std::cout << kHelp;
+    return 0;
+  }
+  if (argument == "--version") {
+    std::cout << "localizer_node " << VISUAL_LOCALIZATION_VERSION << "\n";
+    return 0;
+  }
+  std::cerr << "localizer_node: unknown argument '" << argument << "'; see --help\n";
+  return kBadUsage;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto arguments = ownArguments(argc, argv);
+  if (!arguments.empty()) return answer(arguments.front());
+
+  ros::init(argc, argv, "localizer");
+  ros::NodeHandle keep_alive;
+  const boost::function<boost::shared_ptr<nodelet::Nodelet>(const std::string&)> make = [](const std::string&) {
+    return boost::make_shared<visual_localization::LocalizerNodelet>();
+  };
+  nodelet::Loader loader(make);
+  if (!loader.load(ros::this_node::getName(), "visual_localization/LocalizerNodelet", ros::names::getRemappings(),
+                   {})) {
+    return kFailed;
+  }
+  ros::spin();
+  return 0;
+}

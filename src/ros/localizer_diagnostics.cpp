@@ -1,0 +1,104 @@
+#include "visual_localization/ros/localizer_diagnostics.h"
+
+#include <diagnostic_msgs/DiagnosticStatus.h>
+
+namespace visual_localization {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+LocalizerDiagnostics::LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                                           const std::string& name, double image_timeout_s)
+    : image_timeout_s_(image_timeout_s), updater_(node, private_node, name) {
+  updater_.setHardwareID("none");
+  updater_.add("localization", this, &LocalizerDiagnostics::reportState);
+  updater_.add("images", this, &LocalizerDiagnostics::reportImages);
+  updater_.add("map", this, &LocalizerDiagnostics::reportMap);
+}
+
+void LocalizerDiagnostics::imageArrived() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++arrived_;
+  last_arrival_ = Clock::now();
+}
+
+void LocalizerDiagnostics::imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  estimate_ = estimate;
+  latency_ms_ = latency_ms;
+  counts_ = counts;
+  last_refusal_.clear();
+}
+
+void LocalizerDiagnostics::imageRefused(const ImageCounts& counts, const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  counts_ = counts;
+  last_refusal_ = reason;
+}
+
+void LocalizerDiagnostics::mapLoaded(const std::string& path, std::size_t images) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  map_path_ = path;
+  map_images_ = images;
+  estimate_.reset();
+}
+
+void LocalizerDiagnostics::reportState(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const LocalizationState state = estimate_         ? estimate_->state
+                                  : map_images_ > 0 ? LocalizationState::kInitializing
+                                                    : LocalizationState::kNoMap;
+  status.summary(state == LocalizationState::kTracking ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
+                 toString(state));
+  if (!estimate_) return;
+  status.add("Best similarity", estimate_->best.similarity);
+  status.add("Matched features", estimate_->best.matches);
+  status.add("Features kept", estimate_->features_kept);
+  status.add("Images compared", estimate_->comparisons);
+  status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->spread_m.x(), estimate_->spread_m.y());
+  status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->times.extract_ms, estimate_->times.match_ms,
+              estimate_->times.update_ms);
+}
+
+void LocalizerDiagnostics::reportImages(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double interval_s = secondsSince(last_report_);
+  const double rate_hz = interval_s > 0.0 ? static_cast<double>(arrived_) / interval_s : 0.0;
+  arrived_ = 0;
+  last_report_ = Clock::now();
+
+  if (!last_arrival_) {
+    status.summary(DiagnosticStatus::WARN, "No image has arrived yet");
+  } else if (secondsSince(*last_arrival_) > image_timeout_s_) {
+    status.summary(DiagnosticStatus::WARN, "No new images");
+  } else if (!last_refusal_.empty()) {
+    status.summary(DiagnosticStatus::WARN, "Refused: " + last_refusal_);
+  } else {
+    status.summary(DiagnosticStatus::OK, "Images arrive");
+  }
+  status.addf("Rate (Hz)", "%.2f", rate_hz);
+  if (last_arrival_) status.addf("Age of the newest (s)", "%.2f", secondsSince(*last_arrival_));
+  if (latency_ms_ >= 0.0) status.addf("Latency (ms)", "%.1f", latency_ms_);
+  status.add("Processed", counts_.processed);
+  status.add("Dropped", counts_.dropped);
+  status.add("Refused", counts_.refused);
+}
+
+void LocalizerDiagnostics::reportMap(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (map_images_ == 0) {
+    status.summary(DiagnosticStatus::WARN, "No map is loaded");
+    return;
+  }
+  status.summary(DiagnosticStatus::OK, "Map is loaded");
+  status.add("Path", map_path_);
+  status.add("Training images", map_images_);
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,213 @@
+#include "visual_localization/ros/localizer_nodelet.h"
+
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include <nodelet/exception.h>
+#include <pluginlib/class_list_macros.hpp>
+
+#include "visual_localization/map/map_store.h"
+#include "visual_localization/parameters/parameters.h"
+#include "visual_localization/ros/initial_pose.h"
+#include "visual_localization/ros/message_conversions.h"
+#include "visual_localization/ros/parameter_server.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kTimerPeriod_s = 1.0;  ///< of diagnostics, and of the status while there is no map
+
+/// In 64 bits: differences of ros::Time throw when they are longer than 68 years.
+double millisecondsBetween(const ros::Time& from, const ros::Time& to) {
+  const auto difference_ns = static_cast<std::int64_t>(to.toNSec()) - static_cast<std::int64_t>(from.toNSec());
+  return static_cast<double>(difference_ns) * 1e-6;
+}
+
+}  // namespace
+
+LocalizerNodelet::~LocalizerNodelet() { stop(); }
+
+void LocalizerNodelet::onInit() {
+  try {
+    start();
+  } catch (const std::exception& error) {
+    // The loader frees the callback queues of a nodelet that fails before it frees the nodelet itself.
+    stop();
+    NODELET_FATAL_STREAM(getName() << " does not start: " << error.what());
+    throw nodelet::Exception(error.what());
+  }
+}
+
+void LocalizerNodelet::stop() {
+  // First nothing new comes in, then the last image is finished, then the rest goes.
+  timer_.stop();
+  service_spinner_.reset();
+  services_.clear();
+  initial_pose_.shutdown();
+  if (images_) images_->shutdown();
+  queue_.close();
+  if (worker_.joinable()) worker_.join();
+  images_.reset();
+  diagnostics_.reset();
+  transform_publisher_.reset();
+  publisher_.reset();
+}
+
+void LocalizerNodelet::start() {
+  ros::NodeHandle& node = getNodeHandle();
+  ros::NodeHandle& private_node = getPrivateNodeHandle();
+  parameters_ = loadParameters(private_node);
+  localizer_ = std::make_unique<SharedLocalizer>(parameters_.localizer);
+  publisher_ = std::make_unique<LocalizerPublisher>(private_node, parameters_);
+  transform_publisher_ = std::make_unique<TransformPublisher>(parameters_.node, node);
+  diagnostics_ =
+      std::make_unique<LocalizerDiagnostics>(node, private_node, getName(), parameters_.node.image_timeout_s);
+  images_ = std::make_unique<ImageSource>(node, private_node, parameters_.node.image_transport,
+                                          [this](ReceivedImage image) { onImage(std::move(image)); });
+  if (!parameters_.node.map.empty()) {
+    try {
+      useMap(parameters_.node.map);
+    } catch (const std::exception& error) {
+      throw ParameterError("parameter 'map' is not allowed: must be a map file: " + std::string(error.what()));
+    }
+  }
+  initial_pose_ = node.subscribe("initialpose", 1, &LocalizerNodelet::onInitialPose, this);
+  offerServices();
+  timer_ = node.createWallTimer(ros::WallDuration(kTimerPeriod_s), &LocalizerNodelet::onTimer, this);
+  worker_ = std::thread(&LocalizerNodelet::work, this);
+  NODELET_INFO_STREAM(getName() << " listens to " << images_->topic());
+}
+
+void LocalizerNodelet::offerServices() {
+  // Loading a map takes a while and must not hold up the images. The multi-threaded queue of the nodelet is of no
+  // use: the loader may free it while a callback of the other queue still holds the nodelet.
+  ros::NodeHandle node = getNodeHandle();
+  ros::NodeHandle private_node = getPrivateNodeHandle();
+  node.setCallbackQueue(&service_queue_);
+  private_node.setCallbackQueue(&service_queue_);
+  services_.push_back(private_node.advertiseService("relocalize", &LocalizerNodelet::onRelocalize, this));
+  services_.push_back(private_node.advertiseService("load_map", &LocalizerNodelet::onLoadMap, this));
+  services_.push_back(node.advertiseService("global_localization", &LocalizerNodelet::onGlobalLocalization, this));
+  service_spinner_ = std::make_unique<ros::AsyncSpinner>(1, &service_queue_);
+  service_spinner_->start();
+}
+
+void LocalizerNodelet::onImage(ReceivedImage image) {
+  diagnostics_->imageArrived();
+  if (localizer_->map()) queue_.push(std::move(image));
+}
+
+void LocalizerNodelet::onInitialPose(const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
+  try {
+    const SharedLocalizer::Guess guess = guessFrom(*pose, parameters_.node.global_frame_id);
+    const bool started = localizer_->relocalizeAt(guess);
+    NODELET_INFO_STREAM((started ? "Searching around" : "No map is loaded yet: will search around")
+                        << " x = " << guess.mean_m.x() << " m, y = " << guess.mean_m.y()
+                        << " m; the heading comes from the training images");
+  } catch (const std::exception& error) {
+    if (initial_pose_throttle_.ready()) NODELET_WARN_STREAM("Initial pose refused: " << error.what());
+  }
+}
+
+bool LocalizerNodelet::onRelocalize(Relocalize::Request& request, Relocalize::Response& response) {
+  try {
+    const Eigen::Vector2d centre_m(request.centre.x, request.centre.y);
+    if (request.use_centre) requireDisc(centre_m, request.radius);
+    response.success =
+        request.use_centre ? localizer_->relocalizeAround(centre_m, request.radius) : localizer_->relocalizeAnywhere();
+    response.message = !response.success    ? "no map is loaded"
+                       : request.use_centre ? "searching in the disc"
+                                            : "searching anywhere in the map";
+  } catch (const std::exception& error) {
+    response.success = false;
+    response.message = error.what();
+  }
+  return true;
+}
+
+bool LocalizerNodelet::onGlobalLocalization(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
+  if (!localizer_->relocalizeAnywhere()) NODELET_WARN("No map is loaded: nowhere to search");
+  return true;
+}
+
+bool LocalizerNodelet::onLoadMap(LoadMap::Request& request, LoadMap::Response& response) {
+  try {
+    response.images = static_cast<std::uint32_t>(useMap(request.path));
+    response.success = true;
+    response.message = "loaded " + request.path;
+  } catch (const std::exception& error) {
+    const auto map = localizer_->map();
+    response.images = map ? static_cast<std::uint32_t>(map->size()) : 0;
+    response.success = false;
+    response.message = error.what();
+    NODELET_WARN_STREAM("Map not loaded: " << error.what());
+  }
+  return true;
+}
+
+void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {
+  if (!localizer_->map()) publisher_->publishNoMap(counts());
+  diagnostics_->publish();
+}
+
+std::size_t LocalizerNodelet::useMap(const std::string& path) {
+  const auto map = loadMap(path);
+  localizer_->setMap(map);
+  publisher_->publishMap(*map);
+  diagnostics_->mapLoaded(path, map->size());
+  NODELET_INFO_STREAM("Map " << path << " with " << map->size() << " training images");
+  return map->size();
+}
+
+void LocalizerNodelet::work() {
+  while (const auto image = queue_.pop()) {
+    try {
+      process(*image);
+    } catch (const std::exception& error) {
+      refuse(error.what());
+    }
+  }
+}
+
+void LocalizerNodelet::process(const ReceivedImage& image) {
+  const cv::Mat grey = image.decode();
+  const ros::Time stamp = usableStamp(image.header.stamp);
+  const auto result = localizer_->process(static_cast<std::int64_t>(stamp.toNSec()), grey);
+  if (!result) return;
+  ++processed_;
+  if (!isFinite(result->estimate)) {
+    if (finite_throttle_.ready()) NODELET_ERROR("The estimate is not finite and is not published");
+    return;
+  }
+  publish(*result, stamp, !image.header.stamp.isZero());
+  std_msgs::Header header = image.header;
+  header.stamp = stamp;
+  publisher_->publishMatches(*result, grey, header);
+}
+
+void LocalizerNodelet::publish(const SharedLocalizer::Result& result, const ros::Time& stamp, bool stamp_is_usable) {
+  const double latency_ms = stamp_is_usable ? millisecondsBetween(stamp, ros::Time::now()) : -1.0;
+  publisher_->publish(result, stamp, latency_ms, counts());
+  diagnostics_->imageProcessed(result.estimate, latency_ms, counts());
+  const std::string missing = transform_publisher_->publish(result.estimate.pose, stamp);
+  if (!missing.empty() && transform_throttle_.ready()) NODELET_WARN_STREAM("Nothing broadcast on tf: " << missing);
+}
+
+ros::Time LocalizerNodelet::usableStamp(const ros::Time& stamp) {
+  if (!stamp.isZero()) return stamp;
+  if (stamp_throttle_.ready()) NODELET_WARN("Images without a stamp: the time of processing is used");
+  return ros::Time::now();
+}
+
+void LocalizerNodelet::refuse(const std::string& reason) {
+  ++refused_;
+  diagnostics_->imageRefused(counts(), reason);
+  if (refusal_throttle_.ready()) NODELET_WARN_STREAM("Image refused: " << reason);
+}
+
+ImageCounts LocalizerNodelet::counts() const { return {processed_, queue_.dropped(), refused_}; }
+
+}  // namespace visual_localization
+
+PLUGINLIB_EXPORT_CLASS(visual_localization::LocalizerNodelet, nodelet::Nodelet)

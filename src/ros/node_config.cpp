@@ -1,0 +1,54 @@
+#include "visual_localization/ros/node_config.h"
+
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+namespace {
+
+/// tf2 knows no leading slash, and an empty name is no frame.
+void checkFrame(const std::string& name, const std::string& frame, std::vector<std::string>& wrong) {
+  if (!frame.empty() && frame.front() != '/' && frame.find_first_of(" \t\n") == std::string::npos) return;
+  wrong.push_back("parameter '" + name + "' = '" + frame +
+                  "' is not allowed: must be a frame name without leading slash or space");
+}
+
+}  // namespace
+
+void NodeConfig::declare(ParameterVisitor& visitor) {
+  visitor.text({"map", "", "path of the map file; empty: none until ~load_map is called"}, map);
+  visitor.text({"image_transport", "", "raw, compressed (decoded here) or another installed image transport"},
+               image_transport);
+  visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf"}, tf_mode,
+                 {"none", "map_to_odom", "map_to_base"});
+  visitor.real({"transform_tolerance", "s", "transforms are dated so far after the image"}, transform_tolerance_s, 0.0,
+               60.0);
+  visitor.real({"image_timeout", "s", "diagnostics warn when the newest image is older"}, image_timeout_s, 0.1, 3600.0);
+  visitor.text({"global_frame_id", "", "frame of the map"}, global_frame_id);
+  visitor.text({"odom_frame_id", "", "frame of the odometry"}, odom_frame_id);
+  visitor.text({"base_frame_id", "", "frame of the robot"}, base_frame_id);
+}
+
+std::vector<std::string> NodeConfig::violations() const {
+  std::vector<std::string> wrong = rangeViolations(*this);
+  checkFrame("global_frame_id", global_frame_id, wrong);
+  checkFrame("odom_frame_id", odom_frame_id, wrong);
+  checkFrame("base_frame_id", base_frame_id, wrong);
+  if (global_frame_id == base_frame_id || global_frame_id == odom_frame_id) {
+    wrong.push_back("parameter 'global_frame_id' = '" + global_frame_id +
+                    "' is not allowed: must differ from odom_frame_id and base_frame_id");
+  }
+  return wrong;
+}
+
+void NodeParameters::declare(ParameterVisitor& visitor) {
+  node.declare(visitor);
+  localizer.declare(visitor);
+}
+
+std::vector<std::string> NodeParameters::violations() const {
+  std::vector<std::string> wrong = node.violations();
+  for (const auto& violation : localizer.violations()) wrong.push_back(violation);
+  return wrong;
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,53 @@
+#include "visual_localization/ros/shared_localizer.h"
+
+#include <utility>
+
+namespace visual_localization {
+
+void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
+  auto localizer = std::make_unique<Localizer>(map, config_);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (waiting_guess_) localizer->relocalize(normallyDistributed(waiting_guess_->mean_m, waiting_guess_->covariance_m2));
+  waiting_guess_.reset();
+  // The old localizer and map now end with this function, when the lock is free again.
+  localizer_.swap(localizer);
+  map_.swap(map);
+}
+
+std::shared_ptr<const TrainingMap> SharedLocalizer::map() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return map_;
+}
+
+std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!localizer_) return std::nullopt;
+  const Estimate estimate = localizer_->process(stamp_ns, grey);
+  return Result{estimate, localizer_->particles(), localizer_->lastFeatures(), map_};
+}
+
+bool SharedLocalizer::relocalizeAnywhere() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (localizer_) localizer_->relocalize();
+  return localizer_ != nullptr;
+}
+
+bool SharedLocalizer::relocalizeAround(const Eigen::Vector2d& centre_m, double radius_m) {
+  const Prior prior = around(centre_m, radius_m);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (localizer_) localizer_->relocalize(prior);
+  return localizer_ != nullptr;
+}
+
+bool SharedLocalizer::relocalizeAt(const Guess& guess) {
+  const Prior prior = normallyDistributed(guess.mean_m, guess.covariance_m2);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (localizer_) {
+    localizer_->relocalize(prior);
+  } else {
+    waiting_guess_ = guess;
+  }
+  return localizer_ != nullptr;
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,123 @@
+"""What the tests of the running node share: waiting with a deadline, the truth, distances."""
+import math
+import os
+import subprocess
+import threading
+import time
+
+import rosbag
+import rospy
+from sensor_msgs.msg import NavSatFix
+
+from visual_localization.msg import LocalizationStatus
+
+EARTH_RADIUS_M = 6371000.0
+TRUTH_TOPIC = '/ground_truth/fix'
+IMAGE_TOPIC = '/stereo/left/image_raw/compressed'
+
+
+def wait_for(condition, timeout_s, what):
+    """Returns the first true value of `condition()`; fails after `timeout_s` of wall time."""
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.02)
+    raise AssertionError('waited %.0f s in vain for %s' % (timeout_s, what))
+
+
+def distance_m(a, b):
+    """Between two fixes that are close together."""
+    north = math.radians(a.latitude - b.latitude)
+    east = math.radians(a.longitude - b.longitude) * math.cos(math.radians(b.latitude))
+    return EARTH_RADIUS_M * math.hypot(north, east)
+
+
+class Recorder:
+    """Keeps every message of a topic."""
+
+    def __init__(self, topic, message_type):
+        self._lock = threading.Lock()
+        self._messages = []
+        self._subscriber = rospy.Subscriber(topic, message_type, self._add, queue_size=1000)
+
+    def _add(self, message):
+        with self._lock:
+            self._messages.append(message)
+
+    def messages(self):
+        with self._lock:
+            return list(self._messages)
+
+    def last(self):
+        with self._lock:
+            return self._messages[-1] if self._messages else None
+
+    def clear(self):
+        with self._lock:
+            self._messages = []
+
+    def is_connected(self):
+        return self._subscriber.get_num_connections() > 0
+
+
+class Localizer:
+    """The node under test as its users see it."""
+
+    def __init__(self, name='/localizer'):
+        self.status = Recorder(name + '/status', LocalizationStatus)
+        self.fix = Recorder(name + '/fix', NavSatFix)
+
+    def wait_until_up(self, timeout_s=60.0):
+        wait_for(lambda: self.status.is_connected() and self.fix.is_connected(), timeout_s, 'the localizer')
+
+    def wait_for_state(self, state, timeout_s):
+        def reached():
+            last = self.status.last()
+            return last is not None and last.state == state
+        wait_for(reached, timeout_s, 'state %d' % state)
+
+    def counts(self):
+        last = self.status.last()
+        return (last.images_processed, last.images_refused) if last else (0, 0)
+
+
+def truth_of(bag_path):
+    """Exact fixes of a bag by stamp."""
+    with rosbag.Bag(bag_path) as bag:
+        return {fix.header.stamp.to_nsec(): fix for _, fix, _ in bag.read_messages(topics=[TRUTH_TOPIC])}
+
+
+def images_of(bag_path, first=0, count=None):
+    """Compressed images of a bag in order."""
+    with rosbag.Bag(bag_path) as bag:
+        images = [image for _, image, _ in bag.read_messages(topics=[IMAGE_TOPIC])]
+    return images[first:] if count is None else images[first:first + count]
+
+
+def errors_m(fixes, truth):
+    """Distance of each fix from the truth at the same stamp."""
+    return [distance_m(fix, truth[fix.header.stamp.to_nsec()]) for fix in fixes if fix.header.stamp.to_nsec() in truth]
+
+
+def share_below(errors, limit_m):
+    return sum(error < limit_m for error in errors) / float(len(errors)) if errors else 0.0
+
+
+class Player:
+    """`rosbag play` as a child process."""
+
+    def __init__(self, bag_path, rate, start_s=0.0, duration_s=None):
+        command = ['rosbag', 'play', '--quiet', '-d', '1', '-r', str(rate), '-s', str(start_s), bag_path]
+        if duration_s is not None:
+            command[3:3] = ['-u', str(duration_s)]
+        self._process = subprocess.Popen(command, stdin=subprocess.DEVNULL, env=dict(os.environ))
+
+    def ended(self):
+        return self._process.poll() is not None
+
+    def stop(self):
+        if not self.ended():
+            self._process.terminate()
+        self._process.wait()

@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""A node without a map says so, and starts where it was told once it gets one."""
+import sys
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
+from sensor_msgs.msg import CompressedImage
+
+import localizer_fixture as fixture
+from visual_localization.msg import LocalizationStatus
+from visual_localization.srv import LoadMap, Relocalize, RelocalizeRequest
+
+DEADLINE_S = 30.0
+GUESS_STD_M = 0.5
+NEAR_M = 15.0
+
+
+class MapTest(unittest.TestCase):
+    def setUp(self):
+        self.camera = rospy.Publisher('/stereo/left/image_raw/compressed', CompressedImage, queue_size=1)
+        self.initial_pose = rospy.Publisher('/initialpose', PoseWithCovarianceStamped, queue_size=1)
+        self.particles = fixture.Recorder('/localizer/particles', PoseArray)
+        self.localizer = fixture.Localizer()
+        self.localizer.wait_until_up()
+        self.load_map = rospy.ServiceProxy('/localizer/load_map', LoadMap)
+        self.relocalize = rospy.ServiceProxy('/localizer/relocalize', Relocalize)
+        for service in (self.load_map, self.relocalize):
+            service.wait_for_service(DEADLINE_S)
+        for publisher in (self.camera, self.initial_pose):
+            fixture.wait_for(publisher.get_num_connections, DEADLINE_S, 'a subscriber')
+
+    def test_life_without_and_with_a_map(self):
+        self.check_no_map()
+        self.give_initial_pose(x=30.0, y=20.0)
+        self.assertGreater(self.load_map(rospy.get_param('~map')).images, 0)
+        self.check_starts_near(x=30.0, y=20.0)
+
+    def check_no_map(self):
+        self.localizer.status.clear()
+        fixture.wait_for(lambda: len(self.localizer.status.messages()) >= 3, DEADLINE_S, 'three reports of NO_MAP')
+        self.assertTrue(all(s.state == LocalizationStatus.NO_MAP for s in self.localizer.status.messages()))
+        answer = self.relocalize(RelocalizeRequest(use_centre=False))
+        self.assertFalse(answer.success)
+        self.assertIn('map', answer.message)
+        self.assertFalse(self.load_map('/does/not/exist.map').success)
+
+    def give_initial_pose(self, x, y):
+        pose = PoseWithCovarianceStamped()
+        pose.header.frame_id = 'map'
+        pose.pose.pose.position.x = x
+        pose.pose.pose.position.y = y
+        pose.pose.pose.orientation.w = 1.0
+        pose.pose.covariance[0] = pose.pose.covariance[7] = GUESS_STD_M ** 2
+        self.initial_pose.publish(pose)
+        rospy.sleep(1.0)  # nothing tells that it has arrived
+
+    def check_starts_near(self, x, y):
+        image = fixture.images_of(rospy.get_param('~bag'), count=1)[0]
+
+        def first_cloud():
+            self.camera.publish(image)
+            rospy.sleep(0.1)
+            return self.particles.messages()
+        cloud = fixture.wait_for(first_cloud, DEADLINE_S, 'the first particles')[0]
+        near = [p for p in cloud.poses if abs(p.position.x - x) < NEAR_M and abs(p.position.y - y) < NEAR_M]
+        self.assertGreater(len(near), 0.7 * len(cloud.poses))
+
+
+if __name__ == '__main__':
+    rospy.init_node('map_test')
+    rostest.rosrun('visual_localization', 'map_test', MapTest, sys.argv)

@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""A recorded round through the running node: it finds its place and stays there; all topics agree."""
+import math
+import sys
+import unittest
+
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
+from nav_msgs.msg import Path
+from sensor_msgs.msg import Image, PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+import localizer_fixture as fixture
+from visual_localization.msg import LocalizationStatus, Swarm
+
+NEAR_M = 5.0
+MOST = 0.8
+
+
+class ReplayTest(unittest.TestCase):
+    def setUp(self):
+        self.bag = rospy.get_param('~bag')
+        self.localizer = fixture.Localizer()
+        self.topics = {name: fixture.Recorder('/localizer/' + name, kind) for name, kind in {
+            'pose': PoseWithCovarianceStamped, 'particles': PoseArray, 'swarm': Swarm, 'particle_cloud': PointCloud2,
+            'map_path': Path, 'map_markers': MarkerArray, 'matches': Image}.items()}
+        self.diagnostics = fixture.Recorder('/diagnostics', DiagnosticArray)
+        self.localizer.wait_until_up()
+
+    def test_a_round_is_followed(self):
+        player = fixture.Player(self.bag, rate=rospy.get_param('~rate'), duration_s=rospy.get_param('~duration'))
+        try:
+            self.localizer.wait_for_state(LocalizationStatus.TRACKING, 120.0)
+            fixture.wait_for(player.ended, 300.0, 'the end of the bag')
+        finally:
+            player.stop()
+        self.check_errors()
+        self.check_poses()
+        self.check_particles()
+        self.check_map_and_pictures()
+        self.check_diagnostics()
+
+    def check_errors(self):
+        tracking = {status.header.stamp.to_nsec() for status in self.localizer.status.messages()
+                    if status.state == LocalizationStatus.TRACKING}
+        fixes = [fix for fix in self.localizer.fix.messages() if fix.header.stamp.to_nsec() in tracking]
+        errors = fixture.errors_m(fixes, fixture.truth_of(self.bag))
+        print('%d images, %d of them tracking, %.0f %% of these within %.0f m, median %.2f m' % (
+            len(self.localizer.fix.messages()), len(errors), 100.0 * fixture.share_below(errors, NEAR_M), NEAR_M,
+            sorted(errors)[len(errors) // 2]))
+        self.assertGreater(len(errors), 20)
+        self.assertGreater(fixture.share_below(errors, NEAR_M), MOST)
+
+    def check_poses(self):
+        poses = self.topics['pose'].messages()
+        self.assertGreater(len(poses), 20)
+        for pose in poses:
+            self.assertEqual(pose.header.frame_id, 'map')
+            numbers = [pose.pose.pose.position.x, pose.pose.pose.position.y, pose.pose.pose.orientation.z,
+                       pose.pose.pose.orientation.w] + list(pose.pose.covariance)
+            self.assertTrue(all(math.isfinite(number) for number in numbers))
+
+    def check_particles(self):
+        swarm = self.topics['swarm'].last()
+        self.assertAlmostEqual(sum(particle.weight for particle in swarm.particles), 1.0, places=6)
+        self.assertEqual(len(self.topics['particles'].last().poses), len(swarm.particles))
+        self.assertEqual(self.topics['particle_cloud'].last().width, len(swarm.particles))
+
+    def check_map_and_pictures(self):
+        self.assertGreater(len(self.topics['map_path'].last().poses), 20)
+        self.assertGreater(len(self.topics['map_markers'].last().markers), 1)
+        self.assertEqual(self.topics['matches'].last().encoding, 'bgr8')
+
+    def check_diagnostics(self):
+        names = {status.name for array in self.diagnostics.messages() for status in array.status}
+        for task in ('localization', 'images', 'map'):
+            self.assertIn('localizer: ' + task, names)
+
+
+if __name__ == '__main__':
+    rospy.init_node('replay_test')
+    rostest.rosrun('visual_localization', 'replay_test', ReplayTest, sys.argv)

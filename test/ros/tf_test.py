@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+"""Transforms: with odometry map, odom and base agree with the pose; without odometry nothing is broadcast."""
+import math
+import sys
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from sensor_msgs.msg import CompressedImage
+from tf2_msgs.msg import TFMessage
+
+import localizer_fixture as fixture
+
+DEADLINE_S = 30.0
+TOLERANCE_S = 0.1
+
+
+def yaw_of(rotation):
+    return 2.0 * math.atan2(rotation.z, rotation.w)
+
+
+def base_in_odom(stamp, x, y, yaw):
+    transform = TransformStamped(child_frame_id='base_link')
+    transform.header.frame_id = 'odom'
+    transform.header.stamp = stamp
+    transform.transform.translation.x = x
+    transform.transform.translation.y = y
+    transform.transform.rotation.z = math.sin(0.5 * yaw)
+    transform.transform.rotation.w = math.cos(0.5 * yaw)
+    return transform
+
+
+class TfTest(unittest.TestCase):
+    def setUp(self):
+        self.camera = rospy.Publisher('/stereo/left/image_raw/compressed', CompressedImage, queue_size=1)
+        self.odometry = rospy.Publisher('/tf', TFMessage, queue_size=10)
+        self.transforms = fixture.Recorder('/tf', TFMessage)
+        self.poses = fixture.Recorder('/localizer/pose', PoseWithCovarianceStamped)
+        self.localizer = fixture.Localizer()
+        self.localizer.wait_until_up()
+        for publisher in (self.camera, self.odometry):
+            fixture.wait_for(publisher.get_num_connections, DEADLINE_S, 'a subscriber')
+        self.image = fixture.images_of(rospy.get_param('~bag'), count=1)[0]
+
+    def show_image(self, odometry=None):
+        """Shows one image, with odometry of the same stamp if given, until there is a pose for it."""
+        def seen():
+            stamp = self.image.header.stamp = rospy.Time.now()
+            if odometry:
+                self.odometry.publish(TFMessage([base_in_odom(stamp, *odometry)]))
+            self.camera.publish(self.image)
+            rospy.sleep(0.3)
+            return [pose for pose in self.poses.messages() if pose.header.stamp == stamp]
+        return fixture.wait_for(seen, DEADLINE_S, 'the pose of an image')[0]
+
+    def from_map(self):
+        return [t for message in self.transforms.messages() for t in message.transforms if t.header.frame_id == 'map']
+
+    def test_1_without_odometry_nothing_is_broadcast(self):
+        for _ in range(3):
+            self.show_image()
+        self.assertEqual(self.from_map(), [])
+
+    def test_2_with_odometry_the_chain_leads_to_the_pose(self):
+        odometry = (3.0, -2.0, 0.7)
+        pose = self.show_image(odometry)
+        stamp = pose.header.stamp + rospy.Duration(TOLERANCE_S)
+        transform = fixture.wait_for(lambda: [t for t in self.from_map() if t.header.stamp == stamp], DEADLINE_S,
+                                     'the transform of an image')[0]
+        self.assertEqual(transform.child_frame_id, 'odom')
+        yaw = yaw_of(transform.transform.rotation)
+        x, y, base_yaw = odometry
+        self.assertAlmostEqual(transform.transform.translation.x + math.cos(yaw) * x - math.sin(yaw) * y,
+                               pose.pose.pose.position.x, places=6)
+        self.assertAlmostEqual(transform.transform.translation.y + math.sin(yaw) * x + math.cos(yaw) * y,
+                               pose.pose.pose.position.y, places=6)
+        self.assertAlmostEqual(math.cos(yaw + base_yaw - yaw_of(pose.pose.pose.orientation)), 1.0, places=6)
+
+
+if __name__ == '__main__':
+    rospy.init_node('tf_test')
+    rostest.rosrun('visual_localization', 'tf_test', TfTest, sys.argv)

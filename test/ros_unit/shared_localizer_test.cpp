@@ -1,0 +1,86 @@
+#include "visual_localization/ros/shared_localizer.h"
+
+#include <atomic>
+#include <limits>
+#include <stdexcept>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "test/ros_unit/small_map.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1000000000;
+
+cv::Mat noise() {
+  cv::Mat image(240, 320, CV_8UC1);
+  cv::randu(image, 0, 255);
+  return image;
+}
+
+TEST(SharedLocalizer, WithoutMapThereIsNoResult) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  EXPECT_FALSE(localizer.process(kSecond_ns, noise()).has_value());
+  EXPECT_FALSE(localizer.relocalizeAnywhere());
+  EXPECT_FALSE(localizer.relocalizeAround({0.0, 0.0}, 5.0));
+  EXPECT_EQ(localizer.map(), nullptr);
+}
+
+TEST(SharedLocalizer, WithMapEveryImageHasAResult) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  const auto result = localizer.process(kSecond_ns, noise());
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->estimate.stamp_ns, kSecond_ns);
+  EXPECT_EQ(result->particles.size(), static_cast<std::size_t>(LocalizerConfig{}.dpso.particles));
+  EXPECT_EQ(result->map, localizer.map());
+}
+
+TEST(SharedLocalizer, AGuessWaitsForTheMap) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  const SharedLocalizer::Guess guess{{2.0, 20.0}, Eigen::Matrix2d::Zero()};
+  EXPECT_FALSE(localizer.relocalizeAt(guess));
+  localizer.setMap(test::smallMap());
+  const auto result = localizer.process(kSecond_ns, noise());
+  ASSERT_TRUE(result.has_value());
+  for (const Particle& particle : result->particles) {
+    if (particle.kind == ParticleKind::kQuantum) continue;
+    EXPECT_NEAR(particle.position_m.y(), 20.0, 5.0);
+  }
+}
+
+TEST(SharedLocalizer, AGuessThatIsNoneIsRefusedAndNotKept) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(localizer.relocalizeAt({{kNan, 0.0}, Eigen::Matrix2d::Identity()}), std::invalid_argument);
+  EXPECT_THROW(localizer.relocalizeAt({{0.0, 0.0}, -Eigen::Matrix2d::Identity()}), std::invalid_argument);
+  EXPECT_NO_THROW(localizer.setMap(test::smallMap()));
+}
+
+TEST(SharedLocalizer, AnUnusableImageChangesNothing) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat()), std::invalid_argument);
+  EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
+  EXPECT_TRUE(localizer.process(kSecond_ns, noise()).has_value());
+}
+
+TEST(SharedLocalizer, MapsMayBeReplacedWhileImagesAreProcessed) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  std::atomic<bool> done{false};
+  std::thread replacer([&] {
+    while (!done) {
+      localizer.setMap(test::smallMap());
+      localizer.relocalizeAnywhere();
+    }
+  });
+  for (int i = 1; i <= 20; ++i) EXPECT_TRUE(localizer.process(i * kSecond_ns, noise()).has_value());
+  done = true;
+  replacer.join();
+}
+
+}  // namespace
+}  // namespace visual_localization
