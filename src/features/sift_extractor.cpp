@@ -9,16 +9,6 @@
 namespace visual_localization {
 namespace {
 
-constexpr int kSmallestSide = 16;
-
-void requireGrey(const cv::Mat& grey) {
-  if (grey.type() != CV_8UC1) throw std::invalid_argument("SIFT: image must be 8-bit with one channel");
-  if (grey.rows < kSmallestSide || grey.cols < kSmallestSide) {
-    throw std::invalid_argument("SIFT: image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
-                                ", must be at least 16x16");
-  }
-}
-
 class OpenCvSiftExtractor : public SiftExtractor {
  public:
   explicit OpenCvSiftExtractor(const SiftConfig& config)
@@ -26,7 +16,7 @@ class OpenCvSiftExtractor : public SiftExtractor {
                                config.edge_threshold, config.sigma_px, CV_8U)) {}
 
   SiftFeatures extract(const cv::Mat& grey) override {
-    requireGrey(grey);
+    requireExtractable(grey);
     sift_->detectAndCompute(grey, cv::noArray(), found_, descriptors_);
     std::vector<SiftKeypoint> keypoints;
     keypoints.reserve(found_.size());
@@ -43,6 +33,15 @@ class OpenCvSiftExtractor : public SiftExtractor {
 };
 
 }  // namespace
+
+void requireExtractable(const cv::Mat& grey) {
+  constexpr int kSmallestSide = 16;
+  if (grey.type() != CV_8UC1) throw std::invalid_argument("image must be 8-bit with one channel");
+  if (grey.rows < kSmallestSide || grey.cols < kSmallestSide) {
+    throw std::invalid_argument("image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
+                                " pixels, must be at least 16x16");
+  }
+}
 
 void SiftConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"sift/octave_layers", "1", "scale samples per octave"}, octave_layers, 1, 10);

@@ -19,7 +19,7 @@ FrontEnd::FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size im
       extractor_(makeSiftExtractor(sift)) {}
 
 Observation FrontEnd::observe(std::int64_t stamp_ns, const cv::Mat& grey) {
-  if (grey.empty() || grey.type() != CV_8UC1) throw std::invalid_argument("image must be 8-bit with one channel");
+  requireExtractable(grey);
   cv::Mat resized = grey;
   if (grey.size() != image_size_) cv::resize(grey, resized, image_size_, 0.0, 0.0, cv::INTER_AREA);
 

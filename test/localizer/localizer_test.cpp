@@ -119,6 +119,7 @@ TEST_F(LocalizerTest, RefusesABadImageAndGoesOn) {
   Localizer localizer(map_, LocalizerConfig());
   EXPECT_THROW(localizer.process(0, cv::Mat()), std::invalid_argument);
   EXPECT_THROW(localizer.process(0, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
+  EXPECT_THROW(localizer.process(0, cv::Mat(4, 4, CV_8UC1)), std::invalid_argument);
   EXPECT_NO_THROW(localizer.process(0, viewAt(10.0)));
 }
 

@@ -24,11 +24,15 @@ struct SiftConfig {
   std::vector<std::string> violations() const { return {}; }
 };
 
+/// Throws std::invalid_argument, naming what is wrong, unless the image is 8-bit with one channel and at least
+/// 16 x 16 pixels.
+void requireExtractable(const cv::Mat& grey);
+
 /// Image in, SIFT features out. Not thread-safe: one extractor a thread.
 class SiftExtractor {
  public:
   virtual ~SiftExtractor() = default;
-  /// `grey` is 8-bit, one channel, at least 16 x 16 pixels; throws std::invalid_argument otherwise.
+  /// Throws like requireExtractable.
   virtual SiftFeatures extract(const cv::Mat& grey) = 0;
 };
 
