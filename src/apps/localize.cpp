@@ -20,6 +20,7 @@
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
+#include "visual_localization/ros/node_config.h"
 
 namespace visual_localization::apps {
 namespace {
@@ -60,14 +61,16 @@ void declareOptions(CLI::App& app, Options& options) {
 }
 
 LocalizerConfig configOf(const Options& options) {
-  LocalizerConfig config;
+  // The file is the node's: what only the node needs is checked, but of no use here.
+  NodeParameters from_file;
   if (!options.config.empty()) {
     try {
-      assignParameters(config, parameters::readYaml(options.config));
+      assignParameters(from_file, parameters::readYaml(options.config));
     } catch (const ParameterError& error) {
       throw ParameterError(options.config + ": " + error.what());
     }
   }
+  LocalizerConfig config = from_file.localizer;
   ParameterValues given;
   if (!options.tracker.empty()) given["tracker"] = options.tracker;
   if (!options.features.empty()) given["features"] = options.features;
@@ -152,6 +155,7 @@ std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index
 
 void run(const Options& options) {
   const LocalizerConfig config = configOf(options);
+  PartialFile output(options.output);  // fails now, not after the run
   Localizer localizer(loadMap(options.map), config);
   const BagReader bag(options.bag);
   const BagImages images = bag.images(options.image_topic);
@@ -177,7 +181,8 @@ void run(const Options& options) {
   }
   progress.show(order.size(), order.size());
   if (totals.images == 0) throw BagError(options.bag + ": no usable image on " + images.topic());
-  writeFile(options.output, track);
+  output.write(track);
+  output.commit();
   print(totals);
   if (truth) print(summarise(std::move(errors_m)));
 }

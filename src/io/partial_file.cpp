@@ -115,10 +115,9 @@ void PartialFile::commit() {
   flush(folderOf(target_));
 }
 
-void writeFile(const std::string& path, const std::string& content) {
-  PartialFile file(path);
-  const int descriptor = ::open(file.path().c_str(), O_WRONLY | O_CLOEXEC);
-  if (descriptor < 0) refuse(path, errno);
+void PartialFile::write(const std::string& content) {
+  const int descriptor = ::open(partial_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (descriptor < 0) refuse(shown_, errno);
   std::size_t written = 0;
   while (written < content.size()) {
     const ssize_t count = ::write(descriptor, content.data() + written, content.size() - written);
@@ -126,11 +125,16 @@ void writeFile(const std::string& path, const std::string& content) {
     if (count <= 0) {
       const int error = count < 0 ? errno : ENOSPC;
       ::close(descriptor);
-      refuse(path, error);
+      refuse(shown_, error);
     }
     written += static_cast<std::size_t>(count);
   }
-  if (::close(descriptor) != 0) refuse(path, errno);
+  if (::close(descriptor) != 0) refuse(shown_, errno);
+}
+
+void writeFile(const std::string& path, const std::string& content) {
+  PartialFile file(path);
+  file.write(content);
   file.commit();
 }
 

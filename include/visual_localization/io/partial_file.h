@@ -26,6 +26,9 @@ class PartialFile {
   /// The name to write to until commit().
   const std::string& path() const { return partial_; }
 
+  /// Appends to the file. Throws FileError naming the target, for instance when the disk is full.
+  void write(const std::string& content);
+
   /// Flushes the file to the disk and renames it to the target. Throws FileError naming the target.
   void commit();
 

@@ -1,0 +1,141 @@
+"""The programs as a user meets them: results, exit codes, one line of error, nothing half-written."""
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+PROGRAMS, MAP, DRIVE, CONFIG = (Path(argument) for argument in sys.argv[1:5])
+HEADER = ('stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,'
+          'extract_ms,match_ms,update_ms').split(',')
+TIMES = ('extract_ms', 'match_ms', 'update_ms')
+
+
+def run(program: str, *arguments, **options) -> subprocess.CompletedProcess:
+    """Runs a program to its end."""
+    command = [str(PROGRAMS / program), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, **options)
+
+
+def read_track(path: Path) -> list:
+    """Rows of a track as dictionaries."""
+    with open(path, newline='', encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+class ProgramsTest(unittest.TestCase):
+    """Each test has a folder of its own."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def localize(self, *arguments) -> list:
+        """A run over the drive; its rows."""
+        track = self.folder / 'track.csv'
+        result = run('localize', '--map', MAP, '--bag', DRIVE, '--output', track, *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.output = result.stdout
+        return read_track(track)
+
+    def assert_refused(self, result: subprocess.CompletedProcess, code: int, *words: str):
+        """One line on standard error that holds these words, and nothing left in the folder."""
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        for word in words:
+            self.assertIn(word, result.stderr)
+
+    def test_track_has_a_row_for_every_image_and_follows_the_robot(self):
+        rows = self.localize('--seed', 1, '--truth-topic', '/ground_truth/fix')
+        self.assertEqual(list(rows[0]), HEADER)
+        self.assertEqual(len(rows), 403)
+        for row in rows:
+            for name in HEADER:
+                if name not in ('state', 'features'):
+                    self.assertTrue(math.isfinite(float(row[name])), row)
+        self.assertGreater(sum(row['state'] == 'TRACKING' for row in rows), 0.8 * len(rows))
+        error = float(self.output.split('mean ')[1].split(' m')[0])
+        self.assertLess(error, 3.0)
+
+    def test_same_seed_gives_the_same_track_another_seed_another_one(self):
+        def positions(rows):
+            return [{name: value for name, value in row.items() if name not in TIMES} for row in rows]
+
+        first = positions(self.localize('--seed', 5))
+        self.assertEqual(first, positions(self.localize('--seed', 5)))
+        self.assertNotEqual(first, positions(self.localize('--seed', 6)))
+
+    def test_start_index_wraps_around_the_round(self):
+        rows = self.localize('--start-index', 400, '--config', CONFIG)
+        stamps = [float(row['stamp']) for row in rows]
+        self.assertEqual(len(stamps), 403)
+        self.assertEqual(stamps.index(min(stamps)), 3)
+
+    def test_bad_usage_is_code_2(self):
+        output = self.folder / 'track.csv'
+        good = ('--map', MAP, '--bag', DRIVE, '--output', output)
+        for extra, word in ((('--tracker', 'crystal_ball'), 'dpso'), (('--particles', '-3'), '[2, 100000]'),
+                            (('--start-index', 403), '0 to 402'), (('--kidnap-at', 3), '--kidnap-to'),
+                            (('--nonsense', 1), '--nonsense')):
+            self.assert_refused(run('localize', *good, *extra), 2, word)
+        self.assert_refused(run('localize', '--map', MAP), 2, '--bag')
+        self.assert_refused(run('map_info'), 2)
+        self.assert_refused(run('map_builder'), 2)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_a_failed_run_is_code_1_and_leaves_nothing(self):
+        output = self.folder / 'output'
+        damaged = self.folder / 'damaged.bag'
+        damaged.write_bytes(DRIVE.read_bytes()[:1000000])
+        for arguments, word in (((MAP, damaged), 'damaged.bag'), ((damaged, DRIVE), 'damaged.bag'),
+                                ((MAP, self.folder / 'none.bag'), 'none.bag'), ((self.folder, DRIVE), 'folder')):
+            result = run('localize', '--map', arguments[0], '--bag', arguments[1], '--output', output)
+            self.assert_refused(result, 1, word)
+        self.assert_refused(run('map_builder', '--bag', damaged, '--output', output), 1, 'damaged.bag')
+        self.assert_refused(run('map_builder', '--bag', DRIVE, '--output', output, '--fix-topic', '/no'), 1, '/gps/fix')
+        result = run('localize', '--map', MAP, '--bag', DRIVE, '--output', self.folder / 'no' / 'track.csv')
+        self.assert_refused(result, 1, 'folder does not exist')
+        self.assertEqual([path.name for path in self.folder.iterdir()], ['damaged.bag'])
+
+    def test_an_unknown_parameter_is_named(self):
+        config = self.folder / 'config.yaml'
+        config.write_text('dpso:\n  inertai: 0.5\n', encoding='utf-8')
+        result = run('localize', '--map', MAP, '--bag', DRIVE, '--config', config, '--output', self.folder / 'out')
+        self.assert_refused(result, 1, 'config.yaml', "'dpso/inertai' = 0.5")
+
+    def test_a_killed_builder_leaves_the_old_map(self):
+        output = self.folder / 'old.map'
+        output.write_bytes(MAP.read_bytes())
+        for number in (signal.SIGTERM, signal.SIGINT):
+            command = [str(PROGRAMS / 'map_builder'), '--bag', str(DRIVE), '--output', str(output)]
+            with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+                self.assertRaises(subprocess.TimeoutExpired, process.wait, 0.7)
+                process.send_signal(number)
+                self.assertNotEqual(process.wait(20), 0)
+        self.assertEqual(output.read_bytes(), MAP.read_bytes())
+        self.assertEqual([path.name for path in self.folder.iterdir()], ['old.map'])
+
+    def test_map_info_shows_checks_and_exports(self):
+        geojson, table = self.folder / 'map.geojson', self.folder / 'map.csv'
+        result = run('map_info', MAP, '--check', '--export-geojson', geojson, '--export-csv', table)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('404 of 320x240', result.stdout)
+        self.assertEqual(len(read_track(table)), 404)
+        self.assertIn('FeatureCollection', geojson.read_text(encoding='utf-8'))
+
+    def test_help_and_version(self):
+        for program in ('map_builder', 'map_info', 'localize'):
+            for option in ('--help', '--version'):
+                result = run(program, option)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertIn(program, result.stdout)
+
+
+if __name__ == '__main__':
+    os.environ.pop('ROS_MASTER_URI', None)
+    unittest.main(argv=sys.argv[:1], verbosity=2)
