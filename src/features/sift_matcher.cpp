@@ -33,34 +33,45 @@ struct TwoNearest {
   }
 };
 
-std::int32_t dot(const std::uint8_t* a, const std::uint8_t* b) {
+/// Descriptors as 16-bit numbers: compilers turn their scalar product into one multiply-add instruction for eight
+/// bins (pmaddwd), which they do not for bytes.
+std::vector<std::int16_t> widened(const SiftFeatures& features) {
+  return std::vector<std::int16_t>(features.descriptors().begin(), features.descriptors().end());
+}
+
+std::int32_t dot(const std::int16_t* a, const std::int16_t* b) {
   std::int32_t sum = 0;
   for (std::size_t i = 0; i < SiftFeatures::kDescriptorSize; ++i) sum += std::int32_t{a[i]} * std::int32_t{b[i]};
   return sum;
 }
 
-/// 1 / |descriptor|, 0 for the zero vector, which is then orthogonal to everything.
-std::vector<float> inverseNorms(const SiftFeatures& features) {
-  std::vector<float> norms(features.size());
-  for (std::size_t i = 0; i < norms.size(); ++i) {
-    const auto squared = static_cast<float>(dot(features.descriptor(i), features.descriptor(i)));
-    norms[i] = squared > 0.0F ? 1.0F / std::sqrt(squared) : 0.0F;
+/// Descriptors ready for comparison.
+struct Prepared {
+  explicit Prepared(const SiftFeatures& features) : bins(widened(features)), inverse_norms(features.size()) {
+    for (std::size_t i = 0; i < inverse_norms.size(); ++i) {
+      const auto squared = static_cast<float>(dot(row(i), row(i)));
+      // The zero vector is orthogonal to everything.
+      inverse_norms[i] = squared > 0.0F ? 1.0F / std::sqrt(squared) : 0.0F;
+    }
   }
-  return norms;
-}
+  const std::int16_t* row(std::size_t i) const { return bins.data() + i * SiftFeatures::kDescriptorSize; }
+
+  std::vector<std::int16_t> bins;
+  std::vector<float> inverse_norms;
+};
 
 struct Nearest {
   std::vector<TwoNearest> of_a;  ///< in B
   std::vector<TwoNearest> of_b;  ///< in A
 };
 
-Nearest findNearest(const SiftFeatures& a, const SiftFeatures& b) {
-  const std::vector<float> norms_a = inverseNorms(a);
-  const std::vector<float> norms_b = inverseNorms(b);
-  Nearest nearest{std::vector<TwoNearest>(a.size()), std::vector<TwoNearest>(b.size())};
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const float cosine = static_cast<float>(dot(a.descriptor(i), b.descriptor(j))) * norms_a[i] * norms_b[j];
+Nearest findNearest(const SiftFeatures& features_a, const SiftFeatures& features_b) {
+  const Prepared a(features_a);
+  const Prepared b(features_b);
+  Nearest nearest{std::vector<TwoNearest>(features_a.size()), std::vector<TwoNearest>(features_b.size())};
+  for (std::size_t i = 0; i < nearest.of_a.size(); ++i) {
+    for (std::size_t j = 0; j < nearest.of_b.size(); ++j) {
+      const float cosine = static_cast<float>(dot(a.row(i), b.row(j))) * a.inverse_norms[i] * b.inverse_norms[j];
       nearest.of_a[i].offer(cosine, j);
       nearest.of_b[j].offer(cosine, i);
     }
