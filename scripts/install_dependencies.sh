@@ -4,7 +4,7 @@ set -euo pipefail
 
 readonly ROS_BUILD=(
   catkin libroscpp-dev libnodelet-dev libnodeletlib-dev pluginlib-dev libcv-bridge-dev libimage-transport-dev
-  libtf2-ros-dev libtf2-geometry-msgs-dev libtf2-eigen-dev librosbag-dev librosbag-storage-dev
+  libtf2-ros-dev libtf2-geometry-msgs-dev libtf2-eigen-dev librosbag-dev librosbag-storage-dev libroslz4-dev libbz2-dev libboost-dev
   libdiagnostic-updater-dev libdynamic-reconfigure-config-init-mutex-dev librostest-dev
   ros-message-generation ros-message-runtime
   # ros-*-msgs holds the definitions, lib*-msgs-dev the headers, python3-*-msgs the modules of the ROS tools.

@@ -14,6 +14,7 @@
 #include <sensor_msgs/NavSatFix.h>
 #include <sys/stat.h>
 
+#include "visual_localization/ros/bag_validator.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
@@ -32,6 +33,8 @@ auto withBag(const std::string& path, Read read) {
     return read();
   } catch (const BagError&) {
     throw;
+  } catch (const DamagedBag& error) {
+    throw BagError(path + ": bag is damaged or cut off: " + oneLine(error.what()));
   } catch (const rosbag::BagUnindexedException&) {
     throw BagError(path + ": bag is not indexed, as after an interrupted recording; `rosbag reindex` may repair it");
   } catch (const rosbag::BagIOException& error) {
@@ -181,7 +184,10 @@ BagImage BagImages::read(std::size_t i) const {
 
 BagReader::BagReader(const std::string& path) : path_(path) {
   requireFile(path);
-  withBag(path, [&] { bag_.open(path, rosbag::bagmode::Read); });
+  withBag(path, [&] {
+    validateBag(path);
+    bag_.open(path, rosbag::bagmode::Read);
+  });
 }
 
 BagImages BagReader::images(const std::string& topic) const {
