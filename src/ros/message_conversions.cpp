@@ -139,6 +139,7 @@ sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, co
   constexpr int kFloat = sensor_msgs::PointField::FLOAT32;
   modifier.setPointCloud2Fields(4, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "intensity", 1, kFloat);
   modifier.resize(particles.size());
+  if (particles.empty()) return message;  // the iterator takes the address of the first point
   sensor_msgs::PointCloud2Iterator<float> point(message, "x");
   for (const Particle& particle : particles) {
     point[0] = static_cast<float>(particle.position_m.x());
