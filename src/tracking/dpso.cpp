@@ -113,7 +113,7 @@ TrackerEstimate Dpso::update(ScoreCache& scores) {
   const std::size_t best = evaluate(scores);
   // An image that matches nothing says nothing about where to go: the attractor stays where it was.
   if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
-  const TrackerEstimate result = estimate();
+  TrackerEstimate result = estimate();
   adaptSpeed();
   adaptDiversity(result.best);
   assignKinds();

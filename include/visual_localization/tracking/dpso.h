@@ -39,7 +39,7 @@ struct DpsoConfig {
 
 /// Dynamic particle swarm optimisation, Kronfeld et al. (journal), section 5: particles fly towards the best
 /// one of the last image; the best one is the estimate.
-class Dpso : public Tracker {
+class Dpso final : public Tracker {
  public:
   /// `map` must outlive the tracker. Starts anywhere in the map's area.
   Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed);
