@@ -75,7 +75,8 @@ LocalizerConfig configOf(const Options& options) {
   if (!options.tracker.empty()) given["tracker"] = options.tracker;
   if (!options.features.empty()) given["features"] = options.features;
   if (options.seed) given["seed"] = *options.seed;
-  if (options.particles) given["dpso/particles"] = *options.particles;
+  const std::string tracker = options.tracker.empty() ? config.tracker : options.tracker;
+  if (options.particles) given[tracker == "dpso" ? "dpso/particles" : "pf/particles"] = *options.particles;
   try {
     assignParameters(config, given);
   } catch (const ParameterError& error) {

@@ -33,7 +33,7 @@ std::vector<double> spanSpeeds(const std::vector<PathSample>& samples, double mi
 
 /// Cost of going from one believed sample straight to another. A robot may stand still, and the straight line cuts
 /// its corners; apart from that it neither races nor crawls.
-double stepCost(const PathSample& from, const PathSample& to, const MotionModel& motion) {
+double stepCost(const PathSample& from, const PathSample& to, const DrivingModel& motion) {
   constexpr double kStanding = 0.2;  // of the typical speed
   constexpr double kStandingCost = 0.5;
   constexpr double kMostForSlow = 4.0;
@@ -59,7 +59,7 @@ SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_
   return {median_mps, 1.4826 * median(speeds)};
 }
 
-std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const MotionModel& motion) {
+std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const DrivingModel& motion) {
   const std::size_t count = samples.size();
   const auto costOfSkipping = [&motion](std::size_t skipped) {
     return skipped == 0 ? 0.0 : motion.opening_cost + motion.rejection_cost * static_cast<double>(skipped);

@@ -91,11 +91,11 @@ std::vector<PathSample> samplesOf(const std::vector<Node>& nodes) {
 }
 
 /// `rough_mps` stands in where the round is too short to measure its speed over several nodes.
-MotionModel motionOf(const std::vector<Node>& nodes, double node_s, double rough_mps,
-                     const TrajectoryCleanerConfig& config) {
+DrivingModel motionOf(const std::vector<Node>& nodes, double node_s, double rough_mps,
+                      const TrajectoryCleanerConfig& config) {
   constexpr double kLongSpan = 4.0;  // nodes
   const std::vector<PathSample> samples = samplesOf(nodes);
-  MotionModel motion;
+  DrivingModel motion;
   const double measured_mps = measureSpeed(samples, kLongSpan * node_s).median_mps;
   motion.speed_mps = measured_mps > 0.0 ? std::max(kLeastSpeed, measured_mps) : rough_mps;
   motion.speed_std_mps = config.speed_tolerance * motion.speed_mps;
@@ -253,7 +253,7 @@ CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFram
   const double rough_mps = std::max(kLeastSpeed, measureSpeed(usable.samples, 10.0 * interval_s).median_mps);
   const double node_s = std::max(0.9 * interval_s, config.node_length_m / rough_mps);
   const std::vector<Node> nodes = summarise(usable.samples, node_s);
-  const MotionModel motion = motionOf(nodes, node_s, rough_mps, config);
+  const DrivingModel motion = motionOf(nodes, node_s, rough_mps, config);
   std::vector<bool> believed = consistentSamples(samplesOf(nodes), motion);
   widenRejections(nodes, config.margin_m / motion.speed_mps, believed);
   judgeNodes(nodes, believed, usable, kSpike * std::max(config.node_length_m, motion.speed_mps * node_s),

@@ -22,7 +22,10 @@ const LocalizerConfig& validated(const LocalizerConfig& config) {
 }
 
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const LocalizerConfig& config) {
-  return std::make_unique<Dpso>(map, config.dpso, config.fitness, static_cast<std::uint32_t>(config.seed));
+  const auto seed = static_cast<std::uint32_t>(config.seed);
+  if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed);
+  return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf), config.pf, config.fitness,
+                                          seed);
 }
 
 }  // namespace

@@ -7,7 +7,8 @@
 namespace visual_localization {
 
 void LocalizerConfig::declare(ParameterVisitor& visitor) {
-  visitor.choice({"tracker", "", "dpso: dynamic particle swarm"}, tracker, {"dpso"});
+  visitor.choice({"tracker", "", "dynamic particle swarm, or particle filter with Gaussian or linear motion"}, tracker,
+                 {"dpso", "pf_gaussian", "pf_linear"});
   visitor.choice({"features", "", "what images are compared by"}, features, {"sift"});
   visitor.integer({"seed", "1", "of the random generator; the same seed, map and images give the same track"}, seed, 0,
                   std::numeric_limits<int>::max());
@@ -21,6 +22,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   fitness.declare(visitor);
   state.declare(visitor);
   dpso.declare(visitor);
+  pf.declare(visitor);
 }
 
 std::vector<std::string> LocalizerConfig::violations() const {

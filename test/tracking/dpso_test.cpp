@@ -2,53 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
+#include "test/support/world.h"
 #include "visual_localization/geo/angles.h"
 
 namespace visual_localization {
 namespace {
 
-/// A world without images: how alike two places look depends on their distance only.
-class World {
- public:
-  explicit World(std::shared_ptr<const TrainingMap> map) : map_(std::move(map)), scores_(map_->size()) {}
+using test::onCircle;
+using test::roundWorld;
+using test::World;
 
-  /// What the robot sees from here.
-  ScoreCache& from(const Eigen::Vector2d& robot_m) {
-    scores_.startImage([this, robot_m](std::size_t image) {
-      const double distance = (map_->image(image).position_m - robot_m).norm() / 2.0;
-      const double similarity = 0.5 * std::exp(-0.5 * distance * distance);
-      return Score{similarity, static_cast<std::size_t>(100.0 * similarity)};
-    });
-    return scores_;
-  }
-
-  ScoreCache& inTheDark() {
-    scores_.startImage([](std::size_t) { return Score{}; });
-    return scores_;
-  }
-
-  const TrainingMap& map() const { return *map_; }
-
- private:
-  std::shared_ptr<const TrainingMap> map_;
-  ScoreCache scores_;
-};
-
-World roundWorld() { return World(test::mapAt(test::circle(200, 30.0))); }
-
-Eigen::Vector2d onCircle(double arc_m) {
-  return 30.0 * Eigen::Vector2d(std::cos(arc_m / 30.0), std::sin(arc_m / 30.0));
-}
-
-double sumOfWeights(const std::vector<Particle>& particles) {
-  return std::accumulate(particles.begin(), particles.end(), 0.0,
-                         [](double sum, const Particle& particle) { return sum + particle.weight; });
-}
+using test::sumOfWeights;
 
 std::size_t countOf(const std::vector<Particle>& particles, ParticleKind kind) {
   return static_cast<std::size_t>(

@@ -7,7 +7,7 @@
 namespace visual_localization {
 
 /// How a vehicle moves and how well its samples are known.
-struct MotionModel {
+struct DrivingModel {
   double speed_mps = 0.0;       ///< typical speed while moving
   double speed_std_mps = 0.0;   ///< how much that varies
   double step_noise_m = 0.0;    ///< std of the length of a step between two samples
@@ -30,6 +30,6 @@ SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_
 /// cost, where a step faster than the model costs its squared excess and a sample left out costs a constant
 /// (dynamic programming, like the most probable path of a hidden Markov model). A multipath bend has to be driven
 /// faster than the path it leaves, going out and coming back, and so loses as a whole.
-std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const MotionModel& motion);
+std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const DrivingModel& motion);
 
 }  // namespace visual_localization

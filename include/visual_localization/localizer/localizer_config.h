@@ -8,6 +8,7 @@
 #include "visual_localization/parameters/parameter_visitor.h"
 #include "visual_localization/tracking/dpso.h"
 #include "visual_localization/tracking/fitness.h"
+#include "visual_localization/tracking/particle_filter.h"
 
 namespace visual_localization {
 
@@ -24,6 +25,7 @@ struct LocalizerConfig {
   FitnessConfig fitness;
   StateConfig state;
   DpsoConfig dpso;
+  ParticleFilterConfig pf;
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const;
