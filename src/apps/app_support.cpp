@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <new>
 #include <string>
@@ -59,6 +60,17 @@ int runProgram(CLI::App& app, int argc, char** argv, const std::function<void()>
   }
   removePartialFilesOnSignals();
   return runBody(app, body);
+}
+
+void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs) {
+  namespace fs = std::filesystem;
+  for (const std::string& input : inputs) {
+    std::error_code none;
+    const bool same_name = !input.empty() && fs::weakly_canonical(output, none) == fs::weakly_canonical(input, none);
+    if (same_name || fs::equivalent(output, input, none)) {
+      throw UsageError(option + " " + output + " would overwrite " + input);
+    }
+  }
 }
 
 std::string humanSize(double bytes) {

@@ -3,6 +3,7 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -22,6 +23,9 @@ constexpr int kBadUsage = 2;
 /// Adds --version, parses the command line and runs `body`; returns the program's exit code. Whatever goes wrong
 /// becomes one line on standard error. Unfinished output disappears, also when the program is interrupted.
 int runProgram(CLI::App& app, int argc, char** argv, const std::function<void()>& body);
+
+/// Throws UsageError, naming the option, when the file to write is one of the files to read.
+void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 
 /// "1.2 kB", "3.4 MB".
 std::string humanSize(double bytes);

@@ -137,25 +137,33 @@ void print(const Totals& totals) {
 }
 
 void print(const ErrorStatistics& errors) {
+  if (errors.count == 0) {
+    std::printf("error: no image has a true position\n");
+    return;
+  }
   std::printf("error: mean %.2f m, median %.2f m, within 5 m %.1f %% of %zu images with a true position\n",
               errors.mean_m, errors.median_m, 100.0 * errors.within_5m, errors.count);
 }
 
-/// One image; nothing when it cannot be used, which is said once per image and does not end the run.
-std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index, Localizer& localizer) {
+/// One image; nothing when it cannot be used: that does not end the run, and the first reason is kept.
+std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index, Localizer& localizer,
+                                      std::string& reason) {
+  std::string refusal;
   try {
     const BagImage image = images.read(index);
     return localizer.process(image.stamp_ns, image.decode());
   } catch (const ImageError& error) {
-    std::cerr << "image " << index << ": " << error.what() << '\n';
+    refusal = error.what();
   } catch (const std::invalid_argument& error) {
-    std::cerr << "image " << index << ": " << error.what() << '\n';
+    refusal = error.what();
   }
+  if (reason.empty()) reason = "image " + std::to_string(index) + ": " + refusal;
   return std::nullopt;
 }
 
 void run(const Options& options) {
   const LocalizerConfig config = configOf(options);
+  requireNoInput("--output", options.output, {options.map, options.bag, options.config});
   PartialFile output(options.output);  // fails now, not after the run
   Localizer localizer(loadMap(options.map), config);
   const BagReader bag(options.bag);
@@ -166,11 +174,12 @@ void run(const Options& options) {
 
   std::string track = trackCsvHeader();
   std::vector<double> errors_m;
+  std::string first_refusal;
   Totals totals;
   ProgressBar progress("localize");
   for (std::size_t step = 0; step < order.size(); ++step) {
     progress.show(step, order.size());
-    const std::optional<Estimate> estimate = localizeImage(images, order[step], localizer);
+    const std::optional<Estimate> estimate = localizeImage(images, order[step], localizer, first_refusal);
     if (!estimate) {
       ++totals.unusable;
       continue;
@@ -181,9 +190,11 @@ void run(const Options& options) {
     if (true_point) errors_m.push_back((estimate->pose.position_m - true_point->position_m).norm());
   }
   progress.show(order.size(), order.size());
-  if (totals.images == 0) throw BagError(options.bag + ": no usable image on " + images.topic());
+  if (totals.images == 0) throw BagError(options.bag + ": no usable image on " + images.topic() + ": " + first_refusal);
   output.write(track);
   output.commit();
+  if (!first_refusal.empty())
+    std::cerr << "localize: " << totals.unusable << " images skipped, first " << first_refusal << '\n';
   print(totals);
   if (truth) print(summarise(std::move(errors_m)));
 }

@@ -171,6 +171,11 @@ void buildMap(const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   // Fails before the work when the results could not be written after it.
   const MapBuilderConfig config = readConfig(options);
+  std::vector<std::string> inputs = options.bags;
+  inputs.push_back(options.config);
+  apps::requireNoInput("--output", options.output, inputs);
+  inputs.push_back(options.output);
+  if (!options.plot.empty()) apps::requireNoInput("--plot", options.plot, inputs);
   requireWritable(options.output);
   if (!options.plot.empty()) requireWritable(options.plot);
   MapBuilder builder(config);

@@ -175,6 +175,9 @@ std::string toGeoJson(const TrainingMap& map) {
 }
 
 void showMap(const Options& options) {
+  for (const std::string& output : {options.geojson, options.csv}) {
+    if (!output.empty()) apps::requireNoInput("--export", output, {options.map});
+  }
   if (options.check) checkMap(options.map);
   const auto map = loadMap(options.map);
   printMap(options, *map);

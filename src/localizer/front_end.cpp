@@ -34,7 +34,8 @@ Observation FrontEnd::observe(std::int64_t stamp_ns, const cv::Mat& grey) {
 }
 
 bool FrontEnd::follows(std::int64_t stamp_ns) const {
-  if (!previous_) return false;
+  constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
+  if (!previous_ || previous_->sift.size() < kLeast) return false;
   const double gap_s = secondsBetween(previous_->stamp_ns, stamp_ns);
   return gap_s > 0.0 && gap_s <= max_image_gap_s_;
 }

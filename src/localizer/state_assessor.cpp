@@ -9,6 +9,8 @@ void StateConfig::declare(ParameterVisitor& visitor) {
                1.0);
   visitor.integer({"state/min_matches", "1", "fewer matched SIFT features are no evidence, whatever their share"},
                   min_matches, 0, 10000);
+  visitor.real({"state/max_distance", "m", "a best match farther from the estimate does not confirm it"},
+               max_distance_m, 0.1, 10000.0);
   visitor.integer({"state/window", "1", "how many of the last images decide about the state"}, window, 1, 1000);
   visitor.integer({"state/images_to_confirm", "1", "how many of them must confirm the position for TRACKING"},
                   images_to_confirm, 1, 1000);
@@ -40,7 +42,8 @@ LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, bool re
 
 bool StateAssessor::confirms(const TrackerEstimate& estimate) const {
   return estimate.best.similarity >= config_.min_similarity &&
-         estimate.best.matches >= static_cast<std::size_t>(config_.min_matches);
+         estimate.best.matches >= static_cast<std::size_t>(config_.min_matches) &&
+         estimate.best_distance_m <= config_.max_distance_m;
 }
 
 }  // namespace visual_localization

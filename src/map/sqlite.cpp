@@ -124,8 +124,6 @@ void Statement::bind(int parameter, Bytes value) {
   check(sqlite3_bind_blob64(statement_, parameter + 1, data, value.size, SQLITE_STATIC), database_);
 }
 
-void Statement::bindNull(int parameter) { check(sqlite3_bind_null(statement_, parameter + 1), database_); }
-
 bool Statement::step() {
   const int result = sqlite3_step(statement_);
   if (result == SQLITE_ROW) return true;

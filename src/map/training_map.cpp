@@ -22,6 +22,10 @@ std::vector<TrainingImage> checked(const MapHeader& header, std::vector<Training
   for (std::size_t i = 0; i < images.size(); ++i) {
     const TrainingImage& image = images[i];
     if (!image.position_m.allFinite()) refuse(i, "position is not finite");
+    if (image.position_m.cwiseAbs().maxCoeff() > kLargestCoordinate_m) {
+      refuse(i, "position is farther than " + std::to_string(static_cast<int>(kLargestCoordinate_m)) +
+                    " m from the datum");
+    }
     if (!std::isfinite(image.yaw_rad)) refuse(i, "heading is not finite");
     if (image.session < 0 || static_cast<std::size_t>(image.session) >= header.sessions.size()) {
       refuse(i,

@@ -169,12 +169,15 @@ class TableWriter : public ParameterVisitor {
   }
 };
 
-void flatten(const YAML::Node& node, const std::string& prefix, const std::string& path, ParameterValues& out) {
+/// `depth`: how many mappings more are accepted; an alias may refer to the mapping that it is in.
+void flatten(const YAML::Node& node, const std::string& prefix, const std::string& path, int depth,
+             ParameterValues& out) {
+  if (depth == 0) throw ParameterError(path + ": key '" + prefix + "' is nested too deeply");
   for (const auto& entry : node) {
     const auto key = entry.first.as<std::string>();
     const std::string name = prefix.empty() ? key : prefix + "/" + key;
     if (entry.second.IsMap()) {
-      flatten(entry.second, name, path, out);
+      flatten(entry.second, name, path, depth - 1, out);
     } else if (entry.second.IsScalar()) {
       // A quoted scalar carries the tag "!": it stays a string even when it looks like a number.
       const std::string text = entry.second.Scalar();
@@ -214,16 +217,19 @@ std::string markdownTable(const Declaration& declare) {
 }
 
 ParameterValues readYaml(const std::string& path) {
+  constexpr int kDeepestNesting = 8;
   try {
     const YAML::Node root = YAML::LoadFile(path);
     ParameterValues out;
     if (root.IsNull()) return out;
     if (!root.IsMap()) throw ParameterError(path + ": must be a mapping of parameter names to values");
-    flatten(root, "", path, out);
+    flatten(root, "", path, kDeepestNesting, out);
     return out;
   } catch (const YAML::BadFile&) {
     throw ParameterError(path + ": cannot be opened");
-  } catch (const YAML::Exception& error) {
+  } catch (const ParameterError&) {
+    throw;
+  } catch (const std::exception& error) {
     throw ParameterError(path + ": not valid YAML: " + error.what());
   }
 }

@@ -95,7 +95,7 @@ void LocalizerNodelet::offerServices() {
 
 void LocalizerNodelet::onImage(ReceivedImage image) {
   diagnostics_->imageArrived();
-  if (localizer_->map()) queue_.push(std::move(image));
+  queue_.push(std::move(image));
 }
 
 void LocalizerNodelet::onInitialPose(const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
@@ -147,7 +147,7 @@ bool LocalizerNodelet::onLoadMap(LoadMap::Request& request, LoadMap::Response& r
 }
 
 void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {
-  if (!localizer_->map()) publisher_->publishNoMap(counts());
+  if (!localizer_->hasMap()) publisher_->publishNoMap(counts());
   diagnostics_->publish();
 }
 

@@ -1,8 +1,25 @@
 #include "visual_localization/ros/shared_localizer.h"
 
+#include <iomanip>
+#include <sstream>
+#include <stdexcept>
 #include <utility>
 
 namespace visual_localization {
+
+namespace {
+
+/// Particles stay in the map's area: a disc that does not touch it holds no place to search.
+void requireOnMap(const Eigen::Vector2d& centre_m, double radius_m, const Area& area) {
+  const Eigen::Vector2d nearest_m = centre_m.cwiseMax(area.min_m).cwiseMin(area.max_m);
+  if ((nearest_m - centre_m).norm() <= radius_m) return;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << "the disc lies off the map, which covers x from " << area.min_m.x()
+       << " to " << area.max_m.x() << " m and y from " << area.min_m.y() << " to " << area.max_m.y() << " m";
+  throw std::invalid_argument(text.str());
+}
+
+}  // namespace
 
 void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
   auto localizer = std::make_unique<Localizer>(map, config_);
@@ -12,6 +29,7 @@ void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
   // The old localizer and map now end with this function, when the lock is free again.
   localizer_.swap(localizer);
   map_.swap(map);
+  has_map_ = true;
 }
 
 std::shared_ptr<const TrainingMap> SharedLocalizer::map() const {
@@ -35,8 +53,10 @@ bool SharedLocalizer::relocalizeAnywhere() {
 bool SharedLocalizer::relocalizeAround(const Eigen::Vector2d& centre_m, double radius_m) {
   const Prior prior = around(centre_m, radius_m);
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (localizer_) localizer_->relocalize(prior);
-  return localizer_ != nullptr;
+  if (!localizer_) return false;
+  requireOnMap(centre_m, radius_m, localizer_->map().area());
+  localizer_->relocalize(prior);
+  return true;
 }
 
 bool SharedLocalizer::relocalizeAt(const Guess& guess) {

@@ -1,5 +1,6 @@
 #include "visual_localization/tracking/cloud.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace visual_localization {
@@ -27,6 +28,15 @@ Eigen::Matrix2d covarianceAbout(const Eigen::Vector2d& centre_m, const std::vect
     total += particle.weight;
   }
   return total > 0.0 ? Eigen::Matrix2d(sum / total) : Eigen::Matrix2d::Zero();
+}
+
+Eigen::Matrix2d scatterAbout(const Eigen::Vector2d& centre_m, const std::vector<Particle>& particles) {
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+  for (const Particle& particle : particles) {
+    const Eigen::Vector2d offset = particle.position_m - centre_m;
+    sum += offset * offset.transpose();
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(1, particles.size()));
 }
 
 void normaliseWeights(std::vector<Particle>& particles) {

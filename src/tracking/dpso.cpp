@@ -90,6 +90,7 @@ void Dpso::reset(const Prior& prior) {
   attractor_m_.reset();
   centre_of_mass_m_.reset();
   speed_known_ = false;
+  seen_an_image_ = false;
   bad_images_ = 0;
   for (Particle& particle : particles_) {
     particle = Particle();
@@ -104,12 +105,13 @@ void Dpso::reset(const Prior& prior) {
 }
 
 TrackerEstimate Dpso::update(ScoreCache& scores) {
-  if (attractor_m_) {
+  if (seen_an_image_) {
     for (Particle& particle : particles_) {
       particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
       confine(particle, area_);
     }
   }
+  seen_an_image_ = true;
   const std::size_t best = evaluate(scores);
   // An image that matches nothing says nothing about where to go: the attractor stays where it was.
   if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
@@ -117,6 +119,7 @@ TrackerEstimate Dpso::update(ScoreCache& scores) {
   adaptSpeed();
   adaptDiversity(result.best);
   assignKinds();
+  centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
   return result;
 }
 
@@ -140,7 +143,8 @@ void Dpso::move(Particle& particle) {
     const double range = area_.range()[axis];
     const double perturbation = config_.phi0 * random_.uniform(-1.0, 1.0) * range * tuning_.v0;
     const double attraction =
-        tuning_.phi2 * random_.uniform(0.0, 1.0) * ((*attractor_m_)[axis] - particle.position_m[axis]);
+        attractor_m_ ? tuning_.phi2 * random_.uniform(0.0, 1.0) * ((*attractor_m_)[axis] - particle.position_m[axis])
+                     : 0.0;
     const double limit = factor * tuning_.v0 * range;
     const double wanted = config_.inertia * particle.velocity_m[axis] + perturbation + attraction;
     particle.velocity_m[axis] = std::clamp(wanted, -limit, limit);
@@ -148,10 +152,12 @@ void Dpso::move(Particle& particle) {
   particle.position_m += particle.velocity_m;
 }
 
-/// Kronfeld et al. (journal), Eq. 6.
+/// Kronfeld et al. (journal), Eq. 6; anywhere as long as nothing was recognised.
 void Dpso::moveQuantum(Particle& particle) {
   particle.velocity_m.setZero();
-  particle.position_m = *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * area_.range()));
+  particle.position_m = attractor_m_
+                            ? *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * area_.range()))
+                            : anywhere(area_)(random_);
 }
 
 std::size_t Dpso::evaluate(ScoreCache& scores) {
@@ -172,7 +178,7 @@ TrackerEstimate Dpso::estimate() const {
   result.position_m = attractor_m_.value_or(cloud.mean_m);
   result.training_image = map_.nearest(result.position_m).image;
   result.mode_covariance_m2 = covarianceAbout(result.position_m, particles_, config_.mode_radius_m);
-  result.cloud_covariance_m2 = covarianceAbout(result.position_m, particles_);
+  result.cloud_covariance_m2 = scatterAbout(result.position_m, particles_);
   result.spread_m = cloud.spread();
   result.best_image = result.training_image;
   for (const Fitness& fitness : fitness_) {
@@ -180,6 +186,7 @@ TrackerEstimate Dpso::estimate() const {
     result.best = fitness.score;
     result.best_image = fitness.training_image;
   }
+  result.best_distance_m = (map_.image(result.best_image).position_m - result.position_m).norm();
   return result;
 }
 
@@ -204,7 +211,6 @@ void Dpso::adaptSpeed() {
         speed_known_ ? (1.0 - config_.ema_alpha) * tuning_.speed_ema + config_.ema_alpha * speed : speed;
     speed_known_ = true;
   }
-  centre_of_mass_m_ = centre;
   if (!config_.adapt_speed || tuning_.recovering || !speed_known_) return;
   const double ratio = tuning_.speed_ema / tuning_.v0;
   if (ratio > 0.6) tuning_.v0 *= 1.1;
@@ -222,6 +228,7 @@ void Dpso::adaptDiversity(const Score& best) {
     tuning_.v0 = config_.v0;
     tuning_.quantum_share = config_.quantum_share;
     tuning_.phi2 = config_.phi2;
+    speed_known_ = false;
   }
   tuning_.recovering = bad_images_ >= config_.recovery_patience;
   if (!tuning_.recovering) return;

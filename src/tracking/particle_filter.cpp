@@ -105,11 +105,12 @@ TrackerEstimate ParticleFilter::estimate() const {
   TrackerEstimate result;
   result.position_m = cloud.mean_m;
   result.mode_covariance_m2 = cloud.covariance_m2;
-  result.cloud_covariance_m2 = cloud.covariance_m2;
+  result.cloud_covariance_m2 = scatterAbout(cloud.mean_m, particles_);
   result.spread_m = cloud.spread();
   result.training_image = map_.nearest(result.position_m).image;
   result.best = best_.score;
   result.best_image = best_.score.similarity > 0.0 ? best_.training_image : result.training_image;
+  result.best_distance_m = (map_.image(result.best_image).position_m - result.position_m).norm();
   return result;
 }
 

@@ -102,6 +102,18 @@ class ProgramsTest(unittest.TestCase):
         self.assert_refused(result, 1, 'folder does not exist')
         self.assertEqual([path.name for path in self.folder.iterdir()], ['damaged.bag'])
 
+    def test_an_output_never_replaces_an_input(self):
+        copy, bag = self.folder / 'copy.map', self.folder / 'copy.bag'
+        copy.write_bytes(MAP.read_bytes())
+        bag.write_bytes(DRIVE.read_bytes())
+        for result in (run('localize', '--map', copy, '--bag', DRIVE, '--output', copy),
+                       run('map_builder', '--bag', bag, '--output', bag),
+                       run('map_builder', '--bag', bag, '--output', self.folder / 'new', '--plot', self.folder / 'new'),
+                       run('map_info', copy, '--export-csv', self.folder / '.' / 'copy.map')):
+            self.assert_refused(result, 2, 'would overwrite')
+        self.assertEqual(copy.read_bytes(), MAP.read_bytes())
+        self.assertEqual(bag.read_bytes(), DRIVE.read_bytes())
+
     def test_an_unknown_parameter_is_named(self):
         config = self.folder / 'config.yaml'
         config.write_text('dpso:\n  inertai: 0.5\n', encoding='utf-8')

@@ -144,6 +144,8 @@ TEST_F(LocalizerTest, OnlyAnImageThatFollowsIsPruned) {
   EXPECT_TRUE(pruned(8 * kSecond));
   EXPECT_FALSE(pruned(8 * kSecond)) << "a stamp that stands still";
   EXPECT_FALSE(pruned(2 * kSecond)) << "a stamp that goes back";
+  front_end.observe(3 * kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  EXPECT_FALSE(pruned(4 * kSecond)) << "the image before was black";
 }
 
 }  // namespace

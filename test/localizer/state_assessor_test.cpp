@@ -54,6 +54,13 @@ TEST(StateAssessor, AShareOfFewFeaturesIsNoEvidence) {
   for (int i = 0; i < 20; ++i) EXPECT_EQ(assessor.assess(seen(0.5, 2), false), LocalizationState::kInitializing);
 }
 
+TEST(StateAssessor, AMatchElsewhereDoesNotConfirmThisPlace) {
+  StateAssessor assessor{StateConfig()};
+  TrackerEstimate estimate = seen(0.3, 30);
+  estimate.best_distance_m = 20.0;
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(assessor.assess(estimate, false), LocalizationState::kInitializing);
+}
+
 TEST(StateAssessor, ResetForgets) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);

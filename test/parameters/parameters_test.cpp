@@ -119,7 +119,8 @@ TEST(Parameters, YamlIsFlattenedAndTyped) {
 }
 
 TEST(Parameters, BadYamlIsRefusedWithItsPath) {
-  for (const char* content : {"[1, 2]", "a: [1, 2]", "a: {b: ", "just text", "? {x: 1}\n: 2\n", "? [1]\n: {a: 3}\n"}) {
+  for (const char* content :
+       {"[1, 2]", "a: [1, 2]", "a: {b: ", "just text", "? {x: 1}\n: 2\n", "? [1]\n: {a: 3}\n", "a: &x {b: *x}"}) {
     const TemporaryYaml yaml(content);
     try {
       parameters::readYaml(yaml.path());
@@ -129,6 +130,7 @@ TEST(Parameters, BadYamlIsRefusedWithItsPath) {
     }
   }
   EXPECT_THROW(parameters::readYaml("/nonexistent/file.yaml"), ParameterError);
+  EXPECT_THROW(parameters::readYaml(std::filesystem::temp_directory_path().string()), ParameterError);
 }
 
 TEST(Parameters, AnEmptyFileSetsNothing) {

@@ -2,16 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include "visual_localization/map/map_builder.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/node_config.h"
 
 namespace visual_localization {
 namespace {
 
-/// config/localizer.yaml is the list of all parameters with their defaults that users read; this keeps it one.
-TEST(ConfigFile, ListsEveryParameterWithItsDefault) {
-  NodeParameters changed;
-  const ParameterValues in_file = parameters::readYaml(LOCALIZER_YAML);
+/// The files are the lists of all parameters with their defaults that users read; this keeps them so.
+template <class Config>
+void expectListsEveryParameter(const std::string& path) {
+  Config changed;
+  const ParameterValues in_file = parameters::readYaml(path);
   const ParameterValues in_code =
       parameters::values([&changed](ParameterVisitor& visitor) { changed.declare(visitor); });
   for (const auto& [name, value] : in_code) {
@@ -20,6 +22,14 @@ TEST(ConfigFile, ListsEveryParameterWithItsDefault) {
   }
   for (const auto& entry : in_file) EXPECT_EQ(in_code.count(entry.first), 1U) << entry.first << " is no parameter";
   EXPECT_NO_THROW(assignParameters(changed, in_file));
+}
+
+TEST(ConfigFile, LocalizerListsEveryParameterWithItsDefault) {
+  expectListsEveryParameter<NodeParameters>(CONFIG_DIR "/localizer.yaml");
+}
+
+TEST(ConfigFile, MapBuilderListsEveryParameterWithItsDefault) {
+  expectListsEveryParameter<MapBuilderConfig>(CONFIG_DIR "/map_builder.yaml");
 }
 
 }  // namespace

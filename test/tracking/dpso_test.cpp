@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -165,6 +166,41 @@ TEST(Dpso, AnImageThatMatchesNothingMovesNoEstimate) {
   for (int step = 0; step < 60; ++step) tracker.update(world.from(onCircle(0.0)));
   const Eigen::Vector2d before = tracker.update(world.from(onCircle(0.0))).position_m;
   EXPECT_EQ(tracker.update(world.inTheDark()).position_m, before);
+}
+
+TEST(Dpso, ASwarmThatHasRecognisedNothingSearches) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  tracker.update(world.inTheDark());
+  const std::vector<Particle> before = tracker.particles();
+  for (int step = 0; step < 10; ++step) tracker.update(world.inTheDark());
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    moved += (tracker.particles()[i].position_m - before[i].position_m).norm() > 1.0 ? 1 : 0;
+  }
+  EXPECT_GT(moved, 60u);
+}
+
+TEST(Dpso, AWrongInitialPoseIsNotTerminal) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  tracker.reset(normallyDistributed(onCircle(0.0), Eigen::Matrix2d::Zero()));
+  const Eigen::Vector2d robot = onCircle(30.0 * kPi);
+  double error_m = 1e9;
+  for (int step = 0; step < 100 && error_m > 3.0; ++step) {
+    error_m = (tracker.update(world.from(robot)).position_m - robot).norm();
+  }
+  EXPECT_LT(error_m, 3.0);
+}
+
+TEST(Dpso, ASingleFalseMatchDoesNotHideHowFarTheSearchReaches) {
+  World world = roundWorld();
+  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  ScoreCache scores(world.map().size());
+  bool given = false;
+  scores.startImage([&given](std::size_t) { return std::exchange(given, true) ? Score{} : Score{0.01, 1}; });
+  const TrackerEstimate estimate = tracker.update(scores);
+  EXPECT_GT(estimate.cloud_covariance_m2.trace(), 400.0);
 }
 
 TEST(Dpso, ResetDrawsFromThePrior) {

@@ -7,6 +7,9 @@
 
 namespace visual_localization {
 
+/// A tangent plane is no map beyond this distance from its datum, metres.
+constexpr double kLargestCoordinate_m = 1e6;
+
 /// Local tangent plane around a datum: x east, y north, metres (REP 103).
 class LocalFrame {
  public:

@@ -21,7 +21,8 @@ struct Observation {
 };
 
 /// Live image in, features out: resizes to the map's size, extracts, and keeps what the image directly before
-/// showed as well (Weiss et al., section III). The first image, or one after a gap, is not pruned.
+/// showed as well (Weiss et al., section III). The first image, or one after a gap or after an image
+/// without features, is not pruned.
 class FrontEnd {
  public:
   FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s);

@@ -16,6 +16,7 @@ namespace visual_localization {
 struct StateConfig {
   double min_similarity = 0.08;  ///< a weaker best match does not confirm a position
   int min_matches = 5;           ///< fewer matched SIFT features are no evidence, whatever their share
+  double max_distance_m = 5.0;   ///< a best match farther from the estimate does not confirm it
   int window = 5;                ///< so many of the last images are looked at
   int images_to_confirm = 4;     ///< so many of them must confirm the position
   double max_step_m = 10.0;      ///< a larger jump between two images makes what came before worthless

@@ -61,7 +61,6 @@ class Statement {
   void bind(int parameter, const std::string& value);
   /// The bytes must outlive the next run().
   void bind(int parameter, Bytes value);
-  void bindNull(int parameter);
 
   /// Goes to the next row; false when there is none.
   bool step();

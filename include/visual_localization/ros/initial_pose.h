@@ -4,12 +4,10 @@
 
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 
+#include "visual_localization/geo/local_frame.h"
 #include "visual_localization/ros/shared_localizer.h"
 
 namespace visual_localization {
-
-/// Coordinates beyond this are not on a local map, and their squares must stay finite. Metres.
-constexpr double kLargestCoordinate_m = 1e6;
 
 /// Position and its covariance from an initial pose. The heading is not used: the training images give it.
 /// Throws std::invalid_argument with the reason in words when the frame is not `global_frame`, a number is not

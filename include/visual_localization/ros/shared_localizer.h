@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -36,6 +37,8 @@ class SharedLocalizer {
   /// Starts anew in `map`, or around the guess that has been waiting for a map.
   void setMap(std::shared_ptr<const TrainingMap> map);
   std::shared_ptr<const TrainingMap> map() const;
+  /// Never waits, unlike map(), which waits for the end of the image that is being processed.
+  bool hasMap() const { return has_map_; }
 
   /// Nothing without a map. Throws std::invalid_argument for an unusable image.
   std::optional<Result> process(std::int64_t stamp_ns, const cv::Mat& grey);
@@ -52,6 +55,7 @@ class SharedLocalizer {
   std::shared_ptr<const TrainingMap> map_;
   std::unique_ptr<Localizer> localizer_;
   std::optional<Guess> waiting_guess_;
+  std::atomic<bool> has_map_{false};
 };
 
 }  // namespace visual_localization

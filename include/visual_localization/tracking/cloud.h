@@ -23,6 +23,9 @@ CloudMoments momentsOf(const std::vector<Particle>& particles);
 /// weights sum to zero.
 Eigen::Matrix2d covarianceAbout(const Eigen::Vector2d& centre_m, const std::vector<Particle>& particles,
                                 double radius_m = std::numeric_limits<double>::infinity());
+/// Second moments about `centre_m` of all particles, each counted the same: how far the search reaches, also when a
+/// single false match holds all the weight.
+Eigen::Matrix2d scatterAbout(const Eigen::Vector2d& centre_m, const std::vector<Particle>& particles);
 /// Scales the weights to sum one; all equal when their sum is not positive.
 void normaliseWeights(std::vector<Particle>& particles);
 

@@ -69,6 +69,7 @@ class Dpso final : public Tracker {
   std::vector<Fitness> fitness_;
   std::optional<Eigen::Vector2d> attractor_m_;       ///< p^n: the best particle of the last image
   std::optional<Eigen::Vector2d> centre_of_mass_m_;  ///< after the last image
+  bool seen_an_image_ = false;                       ///< since the last reset
   bool speed_known_ = false;
   int bad_images_ = 0;
 };

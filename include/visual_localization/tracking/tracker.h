@@ -13,13 +13,15 @@ namespace visual_localization {
 
 /// What a tracker believes after an image.
 struct TrackerEstimate {
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();           ///< east, north in the map frame
-  Eigen::Matrix2d mode_covariance_m2 = Eigen::Matrix2d::Zero();   ///< of the mode of the cloud around `position_m`
-  Eigen::Matrix2d cloud_covariance_m2 = Eigen::Matrix2d::Zero();  ///< of the whole cloud about `position_m`
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();          ///< east, north in the map frame
+  Eigen::Matrix2d mode_covariance_m2 = Eigen::Matrix2d::Zero();  ///< of the mode of the cloud around `position_m`
+  Eigen::Matrix2d cloud_covariance_m2 =
+      Eigen::Matrix2d::Zero();                         ///< of the whole cloud, unweighted, about `position_m`
   Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();  ///< sigma_x, sigma_y of the cloud (Weiss et al., Eq. 2)
   std::size_t training_image = 0;                      ///< nearest to `position_m`
   Score best;                                          ///< best score among the training images compared
   std::size_t best_image = 0;                          ///< the training image of `best`
+  double best_distance_m = 0.0;                        ///< from `position_m` to `best_image`
 };
 
 /// How the tracker is tuned at the moment, for people to see.
