@@ -1,12 +1,14 @@
 #include "visual_localization/ros/bag_validator.h"
 
 #include <csignal>
+#include <functional>
 #include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 #include <rosbag/bag.h>
+#include <roslz4/lz4s.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <sys/resource.h>
@@ -147,6 +149,145 @@ TEST_F(BagValidatorTest, TheReaderNamesThePath) {
     EXPECT_THAT(error.what(), testing::StartsWith(path));
     EXPECT_THAT(error.what(), HasSubstr("damaged"));
   }
+}
+
+/// One kind of damage to an uncompressed bag, and what is said about it.
+struct Damage {
+  const char* text;
+  std::function<void(std::string&)> make;
+};
+
+/// Replaces what begins with the first, or last, `pattern`.
+auto patch(const std::string& pattern, std::size_t after, const std::string& value, bool last = false) {
+  return [=](std::string& bytes) {
+    const std::size_t at = last ? bytes.rfind(pattern) : bytes.find(pattern);
+    ASSERT_NE(at, std::string::npos) << pattern;
+    bytes.replace(at + after, value.size(), value);
+  };
+}
+
+/// Copies `count` bytes that stand `after` the first `pattern` to the same place of the last one.
+auto repeat(const std::string& pattern, std::size_t after, std::size_t count) {
+  return [=](std::string& bytes) {
+    const std::size_t first = bytes.find(pattern);
+    ASSERT_NE(first, std::string::npos) << pattern;
+    bytes.replace(bytes.rfind(pattern) + after, count, bytes.substr(first + after, count));
+  };
+}
+
+TEST_F(BagValidatorTest, NamesEveryKindOfDamage) {
+  const std::string good = test::readAll(writeBag(rosbag::compression::Uncompressed));
+  const std::string four("\x01\0\0\0", 4);
+  const std::string huge = "\xFF\xFF\xFF\xFF";
+  const std::string version = "ver=" + four;  // ends the header of an index; its data begins eight bytes behind
+  const std::string count("\x0A\0\0\0count=", 10);
+  const Damage damages[] = {
+      {"a record's header at byte 17 claims 4294967295 bytes", patch("#ROSBAG V2.0\n", 13, huge)},
+      {"longer than its header", patch("#ROSBAG V2.0\n", 17, huge)},
+      {"has no name", patch("conn_count=", 10, "_")},
+      {"does not begin with a bag header", patch("op=\x03", 3, "\x05")},
+      {"the unknown type", patch("op=\x03", 3, "\x63")},
+      {"rosbag reindex", patch("index_pos=", 10, std::string(8, '\0'))},
+      {"the index lies outside the file", patch("index_pos=", 10, huge + huge)},
+      {"field 'chunk_count'", patch("chunk_count=", 0, "Chunk")},
+      {"field 'size'", patch("size=", 0, "Size")},
+      {"at most 268435456 are accepted", patch("size=", 5, huge)},
+      {"another size than it claims", patch("size=", 5, four)},
+      {"unknown compression", patch("compression=none", 12, "nine")},
+      {"no field 'topic'", patch("topic=", 0, "Topic")},
+      {"no field 'type'", patch("type=", 0, "Type")},
+      {"no field 'md5sum'", patch("md5sum=", 0, "Md5")},
+      {"no field 'message_definition'", patch("message_definition=", 0, "Message", true)},
+      {"something else than messages", patch("op=\x02", 3, "\x06")},
+      {"field 'time'", patch(std::string("\x0D\0\0\0time=", 9), 4, "Time")},
+      {"an index has an unknown version", patch(version, 4, "\x02")},
+      {"an index has the wrong size", patch(count, 10, huge)},
+      {"an index points beside its messages", patch(version, 20, four)},
+      {"description has an unknown version", patch(version, 4, "\x02", true)},
+      {"description has the wrong size", patch(count, 10, huge, true)},
+      {"description points beside it", patch("chunk_pos=", 10, four)},
+      {"described twice", repeat("chunk_pos=", 10, 8)},
+      {"lacks a connection", patch("conn_count=", 11, huge)},
+      {"ends within a record's header", patch("chunk_count=", 12, huge)},
+  };
+  for (const Damage& damage : damages) {
+    std::string bytes = good;
+    damage.make(bytes);
+    const std::string path = writeBytes(bytes == good ? "" : bytes);
+    try {
+      const BagReader bag(path);
+      ADD_FAILURE() << "accepted: " << damage.text;
+    } catch (const BagError& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::StartsWith(path), HasSubstr(damage.text)));
+    }
+  }
+}
+
+std::string number(std::uint64_t value, std::size_t size) {
+  std::string bytes;
+  for (std::size_t i = 0; i < size; ++i) bytes += static_cast<char>(value >> (8 * i));
+  return bytes;
+}
+
+std::string record(const std::vector<std::string>& fields, const std::string& data) {
+  std::string header;
+  for (const std::string& field : fields) header += number(field.size(), 4) + field;
+  return number(header.size(), 4) + header + number(data.size(), 4) + data;
+}
+
+/// A bag of nothing but one chunk and, if given, an index.
+std::string oneChunk(const std::string& compression, std::size_t size, const std::string& packed,
+                     const std::string& index = "") {
+  const auto header = [](std::size_t index_at) {
+    return "#ROSBAG V2.0\n" + record({"op=\x03", "index_pos=" + number(index_at, 8), "conn_count=" + number(0, 4),
+                                      "chunk_count=" + number(0, 4)},
+                                     "");
+  };
+  const std::string body = record({"op=\x05", "compression=" + compression, "size=" + number(size, 4)}, packed) + index;
+  return header(header(0).size() + body.size()) + body;
+}
+
+std::string refusal(const std::string& path) {
+  try {
+    validateBag(path);
+  } catch (const DamagedBag& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST_F(BagValidatorTest, AMessageIndexedTwiceIsRefused) {
+  const std::string message = record({"op=\x02", "conn=" + number(0, 4), "time=" + number(0, 8)}, "");
+  const auto bag = [&message](std::size_t second) {
+    const std::string entries = number(0, 8) + number(0, 4) + number(0, 8) + number(second, 4);
+    const std::string index =
+        record({"op=\x04", "ver=" + number(1, 4), "conn=" + number(0, 4), "count=" + number(2, 4)}, entries);
+    return oneChunk("none", 2 * message.size(), message + message, index);
+  };
+  EXPECT_EQ(refusal(writeBytes(bag(message.size()))), "accepted");
+  EXPECT_EQ(refusal(writeBytes(bag(0))), "an index points to a message twice");
+}
+
+TEST_F(BagValidatorTest, WhatCannotBeUnpackedIsRefused) {
+  EXPECT_THAT(refusal(writeBytes(oneChunk("bz2", 100, "no such thing"))), HasSubstr("cannot be unpacked"));
+  EXPECT_THAT(refusal(writeBytes(oneChunk("lz4", 100, "no such thing"))), HasSubstr("too long"));
+  EXPECT_THAT(refusal(writeBytes(oneChunk("lz4", 100, std::string(20, '\0')))), HasSubstr("unknown block size"));
+  EXPECT_THAT(refusal(writeBytes(oneChunk("lz4", 100, "short"))), HasSubstr("cut off"));
+}
+
+TEST_F(BagValidatorTest, ALz4BlockLargerThanItsFrameAllowsIsRefused) {
+  std::string content(100'000, 'x');
+  std::string packed(content.size(), '\0');
+  auto size = static_cast<unsigned int>(packed.size());
+  constexpr int kBlocksOf64Kib = 4;
+  ASSERT_EQ(roslz4_buffToBuffCompress(content.data(), 100'000, packed.data(), &size, kBlocksOf64Kib), ROSLZ4_OK);
+  EXPECT_EQ(refusal(writeBytes(oneChunk("lz4", content.size(), packed.substr(0, size)))),
+            "a record's header at byte 4 claims 2021161080 bytes of 99996");  // unpacked, but not made of records
+  constexpr std::size_t kBlock = 900'000;                                     // would be copied into a buffer of 64 KiB
+  const std::string frame = packed.substr(0, 7) + number(kBlock, 4) + std::string(kBlock, 'x') + number(0, 8);
+  const std::string path = writeBytes(oneChunk("lz4", content.size(), frame));
+  EXPECT_EQ(signalWhileReading(path), 0);
+  EXPECT_EQ(refusal(path), "a block of a compressed chunk is too long");
 }
 
 TEST_F(BagValidatorTest, OtherVersionsAndFilesAreRefused) {
