@@ -33,6 +33,8 @@ auto withBag(const std::string& path, Read read) {
     return read();
   } catch (const BagError&) {
     throw;
+  } catch (const UnsupportedBag& error) {
+    throw BagError(path + ": " + oneLine(error.what()));
   } catch (const DamagedBag& error) {
     throw BagError(path + ": bag is damaged or cut off: " + oneLine(error.what()));
   } catch (const rosbag::BagUnindexedException&) {
@@ -71,12 +73,16 @@ Topics topicsOf(const rosbag::Bag& bag) {
   return topics;
 }
 
-/// For error messages: "/a (sensor_msgs/Image), /b (sensor_msgs/CompressedImage)".
+/// For error messages, the first few: "/a (sensor_msgs/Image), /b (sensor_msgs/CompressedImage)".
 template <class... Messages>
 std::string listTopics(const rosbag::Bag& bag) {
+  constexpr std::size_t kLongestList = 1000;
   std::string list;
   const auto append = [&list](const Topics& topics, const std::string& type) {
-    for (const auto& entry : topics) list += (list.empty() ? "" : ", ") + oneLine(entry.first) + " (" + type + ")";
+    for (const auto& entry : topics) {
+      if (list.size() > kLongestList) return;
+      list += (list.empty() ? "" : ", ") + oneLine(entry.first) + " (" + type + ")";
+    }
   };
   (append(topicsOf<Messages>(bag), ros::message_traits::datatype<Messages>()), ...);
   return list.empty() ? "none" : list;

@@ -167,9 +167,11 @@ class Validator {
     const Record header = bag::readRecord(bytes_, {kVersion.size(), bytes_.size()});
     require(header.op == Op::kBagHeader, "does not begin with a bag header");
     const auto encryptor = header.fields.find("encryptor");
-    require(encryptor == header.fields.end() || encryptor->second.empty(), "is encrypted");
+    if (encryptor != header.fields.end() && !encryptor->second.empty()) throw UnsupportedBag("bag is encrypted");
     const std::uint64_t index_at = bag::number(header.fields, "index_pos", 8);
-    require(index_at != 0, "is not indexed, as after an interrupted recording; `rosbag reindex` may repair it");
+    if (index_at == 0) {
+      throw UnsupportedBag("bag is not indexed, as after an interrupted recording; `rosbag reindex` may repair it");
+    }
     require(index_at >= header.data.end && index_at <= bytes_.size(), "the index lies outside the file");
     readChunks({header.data.end, index_at});
     readSummary(header, {index_at, bytes_.size()});
@@ -237,8 +239,8 @@ class Validator {
 void requireVersion(const Bytes& bytes) {
   const Range start{0, std::min<std::uint64_t>(bytes.size(), kVersion.size())};
   const std::string version = bag::readRange(bytes, start, kVersion.size(), "the version");
-  if (version.substr(0, 8) != kVersion.substr(0, 8)) throw DamagedBag("is not a bag");
-  if (version != kVersion) throw DamagedBag("is a bag of another format than 2.0");
+  if (version.substr(0, 8) != kVersion.substr(0, 8)) throw UnsupportedBag("is not a bag");
+  if (version != kVersion) throw UnsupportedBag("is a bag of another format than 2.0");
 }
 
 }  // namespace
