@@ -24,7 +24,7 @@ readonly CORE=(
   libopencv-dev libeigen3-dev libsqlite3-dev zlib1g-dev libnanoflann-dev libgeographiclib-dev libcli11-dev
   libyaml-cpp-dev libhwy-dev libgtest-dev libgmock-dev libbenchmark-dev
 )
-readonly PLOTS=(python3-matplotlib python3-numpy python3-opencv)
+readonly PLOTS=(python3-matplotlib python3-yaml python3-numpy python3-opencv)
 readonly LINT=(clang-format clang-tidy shellcheck)
 readonly RVIZ=(rviz xvfb)
 

@@ -1,0 +1,1 @@
+"""The report of an evaluation: tables, sentences and figures from the CSV files that `evaluate` writes."""

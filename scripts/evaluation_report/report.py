@@ -1,0 +1,59 @@
+"""Puts the report together."""
+from pathlib import Path
+from typing import List, Optional, Tuple
+
+from .data import Results, read_results
+from .figures import Figures
+from .files import written_whole
+from .papers import Papers
+from .tables import escape, result_tables, tracking_tables
+from .words import in_words
+
+
+def counted(count: int, what: str) -> str:
+    """So many of them."""
+    return f'{count} {what}' if count == 1 else f'{count} {what}s'
+
+
+def introduction(results: Results) -> str:
+    """Title, and what was run."""
+    title = escape(results.description.get('title') or results.experiment)
+    text = f'# {title}\n\n'
+    source = results.description.get('source')
+    if source:
+        text += f'Reproduces: {escape(source)}.\n\n'
+    rounds = [name for pair in results.pairs for name in pair]
+    facts = [counted(len(results.methods()), 'method')]
+    if results.pairs:
+        facts.insert(0, counted(len(set(rounds)), 'round'))
+        facts.append(counted(len(results.pairs), 'pair') + ' (map → drive): '
+                     + ', '.join(f'{escape(train)} → {escape(test)}' for train, test in results.pairs))
+    runs = [outcome.get('runs') for outcome in results.outcomes]
+    known = [value for value in runs if value is not None]
+    if known:
+        facts.append(counted(int(sum(known)), 'run'))
+    return text + f'Experiment `{escape(results.experiment)}`: ' + '; '.join(facts) + '.\n\n'
+
+
+def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]]) -> str:
+    """The whole report in Markdown."""
+    text = introduction(results) + '## Results\n\n' + result_tables(results, papers)
+    text += '\n## In words\n\n' + in_words(results, papers)
+    discussion = results.description.get('discussion')
+    if discussion:
+        text += f'\n## Why\n\n{str(discussion).rstrip()}\n'
+    if figures:
+        text += '\n## Figures\n\n' + '\n\n'.join(f'![{escape(caption)}](figures/{name})' for name, caption in figures)
+        text += '\n'
+    return text + '\n## Tracking and cost\n\n' + tracking_tables(results)
+
+
+def write_report(folder: Path, papers_path: Optional[Path], file_format: str) -> int:
+    """Writes figures and report into the folder; the number of figures."""
+    papers = Papers(papers_path)
+    results = read_results(folder)
+    figures = Figures(results, papers).write(folder / 'figures', file_format)
+    text = report_text(results, papers, figures)
+    with written_whole(folder / 'report.md') as partial:
+        partial.write_text(text, encoding='utf-8')
+    return len(figures)
