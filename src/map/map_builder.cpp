@@ -108,7 +108,7 @@ std::vector<std::string> MapBuilderConfig::violations() const {
 MapBuilder::MapBuilder(const MapBuilderConfig& config) : config_(config) {
   const std::vector<std::string> wrong = config_.violations();
   if (!wrong.empty()) throw ParameterError(wrong.front());
-  extractor_ = makeSiftExtractor(config_.sift);
+  sift_extractor_ = makeSiftExtractor(config_.sift);
   header_.sift = config_.sift;
 }
 
@@ -161,7 +161,8 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   image.session = static_cast<int>(header_.sessions.size()) - 1;
   image.position_m = place->position_m;
   image.yaw_rad = place->yaw_rad;
-  image.sift = extractor_->extract(image_of_map_size);
+  image.sift = sift_extractor_->extract(image_of_map_size);
+  image.global = global_extractor_.extract(image_of_map_size);
   image.preview_jpeg = previewOf(image_of_map_size, config_.preview_width_px);
   report_.features_extracted += image.sift.size();
   ++report_.images_kept;

@@ -120,14 +120,6 @@ std::int64_t takeChecksum(ParameterValues& meta) {
   return checksum;
 }
 
-std::optional<Bytes> globalDescriptor(const Statement& row, int column) {
-  if (row.type(column) == Statement::Type::kNull) return std::nullopt;
-  const Bytes bytes = row.blob(column);
-  if (bytes.size != map_schema::kGlobalDescriptorBytes)
-    throw Refusal("is damaged: a global descriptor has a wrong size");
-  return bytes;
-}
-
 ImageRow imageRow(const Statement& row) {
   ImageRow image;
   image.id = row.integer(0);
@@ -137,8 +129,7 @@ ImageRow imageRow(const Statement& row) {
   image.north_m = row.real(4);
   image.yaw_rad = row.real(5);
   image.feature_count = row.integer(6);
-  image.wgoh = globalDescriptor(row, 7);
-  image.wgii = globalDescriptor(row, 8);
+  image.global = {map_schema::unpackHistogram(row.blob(7)), map_schema::unpackHistogram(row.blob(8))};
   image.features_crc32 = row.integer(9);
   image.preview_crc32 = row.integer(10);
   return image;
@@ -224,8 +215,6 @@ std::vector<ImageRow> readRows(const sqlite::Database& database, std::size_t ses
     ImageRow image = imageRow(row);
     requirePlausible(image, rows.size(), session_count);
     image.addTo(checksum);
-    image.wgoh.reset();  // their bytes do not outlive this step
-    image.wgii.reset();
     rows.push_back(image);
   }
   return rows;
@@ -237,6 +226,7 @@ TrainingImage withoutFeatures(const ImageRow& row) {
   image.session = static_cast<int>(row.session);
   image.position_m = {row.east_m, row.north_m};
   image.yaw_rad = row.yaw_rad;
+  image.global = row.global;
   return image;
 }
 

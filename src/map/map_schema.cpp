@@ -62,7 +62,6 @@ float getFloat(const std::uint8_t* from) {
                              std::uint32_t{from[3]} << 24U;
   float value = 0.0F;
   std::memcpy(&value, &bits, sizeof(value));
-  if (!std::isfinite(value)) throw std::runtime_error("a keypoint is not finite");
   return value;
 }
 
@@ -80,7 +79,7 @@ const std::array<Table, 4> kTables{{
     {"images",
      "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
      "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL, "
-     "wgoh BLOB, wgii BLOB, features_crc32 INTEGER NOT NULL, preview_crc32 INTEGER NOT NULL)"},
+     "wgoh BLOB NOT NULL, wgii BLOB NOT NULL, features_crc32 INTEGER NOT NULL, preview_crc32 INTEGER NOT NULL)"},
     {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
     {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL)"},
 }};
@@ -114,9 +113,9 @@ void Checksum::add(const std::string& value) {
   addRaw(reinterpret_cast<const std::uint8_t*>(value.data()), value.size());
 }
 
-void Checksum::add(const std::optional<sqlite::Bytes>& value) {
-  add(value ? static_cast<std::int64_t>(value->size) : std::int64_t{-1});
-  if (value) addRaw(value->data, value->size);
+void Checksum::add(const std::vector<std::uint8_t>& value) {
+  add(static_cast<std::int64_t>(value.size()));
+  addRaw(value.data(), value.size());
 }
 
 void Checksum::add(const ParameterValues& values) {
@@ -137,8 +136,8 @@ void ImageRow::addTo(Checksum& checksum) const {
     checksum.add(value);
   }
   for (const double value : {east_m, north_m, yaw_rad}) checksum.add(value);
-  checksum.add(wgoh);
-  checksum.add(wgii);
+  checksum.add(packHistogram(global.wgoh));
+  checksum.add(packHistogram(global.wgii));
 }
 
 ParameterValues toMeta(const MapHeader& header) {
@@ -184,9 +183,30 @@ std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes) {
   const std::uint8_t* from = bytes.data;
   for (SiftKeypoint& keypoint : keypoints) {
     keypoint = {getFloat(from), getFloat(from + 4), getFloat(from + 8), getFloat(from + 12)};
+    for (const float value : {keypoint.x_px, keypoint.y_px, keypoint.size_px, keypoint.angle_deg}) {
+      if (!std::isfinite(value)) throw std::runtime_error("a keypoint is not finite");
+    }
     from += kKeypointBytes;
   }
   return keypoints;
+}
+
+std::vector<std::uint8_t> packHistogram(const GlobalFeatures::Histogram& histogram) {
+  std::vector<std::uint8_t> bytes(kHistogramBytes);
+  for (std::size_t i = 0; i < histogram.size(); ++i) putFloat(histogram[i], &bytes[i * sizeof(float)]);
+  return bytes;
+}
+
+GlobalFeatures::Histogram unpackHistogram(sqlite::Bytes bytes) {
+  if (bytes.size != kHistogramBytes) throw std::runtime_error("a global descriptor has a wrong size");
+  GlobalFeatures::Histogram histogram{};
+  for (std::size_t i = 0; i < histogram.size(); ++i) {
+    histogram[i] = getFloat(bytes.data + i * sizeof(float));
+    if (!(std::isfinite(histogram[i]) && histogram[i] >= 0.0F)) {
+      throw std::runtime_error("a global descriptor is not finite or negative");
+    }
+  }
+  return histogram;
 }
 
 }  // namespace visual_localization::map_schema

@@ -23,7 +23,7 @@ class Writer {
  public:
   explicit Writer(sqlite::Database& database)
       : meta_(database, "INSERT INTO meta VALUES(?,?)"),
-        images_(database, "INSERT INTO images VALUES(?,?,?,?,?,?,?,NULL,NULL,?,?)"),
+        images_(database, "INSERT INTO images VALUES(?,?,?,?,?,?,?,?,?,?,?)"),
         features_(database, "INSERT INTO features VALUES(?,?,?)"),
         previews_(database, "INSERT INTO previews VALUES(?,?)") {}
 
@@ -52,6 +52,7 @@ class Writer {
     row.north_m = image.position_m.y();
     row.yaw_rad = image.yaw_rad;
     row.feature_count = static_cast<std::int64_t>(image.sift.size());
+    row.global = image.global;
     row.features_crc32 = map_schema::crc32Of(descriptor_bytes, map_schema::crc32Of(keypoint_bytes));
     row.preview_crc32 = map_schema::crc32Of(preview_bytes);
     writeRow(row);
@@ -76,8 +77,12 @@ class Writer {
     images_.bind(4, row.north_m);
     images_.bind(5, row.yaw_rad);
     images_.bind(6, row.feature_count);
-    images_.bind(7, row.features_crc32);
-    images_.bind(8, row.preview_crc32);
+    const std::vector<std::uint8_t> wgoh = map_schema::packHistogram(row.global.wgoh);
+    const std::vector<std::uint8_t> wgii = map_schema::packHistogram(row.global.wgii);
+    images_.bind(7, Bytes{wgoh.data(), wgoh.size()});
+    images_.bind(8, Bytes{wgii.data(), wgii.size()});
+    images_.bind(9, row.features_crc32);
+    images_.bind(10, row.preview_crc32);
     images_.run();
   }
 

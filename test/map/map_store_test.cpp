@@ -133,7 +133,7 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 
 TEST_F(MapStore, NamesBothVersions) {
   tamper("PRAGMA user_version = 7");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("version 1")));
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("version 2")));
 }
 
 TEST_F(MapStore, RefusesEveryTruncation) {

@@ -10,6 +10,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "visual_localization/features/global_extractor.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
@@ -70,7 +71,8 @@ class MapBuilder {
   std::optional<LocalFrame> frame_;
   MapHeader header_;
   std::vector<TrainingImage> images_;  ///< not pruned yet
-  std::unique_ptr<SiftExtractor> extractor_;
+  std::unique_ptr<SiftExtractor> sift_extractor_;
+  GlobalExtractor global_extractor_;
   std::optional<std::int64_t> last_stamp_ns_;
   std::optional<Eigen::Vector2d> last_kept_m_;
 };

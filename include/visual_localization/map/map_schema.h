@@ -2,10 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/map/sqlite.h"
 #include "visual_localization/map/training_map.h"
@@ -20,8 +20,7 @@ constexpr std::int64_t kMaxImages = 100'000'000;
 constexpr std::int64_t kMaxFeaturesPerImage = 1'000'000;
 constexpr std::int64_t kMinImageSide_px = 16;  ///< smaller ones have no features
 constexpr std::int64_t kMaxImageSide_px = 32768;
-/// 128 values of four bytes.
-constexpr std::size_t kGlobalDescriptorBytes = 512;
+constexpr std::size_t kHistogramBytes = GlobalFeatures::kSize * sizeof(float);
 constexpr std::size_t kKeypointBytes = 16;
 
 struct Table {
@@ -38,7 +37,7 @@ class Checksum {
   void add(std::int64_t value);
   void add(double value);
   void add(const std::string& value);
-  void add(const std::optional<sqlite::Bytes>& value);
+  void add(const std::vector<std::uint8_t>& value);
   void add(const ParameterValues& values);
   std::int64_t value() const { return value_; }
 
@@ -59,8 +58,7 @@ struct ImageRow {
   double north_m = 0.0;
   double yaw_rad = 0.0;
   std::int64_t feature_count = 0;
-  std::optional<sqlite::Bytes> wgoh;
-  std::optional<sqlite::Bytes> wgii;
+  GlobalFeatures global;
   std::int64_t features_crc32 = 0;  ///< of the keypoints followed by the descriptors
   std::int64_t preview_crc32 = 0;   ///< of the preview; 0 without one
 
@@ -77,5 +75,10 @@ MapHeader toHeader(ParameterValues meta);
 std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints);
 /// Inverse of packKeypoints(). Throws std::runtime_error when a value is not finite.
 std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes);
+
+/// 128 little-endian 32-bit floats.
+std::vector<std::uint8_t> packHistogram(const GlobalFeatures::Histogram& histogram);
+/// Inverse of packHistogram(). Throws std::runtime_error when the size is wrong or a value is not finite or negative.
+GlobalFeatures::Histogram unpackHistogram(sqlite::Bytes bytes);
 
 }  // namespace visual_localization::map_schema

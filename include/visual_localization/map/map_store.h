@@ -15,7 +15,7 @@ class MapStoreError : public std::runtime_error {
 };
 
 /// Version of the schema that this build writes; the only one it reads.
-constexpr int kMapSchemaVersion = 1;
+constexpr int kMapSchemaVersion = 2;
 
 /// Writes `map` to `path` (one SQLite file) in one transaction under a temporary name beside it, then renames:
 /// whatever happens, `path` is the old file, the new one, or absent. Throws MapStoreError.

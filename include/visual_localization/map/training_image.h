@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
 
 namespace visual_localization {
@@ -16,6 +17,7 @@ struct TrainingImage {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north in the map frame
   double yaw_rad = 0.0;                                  ///< direction of travel, 0 = east, counter-clockwise
   SiftFeatures sift;                                     ///< after pruning
+  GlobalFeatures global;                                 ///< of the whole image
   std::vector<std::uint8_t> preview_jpeg;                ///< small grey JPEG for people; may be empty
 };
 

@@ -1,0 +1,44 @@
+#include "visual_localization/features/subimage_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace visual_localization {
+
+SubimageGrid::SubimageGrid(cv::Size image_size, double relative_std)
+    : columns_(axis(image_size.width, relative_std)), rows_(axis(image_size.height, relative_std)) {}
+
+SubimageGrid::Axis SubimageGrid::axis(int length_px, double relative_std) {
+  const double side_px = static_cast<double>(length_px) / GlobalFeatures::kGridSide;
+  Axis axis;
+  for (int i = 0; i < length_px; ++i) {
+    const double centre_px = i + 0.5;
+    const auto subimage = std::min(GlobalFeatures::kGridSide - 1, static_cast<std::size_t>(centre_px / side_px));
+    const double offset = centre_px / side_px - (static_cast<double>(subimage) + 0.5);
+    axis.subimage.push_back(subimage);
+    axis.weight.push_back(static_cast<float>(std::exp(-0.5 * offset * offset / (relative_std * relative_std))));
+  }
+  return axis;
+}
+
+void SubimageGrid::addRow(int row, int begin, int end, const float* values, const std::uint8_t* bins,
+                          GlobalFeatures::Histogram& histogram) const {
+  const auto y = static_cast<std::size_t>(row);
+  GlobalFeatures::Histogram sums{};  // of one row of subimages; the row's weight is common to all its pixels
+  const auto last = static_cast<std::size_t>(std::max(begin, end));
+  for (auto x = static_cast<std::size_t>(begin); x < last; ++x) {
+    sums[columns_.subimage[x] * GlobalFeatures::kBins + bins[x]] += values[x] * columns_.weight[x];
+  }
+  constexpr std::size_t kRowOfSubimages = GlobalFeatures::kGridSide * GlobalFeatures::kBins;
+  float* to = &histogram[rows_.subimage[y] * kRowOfSubimages];
+  for (std::size_t i = 0; i < kRowOfSubimages; ++i) to[i] += rows_.weight[y] * sums[i];
+}
+
+void normalise(GlobalFeatures::Histogram& histogram) {
+  const float total = std::accumulate(histogram.begin(), histogram.end(), 0.0F);
+  if (!(total > 0.0F)) return;
+  for (float& value : histogram) value /= total;
+}
+
+}  // namespace visual_localization
