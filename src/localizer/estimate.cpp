@@ -18,6 +18,4 @@ std::string toString(LocalizationState state) {
   return "UNKNOWN";
 }
 
-std::string toString(FeatureKind kind) { return kind == FeatureKind::kSift ? "SIFT" : "GLOBAL"; }
-
 }  // namespace visual_localization

@@ -1,12 +1,12 @@
 #include "visual_localization/localizer/front_end.h"
 
-#include <stdexcept>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
 
 #include "visual_localization/features/pruning.h"
 #include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/localizer/stopwatch.h"
 
 namespace visual_localization {
 
@@ -16,27 +16,52 @@ FrontEnd::FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size im
       image_size_(image_size),
       prune_(prune),
       max_image_gap_s_(max_image_gap_s),
-      extractor_(makeSiftExtractor(sift)) {}
+      sift_extractor_(makeSiftExtractor(sift)) {}
 
-Observation FrontEnd::observe(std::int64_t stamp_ns, const cv::Mat& grey) {
+void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
+  const Stopwatch stopwatch;
   requireExtractable(grey);
-  cv::Mat resized = grey;
-  if (grey.size() != image_size_) cv::resize(grey, resized, image_size_, 0.0, 0.0, cv::INTER_AREA);
-
-  SiftFeatures sift = extractor_->extract(resized);
-  Observation observation;
-  observation.stamp_ns = stamp_ns;
-  observation.features_extracted = sift.size();
-  observation.features.sift =
-      prune_ && follows(stamp_ns) ? keepSeenIn(sift, {&previous_->sift}, match_.max_angle_ratio) : sift;
-  previous_ = Previous{stamp_ns, std::move(sift)};
-  return observation;
+  std::swap(previous_, current_);
+  if (!current_) current_.emplace();
+  current_->stamp_ns = stamp_ns;
+  current_->sift.reset();
+  if (grey.size() == image_size_) {
+    grey.copyTo(current_->grey);
+  } else {
+    cv::resize(grey, current_->grey, image_size_, 0.0, 0.0, cv::INTER_AREA);
+  }
+  pruned_.reset();
+  global_.reset();
+  extract_ms_ = stopwatch.elapsed_ms();
 }
 
-bool FrontEnd::follows(std::int64_t stamp_ns) const {
+const SiftFeatures& FrontEnd::sift() {
+  if (pruned_) return *pruned_;
+  const Stopwatch stopwatch;
+  const SiftFeatures& all = unprunedSift(*current_);
   constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
-  if (!previous_ || previous_->sift.size() < kLeast) return false;
-  const double gap_s = secondsBetween(previous_->stamp_ns, stamp_ns);
+  const bool prunable = prune_ && previousIsClose() && unprunedSift(*previous_).size() >= kLeast;
+  pruned_ = prunable ? keepSeenIn(all, {&*previous_->sift}, match_.max_angle_ratio) : all;
+  extract_ms_ += stopwatch.elapsed_ms();
+  return *pruned_;
+}
+
+const GlobalFeatures& FrontEnd::global() {
+  if (global_) return *global_;
+  const Stopwatch stopwatch;
+  global_ = global_extractor_.extract(current_->grey);
+  extract_ms_ += stopwatch.elapsed_ms();
+  return *global_;
+}
+
+const SiftFeatures& FrontEnd::unprunedSift(Image& image) {
+  if (!image.sift) image.sift = sift_extractor_->extract(image.grey);
+  return *image.sift;
+}
+
+bool FrontEnd::previousIsClose() const {
+  if (!previous_) return false;
+  const double gap_s = secondsBetween(previous_->stamp_ns, current_->stamp_ns);
   return gap_s > 0.0 && gap_s <= max_image_gap_s_;
 }
 

@@ -1,19 +1,16 @@
 #include "visual_localization/localizer/localizer.h"
 
-#include <chrono>
 #include <utility>
 
 #include "visual_localization/geo/angles.h"
+#include "visual_localization/localizer/live_image.h"
+#include "visual_localization/localizer/stopwatch.h"
 #include "visual_localization/parameters/parameters.h"
+#include "visual_localization/tracking/dpso.h"
+#include "visual_localization/tracking/particle_filter.h"
 
 namespace visual_localization {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double millisecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 const LocalizerConfig& validated(const LocalizerConfig& config) {
   const auto wrong = config.violations();
@@ -24,8 +21,8 @@ const LocalizerConfig& validated(const LocalizerConfig& config) {
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const LocalizerConfig& config) {
   const auto seed = static_cast<std::uint32_t>(config.seed);
   if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed);
-  return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf), config.pf, config.fitness,
-                                          seed);
+  return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf, map), config.pf,
+                                          config.fitness, seed);
 }
 
 }  // namespace
@@ -34,51 +31,56 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
     : map_(std::move(map)),
       config_(validated(config)),
       front_end_(map_->header().sift, config_.match, map_->header().image_size, config_.prune, config_.max_image_gap_s),
-      similarity_(std::make_unique<SiftSimilarity>(config_.match)),
+      sift_similarity_(config_.match, config_.similarity),
+      global_similarity_(config_.similarity),
       scores_(map_->size()),
+      places_(map_->size(), static_cast<std::size_t>(config_.max_proposal_images)),
       tracker_(makeTracker(*map_, config_)),
+      choice_(config_.features, config_.hybrid),
       assessor_(config_.state) {}
 
 Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
-  const auto start = Clock::now();
-  const Observation observation = front_end_.observe(stamp_ns, grey);
-  const double extract_ms = millisecondsSince(start);
-  Estimate estimate = process(observation);
-  estimate.times.extract_ms = extract_ms;
+  const Stopwatch stopwatch;
+  front_end_.setImage(stamp_ns, grey);
+  LiveImage image(front_end_, *map_, sift_similarity_, global_similarity_);
+  Estimate estimate = process(stamp_ns, image);
+  estimate.features_extracted = front_end_.siftExtracted();
+  if (const auto& sift = front_end_.siftIfExtracted()) estimate.features_kept = sift->size();
+  const double extract_ms = front_end_.extract_ms();
+  estimate.times = {extract_ms, image.match_ms(), stopwatch.elapsed_ms() - extract_ms - image.match_ms()};
   return estimate;
 }
 
-Estimate Localizer::process(const Observation& observation) {
-  double match_ms = 0.0;
-  const auto start = Clock::now();
-  scores_.startImage([&](std::size_t image) {
-    const auto comparison_start = Clock::now();
-    const Score score = similarity_->compare(observation.features, map_->image(image));
-    match_ms += millisecondsSince(comparison_start);
-    return score;
-  });
-  const TrackerEstimate tracked = tracker_->update(scores_);
+Estimate Localizer::process(std::int64_t stamp_ns, ComparableImage& image) {
+  const FeatureKind features = choice_.next();
+  scores_.startImage([&](std::size_t i) { return image.compare(features, i); });
+  places_.startImage([&](std::size_t i) { return image.compare(FeatureKind::kGlobal, i).weight; });
+  const TrackerEstimate tracked = tracker_->update({scores_, places_});
+  choice_.update(tracked.spread_m);
 
   Estimate estimate;
-  estimate.stamp_ns = observation.stamp_ns;
+  estimate.stamp_ns = stamp_ns;
+  estimate.features = features;
   estimate.tuning = tracker_->tuning();
-  estimate.state = assessor_.assess(tracked, estimate.tuning.recovering);
+  estimate.state = assessor_.assess(tracked, features, estimate.tuning.recovering);
   estimate.pose = poseOf(tracked, estimate.state);
   estimate.best = tracked.best;
   estimate.best_image = tracked.best_image;
+  estimate.best_distance_m = tracked.best_distance_m;
   estimate.comparisons = scores_.comparisons();
-  estimate.features_extracted = observation.features_extracted;
-  estimate.features_kept = observation.features.sift.size();
   estimate.spread_m = tracked.spread_m;
-  estimate.times = {0.0, match_ms, millisecondsSince(start) - match_ms};
-  last_features_ = observation.features;
   return estimate;
 }
 
-void Localizer::relocalize() { relocalize(anywhere(map_->area())); }
+void Localizer::relocalize() {
+  tracker_->reset();
+  choice_.reset();
+  assessor_.reset();
+}
 
 void Localizer::relocalize(const Prior& prior) {
   tracker_->reset(prior);
+  choice_.reset();
   assessor_.reset();
 }
 

@@ -9,7 +9,8 @@ namespace visual_localization {
 void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.choice({"tracker", "", "dynamic particle swarm, or particle filter with Gaussian or linear motion"}, tracker,
                  {"dpso", "pf_gaussian", "pf_linear"});
-  visitor.choice({"features", "", "what images are compared by"}, features, {"sift"});
+  visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
+                 features, {"sift", "global", "hybrid"});
   visitor.integer({"seed", "1", "of the random generator; the same seed, map and images give the same track"}, seed, 0,
                   std::numeric_limits<int>::max());
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);
@@ -18,7 +19,12 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"min_position_std", "m", "no pose claims to be more accurate than this"}, min_position_std_m, 0.0,
                1000.0);
   visitor.real({"min_yaw_std", "rad", "no heading claims to be more accurate than this"}, min_yaw_std_rad, 0.0, 3.2);
+  visitor.integer(
+      {"max_proposal_images", "1", "of a larger map a guided recovery weighs only so many images per image"},
+      max_proposal_images, 1, std::numeric_limits<int>::max());
   match.declare(visitor);
+  similarity.declare(visitor);
+  hybrid.declare(visitor);
   fitness.declare(visitor);
   state.declare(visitor);
   dpso.declare(visitor);

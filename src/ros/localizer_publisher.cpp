@@ -79,7 +79,7 @@ void LocalizerPublisher::publishStatus(LocalizationStatus status, double latency
 void LocalizerPublisher::publishMatches(const SharedLocalizer::Result& result, const cv::Mat& grey,
                                         const std_msgs::Header& header) {
   if (matches_.getNumSubscribers() == 0) return;
-  const cv::Mat canvas = drawMatches(grey, result.features.sift, *result.map, result.estimate.best_image,
+  const cv::Mat canvas = drawMatches(grey, result.sift, *result.map, result.estimate.best_image,
                                      parameters_.localizer.match.max_angle_ratio);
   matches_.publish(cv_bridge::CvImage(header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
 }

@@ -41,7 +41,7 @@ std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t sta
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return std::nullopt;
   const Estimate estimate = localizer_->process(stamp_ns, grey);
-  return Result{estimate, localizer_->particles(), localizer_->lastFeatures(), map_};
+  return Result{estimate, localizer_->particles(), localizer_->lastSift(), map_};
 }
 
 bool SharedLocalizer::relocalizeAnywhere() {

@@ -35,54 +35,16 @@ double approach(double from, double to, double start, double share) {
 
 }  // namespace
 
-void DpsoConfig::declare(ParameterVisitor& visitor) {
-  visitor.integer({"dpso/particles", "1", "size of the swarm"}, particles, 2, 100000);
-  visitor.real({"dpso/inertia", "1", "share of the velocity that is kept (omega)"}, inertia, 0.0, 1.0);
-  visitor.real({"dpso/phi0", "1", "weight of the random perturbation"}, phi0, 0.0, 10.0);
-  visitor.real({"dpso/phi2", "1", "weight of the attraction to the best particle"}, phi2, 0.0, 4.0);
-  visitor.real({"dpso/quantum_share", "1", "share of quantum particles (q_r)"}, quantum_share, 0.0, 1.0);
-  visitor.real({"dpso/quantum_std", "1", "spread of quantum particles, share of the area's range (q_d)"}, quantum_std,
-               0.0, 1.0);
-  visitor.real({"dpso/high_energy_share", "1", "share of particles allowed a higher speed (h_r)"}, high_energy_share,
-               0.0, 1.0);
-  visitor.real({"dpso/high_energy_factor", "1", "their speed limit in multiples of v0"}, high_energy_factor, 1.0,
-               100.0);
-  visitor.real({"dpso/v0", "1", "initial speed limit per image, share of the area's range"}, v0, 1e-6, 1.0);
-  visitor.flag({"dpso/adapt_speed", "", "keep v0 at about twice the speed of the swarm"}, adapt_speed);
-  visitor.real({"dpso/v0_min", "1", "lower limit of the speed adaptation"}, v0_min, 1e-6, 1.0);
-  visitor.real({"dpso/ema_alpha", "1", "weight of the newest speed in its moving average (alpha)"}, ema_alpha, 0.001,
-               1.0);
-  visitor.flag({"dpso/recover", "", "raise the diversity of the swarm when the position is lost"}, recover);
-  visitor.integer({"dpso/recovery_patience", "1", "bad images in a row before recovery starts"}, recovery_patience, 1,
-                  1000);
-  visitor.real({"dpso/recovery_step", "1", "share of the way to the limits taken per bad image"}, recovery_step, 0.01,
-               1.0);
-  visitor.real({"dpso/v0_max", "1", "speed limit in recovery and of the speed adaptation"}, v0_max, 1e-6, 1.0);
-  visitor.real({"dpso/quantum_share_max", "1", "share of quantum particles in recovery"}, quantum_share_max, 0.0, 1.0);
-  visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);
-  visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
-               1000.0);
-}
-
-std::vector<std::string> DpsoConfig::violations() const {
-  std::vector<std::string> wrong;
-  if (v0_min > v0) wrong.emplace_back("parameter 'dpso/v0_min' must not exceed 'dpso/v0'");
-  if (v0 > v0_max) wrong.emplace_back("parameter 'dpso/v0' must not exceed 'dpso/v0_max'");
-  if (quantum_share > quantum_share_max) {
-    wrong.emplace_back("parameter 'dpso/quantum_share' must not exceed 'dpso/quantum_share_max'");
-  }
-  if (phi2_min > phi2) wrong.emplace_back("parameter 'dpso/phi2_min' must not exceed 'dpso/phi2'");
-  if (quantum_share_max + high_energy_share > 1.0) {
-    wrong.emplace_back("'dpso/quantum_share_max' + 'dpso/high_energy_share' must not exceed 1");
-  }
-  return wrong;
-}
-
 Dpso::Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed)
     : map_(map), config_(config), fitness_config_(fitness), random_(seed), area_(map.area()) {
   particles_.resize(static_cast<std::size_t>(config.particles));
   fitness_.resize(particles_.size());
+  reset();
+}
+
+void Dpso::reset() {
   reset(anywhere(area_));
+  position_unknown_ = true;
 }
 
 void Dpso::reset(const Prior& prior) {
@@ -91,6 +53,7 @@ void Dpso::reset(const Prior& prior) {
   centre_of_mass_m_.reset();
   speed_known_ = false;
   seen_an_image_ = false;
+  position_unknown_ = false;
   bad_images_ = 0;
   for (Particle& particle : particles_) {
     particle = Particle();
@@ -104,15 +67,18 @@ void Dpso::reset(const Prior& prior) {
   assignKinds();
 }
 
-TrackerEstimate Dpso::update(ScoreCache& scores) {
-  if (seen_an_image_) {
-    for (Particle& particle : particles_) {
+TrackerEstimate Dpso::update(const TrackerInput& input) {
+  for (Particle& particle : particles_) {
+    if (particle.kind == ParticleKind::kQuantum && isGuided()) {
+      particle.velocity_m.setZero();
+      particle.position_m = map_.image(input.places.draw(random_)).position_m;
+    } else if (seen_an_image_) {
       particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
-      confine(particle, area_);
     }
+    confine(particle, area_);
   }
   seen_an_image_ = true;
-  const std::size_t best = evaluate(scores);
+  const std::size_t best = evaluate(input.scores);
   // An image that matches nothing says nothing about where to go: the attractor stays where it was.
   if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
   TrackerEstimate result = estimate();
@@ -158,6 +124,12 @@ void Dpso::moveQuantum(Particle& particle) {
   particle.position_m = attractor_m_
                             ? *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * area_.range()))
                             : anywhere(area_)(random_);
+}
+
+/// Whether quantum particles go where the whole image looks alike instead of around the best particle.
+bool Dpso::isGuided() const {
+  if (config_.recovery != "guided") return false;
+  return tuning_.recovering || (config_.guided_start && position_unknown_);
 }
 
 std::size_t Dpso::evaluate(ScoreCache& scores) {
@@ -221,8 +193,9 @@ void Dpso::adaptSpeed() {
 /// Recovery phase of the same section: a best match that stays bad boosts the diversity step by step; the
 /// first good one ends it.
 void Dpso::adaptDiversity(const Score& best) {
-  if (!config_.recover) return;
-  const bool bad = best.similarity < fitness_config_.recognised_similarity;
+  const bool bad = !best.recognised;
+  if (!bad) position_unknown_ = false;
+  if (config_.recovery == "none") return;
   bad_images_ = bad ? bad_images_ + 1 : 0;
   if (!bad && tuning_.recovering) {
     tuning_.v0 = config_.v0;

@@ -26,10 +26,17 @@ void ParticleFilterConfig::declare(ParameterVisitor& visitor) {
                0.0, 1000.0);
 }
 
-std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config) {
-  if (tracker == "pf_gaussian") return std::make_unique<GaussianMotion>(config.gaussian_std_m);
-  return std::make_unique<LinearMotion>(config.rotation_std_deg * kPi / 180.0, config.acceleration_std,
-                                        config.initial_speed_m);
+std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
+                                             const TrainingMap& map) {
+  std::vector<std::unique_ptr<MotionModel>> parts;
+  if (tracker == "pf_gaussian") {
+    parts.push_back(std::make_unique<GaussianMotion>(config.gaussian_std_m));
+  } else {
+    parts.push_back(std::make_unique<LinearMotion>(config.rotation_std_deg * kPi / 180.0, config.acceleration_std,
+                                                   config.initial_speed_m));
+  }
+  if (config.pull > 0.0) parts.push_back(std::make_unique<PullToMap>(map, config.pull));
+  return std::make_unique<CombinedMotion>(std::move(parts));
 }
 
 ParticleFilter::ParticleFilter(const TrainingMap& map, std::unique_ptr<MotionModel> motion,
@@ -43,7 +50,7 @@ ParticleFilter::ParticleFilter(const TrainingMap& map, std::unique_ptr<MotionMod
       particles_(static_cast<std::size_t>(config.particles)),
       order_(particles_.size()) {
   std::iota(order_.begin(), order_.end(), std::size_t{0});
-  reset(anywhere_);
+  reset();
 }
 
 void ParticleFilter::reset(const Prior& prior) {
@@ -56,13 +63,13 @@ void ParticleFilter::reset(const Prior& prior) {
   seen_an_image_ = false;
 }
 
-TrackerEstimate ParticleFilter::update(ScoreCache& scores) {
+TrackerEstimate ParticleFilter::update(const TrackerInput& input) {
   if (seen_an_image_) {
     resample();
-    for (Particle& particle : particles_) move(particle);
+    for (Particle& particle : particles_) motion_->move(particle, input.travel, random_);
   }
   seen_an_image_ = true;
-  weigh(scores);
+  weigh(input.scores);
   TrackerEstimate result = estimate();
   injectRandomParticles();
   return result;
@@ -81,13 +88,6 @@ void ParticleFilter::resample() {
     drawn_.push_back(particles_[source]);
   }
   particles_.swap(drawn_);
-}
-
-/// The motion model, then a part of the way to the nearest training image (Weiss et al., section IV.A, step 2).
-void ParticleFilter::move(Particle& particle) {
-  motion_->move(particle, random_);
-  const Eigen::Vector2d target_m = map_.image(map_.nearest(particle.position_m).image).position_m;
-  particle.position_m += config_.pull * (target_m - particle.position_m);
 }
 
 void ParticleFilter::weigh(ScoreCache& scores) {

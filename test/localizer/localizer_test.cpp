@@ -135,8 +135,8 @@ TEST_F(LocalizerTest, RefusesABadConfiguration) {
 TEST_F(LocalizerTest, OnlyAnImageThatFollowsIsPruned) {
   FrontEnd front_end(SiftConfig(), MatchConfig(), {320, 240}, true, 5.0);
   const auto pruned = [&](std::int64_t stamp_ns) {
-    const Observation observation = front_end.observe(stamp_ns, viewAt(10.0 + 1e-9 * static_cast<double>(stamp_ns)));
-    return observation.features.sift.size() < observation.features_extracted;
+    front_end.setImage(stamp_ns, viewAt(10.0 + 1e-9 * static_cast<double>(stamp_ns)));
+    return front_end.sift().size() < front_end.siftExtracted();
   };
   EXPECT_FALSE(pruned(0)) << "the first image has none before it";
   EXPECT_TRUE(pruned(1 * kSecond));
@@ -144,7 +144,7 @@ TEST_F(LocalizerTest, OnlyAnImageThatFollowsIsPruned) {
   EXPECT_TRUE(pruned(8 * kSecond));
   EXPECT_FALSE(pruned(8 * kSecond)) << "a stamp that stands still";
   EXPECT_FALSE(pruned(2 * kSecond)) << "a stamp that goes back";
-  front_end.observe(3 * kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  front_end.setImage(3 * kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
   EXPECT_FALSE(pruned(4 * kSecond)) << "the image before was black";
 }
 

@@ -7,7 +7,7 @@ namespace {
 
 TrackerEstimate seen(double similarity, std::size_t matches, double x = 0.0) {
   TrackerEstimate estimate;
-  estimate.best = {similarity, matches};
+  estimate.best = {similarity, similarity, matches, similarity >= 0.05};
   estimate.position_m = {x, 0.0};
   return estimate;
 }
@@ -17,7 +17,7 @@ const TrackerEstimate kBad = seen(0.01, 1);
 
 LocalizationState afterGood(StateAssessor& assessor, int images) {
   LocalizationState state = LocalizationState::kNoMap;
-  for (int i = 0; i < images; ++i) state = assessor.assess(kGood, false);
+  for (int i = 0; i < images; ++i) state = assessor.assess(kGood, FeatureKind::kSift, false);
   return state;
 }
 
@@ -30,15 +30,15 @@ TEST(StateAssessor, EnoughGoodImagesConfirmAPosition) {
 TEST(StateAssessor, OneBadImageIsForgivenTwoAreNot) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
-  EXPECT_EQ(assessor.assess(kBad, false), LocalizationState::kTracking);
-  EXPECT_EQ(assessor.assess(kBad, false), LocalizationState::kUncertain);
-  EXPECT_EQ(assessor.assess(kBad, true), LocalizationState::kRecovering);
+  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, false), LocalizationState::kTracking);
+  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, false), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, true), LocalizationState::kRecovering);
 }
 
 TEST(StateAssessor, AfterALossThePositionMustBeConfirmedAgain) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
-  for (int i = 0; i < 5; ++i) assessor.assess(kBad, true);
+  for (int i = 0; i < 5; ++i) assessor.assess(kBad, FeatureKind::kSift, true);
   EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kUncertain);
   EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
 }
@@ -46,26 +46,28 @@ TEST(StateAssessor, AfterALossThePositionMustBeConfirmedAgain) {
 TEST(StateAssessor, AJumpVoidsEarlierConfirmations) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
-  EXPECT_EQ(assessor.assess(seen(0.3, 30, 60.0), false), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(seen(0.3, 30, 60.0), FeatureKind::kSift, false), LocalizationState::kUncertain);
 }
 
 TEST(StateAssessor, AShareOfFewFeaturesIsNoEvidence) {
   StateAssessor assessor{StateConfig()};
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(assessor.assess(seen(0.5, 2), false), LocalizationState::kInitializing);
+  for (int i = 0; i < 20; ++i)
+    EXPECT_EQ(assessor.assess(seen(0.5, 2), FeatureKind::kSift, false), LocalizationState::kInitializing);
 }
 
 TEST(StateAssessor, AMatchElsewhereDoesNotConfirmThisPlace) {
   StateAssessor assessor{StateConfig()};
   TrackerEstimate estimate = seen(0.3, 30);
   estimate.best_distance_m = 20.0;
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(assessor.assess(estimate, false), LocalizationState::kInitializing);
+  for (int i = 0; i < 10; ++i)
+    EXPECT_EQ(assessor.assess(estimate, FeatureKind::kSift, false), LocalizationState::kInitializing);
 }
 
 TEST(StateAssessor, ResetForgets) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
   assessor.reset();
-  EXPECT_EQ(assessor.assess(kGood, false), LocalizationState::kInitializing);
+  EXPECT_EQ(assessor.assess(kGood, FeatureKind::kSift, false), LocalizationState::kInitializing);
 }
 
 TEST(StateAssessor, NamesOfTheStates) {

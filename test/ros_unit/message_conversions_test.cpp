@@ -27,7 +27,7 @@ Estimate someEstimate() {
   estimate.pose.covariance_m2 << 4.0, 0.5, 0.5, 1.0;
   estimate.pose.yaw_variance_rad2 = 0.04;
   estimate.pose.geodetic = {48.5, 9.05, 340.0};
-  estimate.best = {0.25, 31};
+  estimate.best = {0.25, 0.25, 31, true};
   estimate.best_image = 7;
   estimate.comparisons = 12;
   estimate.spread_m = {3.0, 2.0};

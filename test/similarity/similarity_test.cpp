@@ -1,25 +1,16 @@
-#include "visual_localization/similarity/similarity.h"
-
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
 #include "visual_localization/similarity/score_cache.h"
+#include "visual_localization/similarity/sift_similarity.h"
 
 namespace visual_localization {
 namespace {
 
 using test::descriptor;
 using test::featuresOf;
-
-ImageFeatures observed(const SiftFeatures& sift) { return ImageFeatures{sift}; }
-
-TrainingImage trained(const SiftFeatures& sift) {
-  TrainingImage image;
-  image.sift = sift;
-  return image;
-}
 
 const auto kX = descriptor({200});
 const auto kY = descriptor({0, 200});
@@ -28,37 +19,37 @@ const auto kU = descriptor({0, 0, 0, 200});
 const auto kV = descriptor({0, 0, 0, 0, 200});
 
 TEST(SiftSimilarity, SymmetricCountsMatchesOverTheSmallerSet) {
-  const SiftSimilarity similarity({0.6, "symmetric"});
+  const SiftSimilarity similarity({0.6, "symmetric"}, SimilarityConfig());
   const SiftFeatures four = featuresOf({kX, kY, kU, kV});
   const SiftFeatures three = featuresOf({kX, kY, kZ});
-  const Score score = similarity.compare(observed(four), trained(three));
+  const Score score = similarity.compare(four, three);
   EXPECT_EQ(score.matches, 2u);
   EXPECT_DOUBLE_EQ(score.similarity, 2.0 / 3.0);
-  EXPECT_DOUBLE_EQ(similarity.compare(observed(three), trained(four)).similarity, 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(similarity.compare(three, four).similarity, 2.0 / 3.0);
 }
 
 TEST(SiftSimilarity, OneWayCountsMatchesOverTheTestImage) {
-  const SiftSimilarity similarity({0.6, "one_way"});
+  const SiftSimilarity similarity({0.6, "one_way"}, SimilarityConfig());
   const SiftFeatures four = featuresOf({kX, kY, kU, kV});
   const SiftFeatures three = featuresOf({kX, kY, kZ});
-  EXPECT_DOUBLE_EQ(similarity.compare(observed(four), trained(three)).similarity, 0.5);
-  EXPECT_DOUBLE_EQ(similarity.compare(observed(three), trained(four)).similarity, 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(similarity.compare(four, three).similarity, 0.5);
+  EXPECT_DOUBLE_EQ(similarity.compare(three, four).similarity, 2.0 / 3.0);
 }
 
 TEST(SiftSimilarity, AnImageIsFullySimilarToItself) {
   const SiftFeatures features = test::randomFeatures(40, 11);
   for (const char* mode : {"symmetric", "one_way"}) {
-    EXPECT_DOUBLE_EQ(SiftSimilarity({0.6, mode}).compare(observed(features), trained(features)).similarity, 1.0);
+    EXPECT_DOUBLE_EQ(SiftSimilarity({0.6, mode}, SimilarityConfig()).compare(features, features).similarity, 1.0);
   }
 }
 
 TEST(SiftSimilarity, FewerThanTwoFeaturesAreNoEvidence) {
-  const SiftSimilarity similarity({0.6, "symmetric"});
+  const SiftSimilarity similarity({0.6, "symmetric"}, SimilarityConfig());
   const SiftFeatures one = featuresOf({kX});
   const SiftFeatures two = featuresOf({kX, kY});
-  EXPECT_EQ(similarity.compare(observed(one), trained(two)).similarity, 0.0);
-  EXPECT_EQ(similarity.compare(observed(two), trained(one)).similarity, 0.0);
-  EXPECT_EQ(similarity.compare(observed({}), trained({})).similarity, 0.0);
+  EXPECT_EQ(similarity.compare(one, two).similarity, 0.0);
+  EXPECT_EQ(similarity.compare(two, one).similarity, 0.0);
+  EXPECT_EQ(similarity.compare({}, {}).similarity, 0.0);
 }
 
 TEST(ScoreCache, ComparesEachTrainingImageOnceAndCounts) {
@@ -66,7 +57,7 @@ TEST(ScoreCache, ComparesEachTrainingImageOnceAndCounts) {
   int calls = 0;
   scores.startImage([&calls](std::size_t image) {
     ++calls;
-    return Score{0.1 * static_cast<double>(image), image};
+    return Score{0.1 * static_cast<double>(image), 0.0, image};
   });
   for (int round = 0; round < 3; ++round) {
     EXPECT_DOUBLE_EQ(scores[3].similarity, 0.3);
@@ -78,9 +69,9 @@ TEST(ScoreCache, ComparesEachTrainingImageOnceAndCounts) {
 
 TEST(ScoreCache, ANewImageForgetsTheOldScores) {
   ScoreCache scores(2);
-  scores.startImage([](std::size_t) { return Score{0.1, 1}; });
+  scores.startImage([](std::size_t) { return Score{0.1, 0.1, 1}; });
   EXPECT_EQ(scores[1].similarity, 0.1);
-  scores.startImage([](std::size_t) { return Score{0.2, 2}; });
+  scores.startImage([](std::size_t) { return Score{0.2, 0.2, 2}; });
   EXPECT_EQ(scores.comparisons(), 0u);
   EXPECT_EQ(scores[1].similarity, 0.2);
 }

@@ -8,35 +8,44 @@
 
 #include "test/support/synthetic.h"
 #include "visual_localization/similarity/score_cache.h"
-#include "visual_localization/tracking/particle.h"
+#include "visual_localization/tracking/tracker.h"
 
 namespace visual_localization::test {
 
 /// A world without images: how alike two places look depends on their distance only.
 class World {
  public:
-  explicit World(std::shared_ptr<const TrainingMap> map) : map_(std::move(map)), scores_(map_->size()) {}
+  explicit World(std::shared_ptr<const TrainingMap> map)
+      : map_(std::move(map)), scores_(map_->size()), places_(map_->size(), 100000) {}
 
-  /// What the robot sees from here.
-  ScoreCache& from(const Eigen::Vector2d& robot_m) {
-    scores_.startImage([this, robot_m](std::size_t image) {
-      const double distance = (map_->image(image).position_m - robot_m).norm() / 2.0;
-      const double similarity = 0.5 * std::exp(-0.5 * distance * distance);
-      return Score{similarity, static_cast<std::size_t>(100.0 * similarity)};
-    });
-    return scores_;
+  /// What the robot sees from here; globally, places within some 10 m look alike.
+  TrackerInput from(const Eigen::Vector2d& robot_m) {
+    scores_.startImage([this, robot_m](std::size_t image) { return scoreAt(0.5 * bell(image, robot_m, 2.0)); });
+    places_.startImage([this, robot_m](std::size_t image) { return bell(image, robot_m, 10.0); });
+    return {scores_, places_};
   }
 
-  ScoreCache& inTheDark() {
+  TrackerInput inTheDark() {
     scores_.startImage([](std::size_t) { return Score{}; });
-    return scores_;
+    places_.startImage([](std::size_t) { return 0.0; });
+    return {scores_, places_};
+  }
+
+  static Score scoreAt(double similarity) {
+    return {similarity, similarity, static_cast<std::size_t>(100.0 * similarity), similarity >= 0.05};
   }
 
   const TrainingMap& map() const { return *map_; }
 
  private:
+  double bell(std::size_t image, const Eigen::Vector2d& robot_m, double width_m) const {
+    const double distance = (map_->image(image).position_m - robot_m).norm() / width_m;
+    return std::exp(-0.5 * distance * distance);
+  }
+
   std::shared_ptr<const TrainingMap> map_;
   ScoreCache scores_;
+  PlaceProposal places_;
 };
 
 /// A round of 30 m radius with an image every 0.94 m.

@@ -115,7 +115,7 @@ TEST(Dpso, AMapOfOneImageWorks) {
 TEST(Dpso, SpeedLimitFollowsTheRobot) {
   World world = roundWorld();
   DpsoConfig config;
-  config.recover = false;
+  config.recovery = "none";
   Dpso tracker(world.map(), config, FitnessConfig(), 1);
   for (int step = 0; step < 150; ++step) tracker.update(world.from(onCircle(0.3 * step)));
   const double slow = tracker.tuning().v0;
@@ -196,10 +196,11 @@ TEST(Dpso, AWrongInitialPoseIsNotTerminal) {
 TEST(Dpso, ASingleFalseMatchDoesNotHideHowFarTheSearchReaches) {
   World world = roundWorld();
   Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
-  ScoreCache scores(world.map().size());
+  const TrackerInput input = world.inTheDark();
   bool given = false;
-  scores.startImage([&given](std::size_t) { return std::exchange(given, true) ? Score{} : Score{0.01, 1}; });
-  const TrackerEstimate estimate = tracker.update(scores);
+  input.scores.startImage(
+      [&given](std::size_t) { return std::exchange(given, true) ? Score{} : World::scoreAt(0.01); });
+  const TrackerEstimate estimate = tracker.update(input);
   EXPECT_GT(estimate.cloud_covariance_m2.trace(), 400.0);
 }
 
@@ -218,10 +219,10 @@ TEST(Dpso, CountsAtMostOneComparisonAParticle) {
   config.particles = 30;
   Dpso tracker(world.map(), config, FitnessConfig(), 1);
   for (int step = 0; step < 20; ++step) {
-    ScoreCache& scores = world.from(onCircle(0.6 * step));
-    tracker.update(scores);
-    EXPECT_LE(scores.comparisons(), 30u);
-    EXPECT_GE(scores.comparisons(), 1u);
+    const TrackerInput input = world.from(onCircle(0.6 * step));
+    tracker.update(input);
+    EXPECT_LE(input.scores.comparisons(), 30u);
+    EXPECT_GE(input.scores.comparisons(), 1u);
   }
 }
 

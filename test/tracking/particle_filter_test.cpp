@@ -19,7 +19,7 @@ using test::World;
 
 ParticleFilter makeFilter(const World& world, const std::string& tracker, std::uint32_t seed,
                           const ParticleFilterConfig& config = {}) {
-  return ParticleFilter(world.map(), makeMotionModel(tracker, config), config, FitnessConfig(), seed);
+  return ParticleFilter(world.map(), makeMotionModel(tracker, config, world.map()), config, FitnessConfig(), seed);
 }
 
 class ParticleFilterTest : public ::testing::TestWithParam<const char*> {};
@@ -130,8 +130,8 @@ TEST(MotionModel, LinearKeepsAndDisturbsTheVelocity) {
   straight.start(particle, random);
   EXPECT_NEAR(particle.velocity_m.norm(), 2.0, 1e-12);
   const Eigen::Vector2d velocity = particle.velocity_m;
-  straight.move(particle, random);
-  straight.move(particle, random);
+  straight.move(particle, Travel(), random);
+  straight.move(particle, Travel(), random);
   EXPECT_LT((particle.position_m - 2.0 * velocity).norm(), 1e-12);
 
   const LinearMotion disturbed(kPi / 3.0, 0.1, 2.0);
@@ -139,7 +139,7 @@ TEST(MotionModel, LinearKeepsAndDisturbsTheVelocity) {
   double scaled_squared = 0.0;
   for (int i = 0; i < 4000; ++i) {
     particle.velocity_m = {1.0, 0.0};
-    disturbed.move(particle, random);
+    disturbed.move(particle, Travel(), random);
     const double log_speed = std::log(particle.velocity_m.norm());
     scaled_squared += log_speed * log_speed / 4000.0;
     turned_squared += std::cos(std::atan2(particle.velocity_m.y(), particle.velocity_m.x())) / 4000.0;
@@ -154,7 +154,7 @@ TEST(MotionModel, GaussianStepsHaveTheGivenSpread) {
   double squared = 0.0;
   for (int i = 0; i < 4000; ++i) {
     Particle particle;
-    motion.move(particle, random);
+    motion.move(particle, Travel(), random);
     squared += particle.position_m.squaredNorm() / 8000.0;
   }
   EXPECT_NEAR(std::sqrt(squared), 4.0, 0.15);

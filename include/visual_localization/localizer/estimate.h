@@ -7,8 +7,9 @@
 
 #include <Eigen/Core>
 
+#include "visual_localization/features/feature_kind.h"
 #include "visual_localization/geo/geodetic_point.h"
-#include "visual_localization/similarity/similarity.h"
+#include "visual_localization/similarity/score.h"
 #include "visual_localization/tracking/tracker.h"
 
 namespace visual_localization {
@@ -24,12 +25,6 @@ enum class LocalizationState : std::uint8_t {
 
 /// "NO_MAP", "INITIALIZING", ...
 std::string toString(LocalizationState state);
-
-/// Which features an estimate rests on.
-enum class FeatureKind : std::uint8_t { kSift = 0, kGlobal = 1 };
-
-/// "SIFT", "GLOBAL".
-std::string toString(FeatureKind kind);
 
 /// Position and heading in the map frame.
 struct PoseEstimate {
@@ -52,12 +47,13 @@ struct Estimate {
   std::int64_t stamp_ns = 0;  ///< of the image
   LocalizationState state = LocalizationState::kInitializing;
   PoseEstimate pose;
-  Score best;                  ///< best match among the training images compared
-  std::size_t best_image = 0;  ///< that training image
-  FeatureKind features = FeatureKind::kSift;
-  std::size_t comparisons = 0;         ///< distinct training images compared
-  std::size_t features_extracted = 0;  ///< in the current image, before pruning
-  std::size_t features_kept = 0;       ///< after pruning
+  Score best;                                 ///< best match among the training images compared
+  std::size_t best_image = 0;                 ///< that training image
+  double best_distance_m = 0.0;               ///< from the estimated position to it
+  FeatureKind features = FeatureKind::kSift;  ///< by which the training images were compared
+  std::size_t comparisons = 0;                ///< distinct training images compared
+  std::size_t features_extracted = 0;         ///< SIFT features of the image before pruning; 0 when there was no need
+  std::size_t features_kept = 0;              ///< after pruning
   TrackerTuning tuning;
   Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();  ///< sigma x, y of the cloud
   StageTimes times;

@@ -7,43 +7,56 @@
 
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/image_features.h"
+#include "visual_localization/features/global_extractor.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
 
 namespace visual_localization {
 
-/// The features of one live image, before and after pruning.
-struct Observation {
-  std::int64_t stamp_ns = 0;
-  ImageFeatures features;              ///< after pruning
-  std::size_t features_extracted = 0;  ///< before
-};
-
-/// Live image in, features out: resizes to the map's size, extracts, and keeps what the image directly before
-/// showed as well (Weiss et al., section III). The first image, or one after a gap or after an image
-/// without features, is not pruned.
+/// Live image in, features out: resizes to the map's size and extracts either kind of features when it is first
+/// asked for. SIFT features are kept only if the image directly before shows them as well (Weiss et al., section
+/// III); its features too are extracted only then. The first image, or one after a gap or after an image without
+/// features, is not pruned.
 class FrontEnd {
  public:
   FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s);
 
-  /// `grey`: 8-bit, one channel, any size of at least 16 x 16; throws std::invalid_argument otherwise.
-  Observation observe(std::int64_t stamp_ns, const cv::Mat& grey);
+  /// The next image. `grey`: 8-bit, one channel, any size of at least 16 x 16; throws std::invalid_argument otherwise,
+  /// and then nothing has changed.
+  void setImage(std::int64_t stamp_ns, const cv::Mat& grey);
+  /// SIFT features of the image, pruned.
+  const SiftFeatures& sift();
+  /// Global features of the image.
+  const GlobalFeatures& global();
+
+  /// The pruned SIFT features if they were asked for.
+  const std::optional<SiftFeatures>& siftIfExtracted() const { return pruned_; }
+  /// Number of SIFT features before pruning; 0 unless they were asked for.
+  std::size_t siftExtracted() const { return current_ && current_->sift ? current_->sift->size() : 0; }
+  /// Time spent on extraction and pruning since setImage, which counts too.
+  double extract_ms() const { return extract_ms_; }
 
  private:
-  struct Previous {
+  struct Image {
     std::int64_t stamp_ns = 0;
-    SiftFeatures sift;
+    cv::Mat grey;                      ///< of the map's size; a copy, since the camera's buffer does not stay
+    std::optional<SiftFeatures> sift;  ///< not pruned
   };
 
-  bool follows(std::int64_t stamp_ns) const;
+  const SiftFeatures& unprunedSift(Image& image);
+  bool previousIsClose() const;
 
   MatchConfig match_;
   cv::Size image_size_;
   bool prune_;
   double max_image_gap_s_;
-  std::unique_ptr<SiftExtractor> extractor_;
-  std::optional<Previous> previous_;
+  std::unique_ptr<SiftExtractor> sift_extractor_;
+  GlobalExtractor global_extractor_;
+  std::optional<Image> previous_;
+  std::optional<Image> current_;
+  std::optional<SiftFeatures> pruned_;
+  std::optional<GlobalFeatures> global_;
+  double extract_ms_ = 0.0;
 };
 
 }  // namespace visual_localization

@@ -11,8 +11,12 @@
 #include "visual_localization/localizer/localizer_config.h"
 #include "visual_localization/localizer/state_assessor.h"
 #include "visual_localization/map/training_map.h"
+#include "visual_localization/similarity/comparable_image.h"
+#include "visual_localization/similarity/global_similarity.h"
 #include "visual_localization/similarity/score_cache.h"
-#include "visual_localization/similarity/similarity.h"
+#include "visual_localization/similarity/sift_similarity.h"
+#include "visual_localization/tracking/feature_choice.h"
+#include "visual_localization/tracking/place_proposal.h"
 #include "visual_localization/tracking/tracker.h"
 
 namespace visual_localization {
@@ -27,8 +31,8 @@ class Localizer {
   /// `grey`: 8-bit, one channel, at least 16 x 16; resized to the map's size. Throws std::invalid_argument for
   /// anything else, and then nothing has changed.
   Estimate process(std::int64_t stamp_ns, const cv::Mat& grey);
-  /// The same for an image whose features are known already.
-  Estimate process(const Observation& observation);
+  /// The same for an image that knows by itself how to compare: its times and counts of features stay zero.
+  Estimate process(std::int64_t stamp_ns, ComparableImage& image);
 
   /// The position is unknown: anywhere in the map.
   void relocalize();
@@ -37,8 +41,8 @@ class Localizer {
 
   const TrainingMap& map() const { return *map_; }
   const std::vector<Particle>& particles() const { return tracker_->particles(); }
-  /// What the last image showed, after pruning: for drawing its matches.
-  const ImageFeatures& lastFeatures() const { return last_features_; }
+  /// SIFT features of the last image after pruning, for drawing its matches; empty when there was no need for them.
+  SiftFeatures lastSift() const { return front_end_.siftIfExtracted().value_or(SiftFeatures()); }
 
  private:
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state) const;
@@ -47,11 +51,13 @@ class Localizer {
   std::shared_ptr<const TrainingMap> map_;
   LocalizerConfig config_;
   FrontEnd front_end_;
-  std::unique_ptr<Similarity> similarity_;
+  SiftSimilarity sift_similarity_;
+  GlobalSimilarity global_similarity_;
   ScoreCache scores_;
+  PlaceProposal places_;
   std::unique_ptr<Tracker> tracker_;
+  FeatureChoice choice_;
   StateAssessor assessor_;
-  ImageFeatures last_features_;
 };
 
 }  // namespace visual_localization

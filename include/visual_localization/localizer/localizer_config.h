@@ -6,7 +6,9 @@
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/localizer/state_assessor.h"
 #include "visual_localization/parameters/parameter_visitor.h"
-#include "visual_localization/tracking/dpso.h"
+#include "visual_localization/similarity/similarity_config.h"
+#include "visual_localization/tracking/dpso_config.h"
+#include "visual_localization/tracking/feature_choice.h"
 #include "visual_localization/tracking/fitness.h"
 #include "visual_localization/tracking/particle_filter.h"
 
@@ -21,7 +23,10 @@ struct LocalizerConfig {
   double max_image_gap_s = 10.0;    ///< longer pauses between images make the earlier one useless for pruning
   double min_position_std_m = 0.5;  ///< accuracy of the map's own positions: no covariance claims more
   double min_yaw_std_rad = 0.1;     ///< the camera is never mounted and driven exactly along the path
+  int max_proposal_images = 20000;  ///< of a larger map only so many images are weighed for a guided recovery
   MatchConfig match;
+  SimilarityConfig similarity;
+  HybridConfig hybrid;
   FitnessConfig fitness;
   StateConfig state;
   DpsoConfig dpso;

@@ -14,12 +14,13 @@ namespace visual_localization {
 
 /// When a position counts as confirmed.
 struct StateConfig {
-  double min_similarity = 0.08;  ///< a weaker best match does not confirm a position
-  int min_matches = 5;           ///< fewer matched SIFT features are no evidence, whatever their share
-  double max_distance_m = 5.0;   ///< a best match farther from the estimate does not confirm it
-  int window = 5;                ///< so many of the last images are looked at
-  int images_to_confirm = 4;     ///< so many of them must confirm the position
-  double max_step_m = 10.0;      ///< a larger jump between two images makes what came before worthless
+  double min_similarity = 0.08;         ///< a weaker best SIFT match does not confirm a position
+  int min_matches = 5;                  ///< fewer matched SIFT features are no evidence, whatever their share
+  double min_global_similarity = 0.65;  ///< a weaker best match by global features does not confirm a position
+  double max_distance_m = 5.0;          ///< a best match farther from the estimate does not confirm it
+  int window = 5;                       ///< so many of the last images are looked at
+  int images_to_confirm = 4;            ///< so many of them must confirm the position
+  double max_step_m = 10.0;             ///< a larger jump between two images makes what came before worthless
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const;
@@ -33,10 +34,10 @@ class StateAssessor {
   /// The position is unknown again.
   void reset();
   /// The state after one more image.
-  LocalizationState assess(const TrackerEstimate& estimate, bool recovering);
+  LocalizationState assess(const TrackerEstimate& estimate, FeatureKind features, bool recovering);
 
  private:
-  bool confirms(const TrackerEstimate& estimate) const;
+  bool confirms(const TrackerEstimate& estimate, FeatureKind features) const;
 
   StateConfig config_;
   std::deque<bool> confirmations_;  ///< of the last images, newest at the back

@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/image_features.h"
+#include "visual_localization/features/sift_features.h"
 #include "visual_localization/localizer/localizer.h"
 
 namespace visual_localization {
@@ -28,7 +28,7 @@ class SharedLocalizer {
   struct Result {
     Estimate estimate;
     std::vector<Particle> particles;
-    ImageFeatures features;  ///< of the image, after pruning
+    SiftFeatures sift;  ///< of the image, after pruning; empty when they were not needed
     std::shared_ptr<const TrainingMap> map;
   };
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "visual_localization/similarity/similarity.h"
+#include "visual_localization/similarity/score.h"
 
 namespace visual_localization {
 

@@ -10,10 +10,9 @@
 
 namespace visual_localization {
 
-/// How fitness falls off beside the recorded path, and from which match on a place counts as recognised.
+/// How fitness falls off beside the recorded path.
 struct FitnessConfig {
-  double distance_sigma_m = 10.0;       ///< std of zeta in Kronfeld et al. (journal), Eq. 3
-  double recognised_similarity = 0.05;  ///< m below this is a bad match (journal, section 5: 5 % of the features)
+  double distance_sigma_m = 10.0;  ///< std of zeta in Kronfeld et al. (journal), Eq. 3
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const { return {}; }
@@ -27,7 +26,7 @@ struct Fitness {
 };
 
 /// f(x, t) = m(i_M(x), s(t)) * zeta(distance to i_M(x)), Kronfeld et al. (journal), Eq. 3, zeta a Gaussian of
-/// height one.
+/// height one; m as the weight that its similarity gives it.
 Fitness evaluateFitness(const Eigen::Vector2d& position_m, const TrainingMap& map, ScoreCache& scores,
                         const FitnessConfig& config);
 

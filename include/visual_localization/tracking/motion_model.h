@@ -1,22 +1,34 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <vector>
 
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/map/training_map.h"
 #include "visual_localization/tracking/particle.h"
 #include "visual_localization/tracking/random.h"
 
 namespace visual_localization {
 
-/// How a particle may move from one image to the next. A model that knows odometry would take its increment
-/// between `start` and `move`; these two do without.
+/// What odometry says about the way from the last image to this one, in the robot's frame at the last image.
+struct OdometryIncrement {
+  Eigen::Vector2d translation_m = Eigen::Vector2d::Zero();  ///< forward, left
+  double rotation_rad = 0.0;                                ///< counter-clockwise
+};
+
+/// What is known about the way from the last image to this one.
+struct Travel {
+  std::optional<OdometryIncrement> odometry;  ///< the papers' models do without
+};
+
+/// How a particle may move from one image to the next.
 class MotionModel {
  public:
   virtual ~MotionModel() = default;
   /// Gives a particle at a new place whatever the model needs.
-  virtual void start(Particle& particle, Random& random) const = 0;
+  virtual void start(Particle&, Random&) const {}
   /// One image further.
-  virtual void move(Particle& particle, Random& random) const = 0;
+  virtual void move(Particle& particle, const Travel& travel, Random& random) const = 0;
 };
 
 /// Random walk (Weiss et al., section IV.A; PF-g of Kronfeld et al. (journal), section 7.2).
@@ -24,8 +36,7 @@ class GaussianMotion final : public MotionModel {
  public:
   /// `std_m`: of the step along each axis, metres per image.
   explicit GaussianMotion(double std_m) : std_m_(std_m) {}
-  void start(Particle& particle, Random& random) const override;
-  void move(Particle& particle, Random& random) const override;
+  void move(Particle& particle, const Travel& travel, Random& random) const override;
 
  private:
   double std_m_;
@@ -39,12 +50,35 @@ class LinearMotion final : public MotionModel {
   LinearMotion(double rotation_std_rad, double acceleration_std, double initial_speed_m)
       : rotation_std_rad_(rotation_std_rad), acceleration_std_(acceleration_std), initial_speed_m_(initial_speed_m) {}
   void start(Particle& particle, Random& random) const override;
-  void move(Particle& particle, Random& random) const override;
+  void move(Particle& particle, const Travel& travel, Random& random) const override;
 
  private:
   double rotation_std_rad_;
   double acceleration_std_;
   double initial_speed_m_;
+};
+
+/// Moves a particle a share of the way to its nearest training image (Weiss et al., section IV.A, step 2).
+class PullToMap final : public MotionModel {
+ public:
+  /// `map` must outlive the model; `share` in [0, 1].
+  PullToMap(const TrainingMap& map, double share) : map_(map), share_(share) {}
+  void move(Particle& particle, const Travel& travel, Random& random) const override;
+
+ private:
+  const TrainingMap& map_;
+  double share_;
+};
+
+/// Several models, one after the other.
+class CombinedMotion final : public MotionModel {
+ public:
+  explicit CombinedMotion(std::vector<std::unique_ptr<MotionModel>> parts);
+  void start(Particle& particle, Random& random) const override;
+  void move(Particle& particle, const Travel& travel, Random& random) const override;
+
+ private:
+  std::vector<std::unique_ptr<MotionModel>> parts_;
 };
 
 }  // namespace visual_localization

@@ -27,8 +27,10 @@ struct ParticleFilterConfig {
   std::vector<std::string> violations() const { return {}; }
 };
 
-/// The motion model of the tracker called `tracker`: "pf_gaussian" or "pf_linear".
-std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config);
+/// The motion of the tracker called `tracker`, "pf_gaussian" or "pf_linear", with the pull towards the training images.
+/// `map` must outlive it.
+std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
+                                             const TrainingMap& map);
 
 /// Particle filter without odometry (Weiss et al., section IV.A): resample, move, weigh, estimate the weighted
 /// mean, replace the worst by random particles.
@@ -38,14 +40,14 @@ class ParticleFilter final : public Tracker {
   ParticleFilter(const TrainingMap& map, std::unique_ptr<MotionModel> motion, const ParticleFilterConfig& config,
                  const FitnessConfig& fitness, std::uint32_t seed);
 
+  void reset() override { reset(anywhere_); }
   void reset(const Prior& prior) override;
-  TrackerEstimate update(ScoreCache& scores) override;
+  TrackerEstimate update(const TrackerInput& input) override;
   const std::vector<Particle>& particles() const override { return particles_; }
   TrackerTuning tuning() const override { return {}; }
 
  private:
   void resample();
-  void move(Particle& particle);
   void weigh(ScoreCache& scores);
   TrackerEstimate estimate() const;
   void injectRandomParticles();

@@ -6,7 +6,9 @@
 #include <Eigen/Core>
 
 #include "visual_localization/similarity/score_cache.h"
+#include "visual_localization/tracking/motion_model.h"
 #include "visual_localization/tracking/particle.h"
+#include "visual_localization/tracking/place_proposal.h"
 #include "visual_localization/tracking/prior.h"
 
 namespace visual_localization {
@@ -33,14 +35,23 @@ struct TrackerTuning {
   bool recovering = false;     ///< the position is taken to be lost
 };
 
-/// Follows the position from image to image without odometry.
+/// What one image brings to a tracker.
+struct TrackerInput {
+  ScoreCache& scores;     ///< of the image by the features chosen for it
+  PlaceProposal& places;  ///< where it may have been taken, should the position be lost
+  Travel travel = {};     ///< since the last image
+};
+
+/// Follows the position from image to image, with or without odometry.
 class Tracker {
  public:
   virtual ~Tracker() = default;
+  /// Forgets the past: the robot may be anywhere in the map's area.
+  virtual void reset() = 0;
   /// Forgets the past; the particles of the next image are drawn from `prior`.
   virtual void reset(const Prior& prior) = 0;
   /// One image: moves the particles, scores them, estimates.
-  virtual TrackerEstimate update(ScoreCache& scores) = 0;
+  virtual TrackerEstimate update(const TrackerInput& input) = 0;
   virtual const std::vector<Particle>& particles() const = 0;
   virtual TrackerTuning tuning() const = 0;
 };

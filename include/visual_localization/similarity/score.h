@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstddef>
+
+namespace visual_localization {
+
+/// How alike two images are, and on how much evidence.
+struct Score {
+  double similarity = 0.0;  ///< m in [0, 1]
+  double weight = 0.0;      ///< what counts for a particle, [0, 1]: m, sharpened for global features
+  std::size_t matches = 0;  ///< matched local features behind it; 0 for global features
+  bool recognised = false;  ///< m is good enough to be no accident
+};
+
+}  // namespace visual_localization

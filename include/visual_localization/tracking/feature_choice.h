@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "visual_localization/features/feature_kind.h"
+#include "visual_localization/parameters/parameter_visitor.h"
+
+namespace visual_localization {
+
+/// Thresholds of the hybrid choice (Weiss et al., section IV.B).
+struct HybridConfig {
+  double sift_below_m = 7.0;    ///< d_SIFT: after SIFT, global features are next when both sigmas are below
+  double global_above_m = 5.5;  ///< d_global: after global features, SIFT is next when one sigma is above
+
+  void declare(ParameterVisitor& visitor);
+  std::vector<std::string> violations() const { return {}; }
+};
+
+/// Which features the next image is compared by: always the same ones, or by how far the cloud is spread (Weiss et
+/// al., section IV.B). Works on any tracker's cloud.
+class FeatureChoice {
+ public:
+  /// `features`: "sift", "global" or "hybrid".
+  FeatureChoice(const std::string& features, const HybridConfig& config);
+
+  /// The position is unknown: the hybrid choice begins with SIFT.
+  void reset();
+  FeatureKind next() const { return next_; }
+  /// After an image that was compared by next(): `spread_m` is sigma_x, sigma_y of the cloud (Eq. 2).
+  void update(const Eigen::Vector2d& spread_m);
+
+ private:
+  bool hybrid_;
+  HybridConfig config_;
+  FeatureKind first_;
+  FeatureKind next_;
+};
+
+}  // namespace visual_localization

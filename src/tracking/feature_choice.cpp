@@ -1,0 +1,31 @@
+#include "visual_localization/tracking/feature_choice.h"
+
+namespace visual_localization {
+
+void HybridConfig::declare(ParameterVisitor& visitor) {
+  visitor.real(
+      {"hybrid/sift_below", "m", "after SIFT, global features follow when the cloud's sigmas are below (d_SIFT)"},
+      sift_below_m, 0.0, 10000.0);
+  visitor.real({"hybrid/global_above", "m", "after global features, SIFT follows when a sigma is above (d_global)"},
+               global_above_m, 0.0, 10000.0);
+}
+
+FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& config)
+    : hybrid_(features == "hybrid"),
+      config_(config),
+      first_(features == "global" ? FeatureKind::kGlobal : FeatureKind::kSift),
+      next_(first_) {}
+
+void FeatureChoice::reset() { next_ = first_; }
+
+void FeatureChoice::update(const Eigen::Vector2d& spread_m) {
+  if (!hybrid_) return;
+  const double largest_m = spread_m.maxCoeff();
+  if (next_ == FeatureKind::kSift && largest_m < config_.sift_below_m) {
+    next_ = FeatureKind::kGlobal;
+  } else if (next_ == FeatureKind::kGlobal && largest_m > config_.global_above_m) {
+    next_ = FeatureKind::kSift;
+  }
+}
+
+}  // namespace visual_localization
