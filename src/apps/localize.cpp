@@ -21,6 +21,7 @@
 #include "visual_localization/ros/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
 #include "visual_localization/ros/node_config.h"
+#include "visual_localization/ros/round_recorder.h"
 
 namespace visual_localization::apps {
 namespace {
@@ -95,18 +96,6 @@ std::vector<std::size_t> orderOf(const Options& options, std::size_t images) {
   }
 }
 
-/// The true positions as a function of time; fixes that are not believable are left out.
-Trajectory truthOf(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
-  std::vector<TrajectoryPoint> points;
-  for (const Fix& fix : bag.fixes(topic)) {
-    if (!fix.has_fix || !isValid(fix.position)) continue;
-    if (!points.empty() && fix.stamp_ns <= points.back().stamp_ns) continue;
-    points.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), 0.0});
-  }
-  if (points.empty()) throw BagError(bag.path() + ": topic " + topic + " holds no believable fix");
-  return Trajectory(std::move(points));
-}
-
 /// What a run adds up to.
 struct Totals {
   std::size_t images = 0;
@@ -170,7 +159,7 @@ void run(const Options& options) {
   const BagImages images = bag.images(options.image_topic);
   const std::vector<std::size_t> order = orderOf(options, images.size());
   std::optional<Trajectory> truth;
-  if (!options.truth_topic.empty()) truth = truthOf(bag, options.truth_topic, localizer.map().frame());
+  if (!options.truth_topic.empty()) truth = trueTrajectory(bag, options.truth_topic, localizer.map().frame());
 
   std::string track = trackCsvHeader();
   std::vector<double> errors_m;

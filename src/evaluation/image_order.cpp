@@ -1,5 +1,7 @@
 #include "visual_localization/evaluation/image_order.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -28,6 +30,28 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start,
     order[step] = (kidnapped ? kidnapping->to + step - kidnapping->at : start + step) % images;
   }
   return order;
+}
+
+std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const RunShape& shape) {
+  if (images == 0) return {};
+  requireIndex("start index", start, images);
+  const std::size_t ahead = shape.closed ? images : images - start;
+  const auto steps = static_cast<std::size_t>(std::ceil(static_cast<double>(ahead) / shape.speed));
+  std::vector<std::size_t> order(steps);
+  for (std::size_t step = 0; step < steps; ++step) {
+    const auto travelled = static_cast<std::size_t>(std::floor(static_cast<double>(step) * shape.speed));
+    const std::size_t jump = shape.kidnapped && step >= steps / 2 ? images / 2 : 0;
+    order[step] = (start + travelled + jump) % images;
+  }
+  return order;
+}
+
+std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_t count) {
+  const std::size_t possible = closed ? images : (images + 1) / 2;
+  const std::size_t runs = count == 0 ? possible : std::min(count, possible);
+  std::vector<std::size_t> starts(runs);
+  for (std::size_t i = 0; i < runs; ++i) starts[i] = i * possible / runs;
+  return starts;
 }
 
 }  // namespace visual_localization

@@ -7,6 +7,8 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "visual_localization/parameters/yaml_map.h"
+
 namespace visual_localization::parameters {
 namespace {
 
@@ -169,25 +171,6 @@ class TableWriter : public ParameterVisitor {
   }
 };
 
-/// `depth`: how many mappings more are accepted; an alias may refer to the mapping that it is in.
-void flatten(const YAML::Node& node, const std::string& prefix, const std::string& path, int depth,
-             ParameterValues& out) {
-  if (depth == 0) throw ParameterError(path + ": key '" + prefix + "' is nested too deeply");
-  for (const auto& entry : node) {
-    const auto key = entry.first.as<std::string>();
-    const std::string name = prefix.empty() ? key : prefix + "/" + key;
-    if (entry.second.IsMap()) {
-      flatten(entry.second, name, path, depth - 1, out);
-    } else if (entry.second.IsScalar()) {
-      // A quoted scalar carries the tag "!": it stays a string even when it looks like a number.
-      const std::string text = entry.second.Scalar();
-      out[name] = entry.second.Tag() == "!" ? ParameterValue(text) : parseScalar(text);
-    } else {
-      throw ParameterError(path + ": key '" + name + "' must be a single value or a mapping");
-    }
-  }
-}
-
 }  // namespace
 
 void assign(const Declaration& declare, const ParameterValues& values) {
@@ -217,14 +200,11 @@ std::string markdownTable(const Declaration& declare) {
 }
 
 ParameterValues readYaml(const std::string& path) {
-  constexpr int kDeepestNesting = 8;
   try {
     const YAML::Node root = YAML::LoadFile(path);
-    ParameterValues out;
-    if (root.IsNull()) return out;
+    if (root.IsNull()) return {};
     if (!root.IsMap()) throw ParameterError(path + ": must be a mapping of parameter names to values");
-    flatten(root, "", path, kDeepestNesting, out);
-    return out;
+    return flatten(root, path);
   } catch (const YAML::BadFile&) {
     throw ParameterError(path + ": cannot be opened");
   } catch (const ParameterError&) {

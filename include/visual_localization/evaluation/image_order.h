@@ -17,4 +17,18 @@ struct Kidnapping {
 /// round has images. Throws std::invalid_argument, naming the allowed range, for an index beyond the round.
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const std::optional<Kidnapping>& kidnapping);
 
+/// How the runs of an experiment go through a round.
+struct RunShape {
+  bool closed = true;      ///< indices wrap; an open round is driven to its end
+  double speed = 1.0;      ///< images of the round per step: at 2 every other one, at 1/2 each one twice
+  bool kidnapped = false;  ///< after half of the run carried by half of the round; closed rounds only
+};
+
+/// The images that the run beginning at `start` sees: once around a closed round, to the end of an open one.
+std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const RunShape& shape);
+
+/// Where the runs begin: every image of a closed round, or of the first half of an open one; `count` of them, evenly
+/// spread, unless that is 0 or more than there are.
+std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_t count);
+
 }  // namespace visual_localization

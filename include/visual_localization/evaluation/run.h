@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "visual_localization/evaluation/contestant.h"
+
+namespace visual_localization {
+
+/// Estimates nearer to the truth than this are right.
+constexpr double kRight_m = 5.0;
+
+/// What happened at one step of a run.
+struct StepRecord {
+  float error_m = 0.0F;  ///< NaN when the image has no true position
+  float confidence = 0.0F;
+  std::uint32_t comparisons = 0;
+  bool sift = false;  ///< compared by SIFT features
+};
+
+/// A closer look at one step, for the course of a single run.
+struct TraceRecord {
+  std::size_t image = 0;
+  double diversity_m = 0.0;
+  Estimate estimate;
+};
+
+/// One run of one method over one driven round.
+struct RunRecord {
+  std::size_t start = 0;
+  std::vector<StepRecord> steps;
+  std::vector<TraceRecord> trace;       ///< of every step of a tracker, when asked for
+  std::size_t steps_to_localise = 0;    ///< images until the first of three right estimates in a row; all when never
+  std::size_t steps_to_relocalise = 0;  ///< the same after the kidnapping
+  std::size_t sift_extractions = 0;     ///< SIFT extractions that a live image would have needed
+  std::size_t global_extractions = 0;
+  std::size_t sift_comparisons = 0;
+  std::size_t global_comparisons = 0;  ///< those of guided recovery included
+  double method_ms = 0.0;              ///< time of the method itself, without extraction and comparisons
+};
+
+/// Everything that the runs of one pair of rounds share.
+struct RunContext {
+  std::shared_ptr<const TrainingMap> map;
+  const Drive& drive;
+  const ScoreTable& table;
+  bool closed = true;
+};
+
+/// Drives from image `start` on (protocol of Kronfeld et al. (journal), section 6).
+RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace);
+
+}  // namespace visual_localization

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "visual_localization/evaluation/recorded_round.h"
+#include "visual_localization/similarity/comparable_image.h"
+#include "visual_localization/similarity/global_similarity.h"
+#include "visual_localization/similarity/sift_similarity.h"
+
+namespace visual_localization {
+
+/// All similarities between a driven round and a map, computed once and shared by all runs of an experiment.
+class ScoreTable {
+ public:
+  struct Entry {
+    double sift = 0.0;  ///< similarity by SIFT
+    double global = 0.0;
+    std::uint32_t matches = 0;  ///< behind `sift`
+  };
+
+  ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads);
+
+  std::size_t trainingImages() const { return training_images_; }
+  const Entry& at(std::size_t drive_image, std::size_t training_image) const {
+    return entries_[drive_image * training_images_ + training_image];
+  }
+  /// Mean wall-clock time of one comparison.
+  double siftCompare_ms() const { return sift_compare_ms_; }
+  double globalCompare_ms() const { return global_compare_ms_; }
+
+ private:
+  std::size_t training_images_;
+  std::vector<Entry> entries_;
+  double sift_compare_ms_ = 0.0;
+  double global_compare_ms_ = 0.0;
+};
+
+/// One recorded image whose scores are looked up instead of computed. Counts what a live image would have cost.
+class RecordedImage final : public ComparableImage {
+ public:
+  /// All parts must outlive it.
+  RecordedImage(const ScoreTable& table, std::size_t drive_image, const SiftSimilarity& sift,
+                const GlobalSimilarity& global)
+      : table_(table), drive_image_(drive_image), sift_(sift), global_(global) {}
+
+  Score compare(FeatureKind kind, std::size_t training_image) override;
+  /// Similarities to all training images.
+  void row(FeatureKind kind, std::vector<double>& similarities);
+  std::size_t siftComparisons() const { return sift_comparisons_; }
+  std::size_t globalComparisons() const { return global_comparisons_; }
+
+ private:
+  const ScoreTable& table_;
+  std::size_t drive_image_;
+  const SiftSimilarity& sift_;
+  const GlobalSimilarity& global_;
+  std::size_t sift_comparisons_ = 0;
+  std::size_t global_comparisons_ = 0;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>
+
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization::parameters {
+
+/// A mapping of a YAML file of which every key must be asked for: a key nobody knows is a mistake of the writer. All
+/// errors are ParameterErrors of one line that name the file and the key.
+class YamlMap {
+ public:
+  /// The mapping at the top of a file.
+  static YamlMap load(const std::string& path);
+
+  bool has(const std::string& key) const;
+  /// Throws when the key is missing or no text.
+  std::string text(const std::string& key);
+  std::string text(const std::string& key, const std::string& otherwise);
+  bool flag(const std::string& key, bool otherwise);
+  double real(const std::string& key, double otherwise, double min, double max);
+  std::size_t count(const std::string& key, std::size_t otherwise, std::size_t min);
+  /// Throws when the key is missing or no mapping.
+  YamlMap map(const std::string& key);
+  /// Throws when the key is missing or no list of mappings.
+  std::vector<YamlMap> maps(const std::string& key);
+  /// Throws when the key is missing or no list of lists of `length` texts.
+  std::vector<std::vector<std::string>> textLists(const std::string& key, std::size_t length);
+  /// Parameters, nested or with full names; none when the key is missing.
+  ParameterValues parameters(const std::string& key);
+  /// Parameter names with lists of texts; none when the key is missing.
+  std::vector<std::pair<std::string, std::vector<std::string>>> sweep(const std::string& key);
+
+  /// To be called when everything has been asked for. Throws when there is more.
+  void requireNoMore() const;
+  /// Throws: something is wrong with `key`.
+  [[noreturn]] void refuse(const std::string& key, const std::string& why) const;
+
+ private:
+  YamlMap(YAML::Node node, std::string path, std::string prefix);
+  YAML::Node take(const std::string& key);
+  YAML::Node takeRequired(const std::string& key);
+
+  YAML::Node node_;
+  std::string path_;
+  std::string prefix_;  ///< where in the file, for messages
+  std::set<std::string> known_;
+};
+
+/// The parameters of a mapping, nested names joined with '/'. Throws ParameterError naming the file and the key.
+ParameterValues flatten(const YAML::Node& mapping, const std::string& path);
+
+}  // namespace visual_localization::parameters

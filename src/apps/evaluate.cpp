@@ -1,0 +1,174 @@
+// Repeats the papers' experiments on recorded rounds: every method on every pair of rounds, from every start image.
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <opencv2/core/utility.hpp>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include "app_support.h"
+#include "progress_bar.h"
+#include "visual_localization/evaluation/evaluator.h"
+#include "visual_localization/evaluation/experiment.h"
+#include "visual_localization/evaluation/result_folder.h"
+#include "visual_localization/evaluation/result_tables.h"
+#include "visual_localization/ros/round_recorder.h"
+
+extern char** environ;
+
+namespace visual_localization::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string config;
+  std::string rounds;
+  std::string output;
+  std::string shard;
+  std::vector<std::string> merge;
+  std::size_t threads = 0;
+  bool no_report = false;
+};
+
+void declareOptions(CLI::App& app, Options& options) {
+  app.add_option("--config", options.config, "Experiment, YAML (see config/evaluation)")->required();
+  app.add_option("--rounds", options.rounds, "Folder of the bags; default: the one of the YAML file");
+  app.add_option("--output", options.output, "Folder for results, report and figures; work found there is not repeated")
+      ->required();
+  app.add_option("--threads", options.threads, "Threads to use; default: all cores");
+  auto* shard = app.add_option("--shard", options.shard, "I/N: run only part I of N of the pairs, without a report");
+  app.add_option("--merge", options.merge, "Take the results of shards from these folders, run nothing, and report")
+      ->excludes(shard);
+  app.add_flag("--no-report", options.no_report, "Write the tables only: neither report nor figures");
+}
+
+Shard shardOf(const std::string& text) {
+  if (text.empty()) return {};
+  Shard shard;
+  int end = 0;
+  const bool parsed = std::sscanf(text.c_str(), "%zu/%zu%n", &shard.index, &shard.count, &end) == 2 &&
+                      static_cast<std::size_t>(end) == text.size() && text.find('-') == std::string::npos;
+  if (!parsed || shard.count == 0 || shard.index == 0 || shard.index > shard.count) {
+    throw UsageError("--shard " + text + " is not allowed: must be I/N with I from 1 to N");
+  }
+  return shard;
+}
+
+std::string readText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::string bagPath(const Options& options, const RoundSpec& round) {
+  const fs::path folder = options.rounds.empty() ? fs::path(options.config).parent_path() : fs::path(options.rounds);
+  return (folder / round.bag).string();
+}
+
+/// What besides the configuration decides about the results: the bags, by their sizes, and this version.
+std::string provenanceOf(const Experiment& experiment, const Options& options) {
+  std::string text = std::string("what,value\npackage_version,") + VISUAL_LOCALIZATION_VERSION + "\n";
+  for (const RoundSpec& round : experiment.rounds) {
+    std::error_code error;
+    const auto size = fs::file_size(bagPath(options, round), error);
+    if (error)
+      throw BagError(bagPath(options, round) + ": round " + round.name + " cannot be read: " + error.message());
+    text += "bytes of " + round.name + "," + std::to_string(size) + "\n";
+  }
+  return text;
+}
+
+/// One bar for each stage of the work.
+class StageBars {
+ public:
+  void show(const std::string& stage, std::size_t done, std::size_t total) {
+    if (!bar_ || stage != stage_) bar_ = std::make_unique<ProgressBar>(stage);
+    stage_ = stage;
+    bar_->show(done, total);
+  }
+
+ private:
+  std::string stage_;
+  std::unique_ptr<ProgressBar> bar_;
+};
+
+void runExperiment(const Experiment& experiment, const ResultFolder& results, const Options& options) {
+  const RoundSource source{
+      [&](const RoundSpec& round) { return recordMap(bagPath(options, round), round, experiment.map); },
+      [&](const RoundSpec& round) {
+        return recordDrive(bagPath(options, round), round, experiment.map, experiment.front_end);
+      }};
+  const std::size_t threads =
+      options.threads > 0 ? options.threads : std::max<std::size_t>(1, std::thread::hardware_concurrency());
+  cv::setNumThreads(1);  // the threads are spread over rounds and runs
+  StageBars bars;
+  evaluate(experiment, source, results, shardOf(options.shard), threads,
+           [&bars](const std::string& stage, std::size_t done, std::size_t total) { bars.show(stage, done, total); });
+}
+
+void mergeFolders(const Experiment& experiment, const ResultFolder& results, const Options& options,
+                  const std::string& yaml, const std::string& provenance) {
+  for (const std::string& folder : options.merge) {
+    if (!fs::is_directory(folder)) throw UsageError("--merge " + folder + " is not a folder");
+    const std::size_t copied = mergeResults(ResultFolder(folder, yaml, provenance), results, experiment);
+    std::printf("%s: %zu results\n", folder.c_str(), copied);
+  }
+}
+
+/// The report and its figures are drawn by a script that is installed beside this program.
+void writeReport(const std::string& folder) {
+  const fs::path script = fs::read_symlink("/proc/self/exe").parent_path() / "report_evaluation.py";
+  const std::string again = "; the tables are written, draw them with: report_evaluation.py " + folder;
+  if (!fs::exists(script)) throw ResultError(script.string() + ": is missing" + again);
+  std::string program = script.string();
+  std::string argument = folder;
+  char* const arguments[] = {program.data(), argument.data(), nullptr};
+  pid_t process = 0;
+  int status = 0;
+  std::fflush(stdout);
+  const bool started = ::posix_spawn(&process, program.c_str(), nullptr, nullptr, arguments, environ) == 0;
+  if (!started || ::waitpid(process, &status, 0) != process || status != 0) {
+    throw ResultError(script.string() + ": failed" + again);
+  }
+}
+
+void run(const Options& options) {
+  shardOf(options.shard);  // a mistake on the command line before all others
+  const Experiment experiment = readExperiment(options.config);
+  const std::string yaml = readText(options.config);
+  const std::string provenance = provenanceOf(experiment, options);
+  const ResultFolder results(options.output, yaml, provenance);
+  mergeFolders(experiment, results, options, yaml, provenance);
+  if (options.merge.empty()) runExperiment(experiment, results, options);
+  if (!options.shard.empty()) {
+    std::printf("shard %s of %s is done; when all are: evaluate --config %s --output %s --merge FOLDER ...\n",
+                options.shard.c_str(), experiment.name.c_str(), options.config.c_str(), options.output.c_str());
+    return;
+  }
+  writeResultTables(experiment, results);
+  if (!options.no_report) writeReport(options.output);
+  std::printf("%s: %zu pairs, %zu methods, results in %s\n", experiment.name.c_str(), experiment.pairs.size(),
+              experiment.methods.size(), options.output.c_str());
+}
+
+}  // namespace
+}  // namespace visual_localization::apps
+
+int main(int argc, char** argv) {
+  using namespace visual_localization::apps;
+  CLI::App app("Runs an experiment of the papers on recorded rounds; writes tables, a report and figures.", "evaluate");
+  Options options;
+  declareOptions(app, options);
+  return runProgram(app, argc, argv, [&options] { run(options); });
+}

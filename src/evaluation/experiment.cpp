@@ -1,0 +1,243 @@
+#include "visual_localization/evaluation/experiment.h"
+
+#include <algorithm>
+#include <set>
+
+#include "visual_localization/parameters/yaml_map.h"
+
+namespace visual_localization {
+namespace {
+
+using parameters::YamlMap;
+using Setting = std::pair<std::string, std::string>;
+
+constexpr double kSlowest = 1.0 / 64.0;
+constexpr double kFastest = 64.0;
+
+std::vector<RoundSpec> readRounds(YamlMap& yaml) {
+  std::vector<RoundSpec> rounds;
+  RoundSpec common;
+  common.image_topic = yaml.text("image_topic", "/stereo/left/image_raw");
+  common.fix_topic = yaml.text("fix_topic", "/gps/fix");
+  common.truth_topic = yaml.text("truth_topic", common.fix_topic);
+  std::set<std::string> names;
+  for (YamlMap& bag : yaml.maps("bags")) {
+    RoundSpec round;
+    round.name = bag.text("name");
+    round.bag = bag.text("bag");
+    round.group = bag.text("group", round.name);
+    round.image_topic = bag.text("image_topic", common.image_topic);
+    round.fix_topic = bag.text("fix_topic", common.fix_topic);
+    round.truth_topic = bag.text("truth_topic", common.truth_topic);
+    bag.requireNoMore();
+    const bool usable = !round.name.empty() && round.name.find_first_of("/ ,\"\n") == std::string::npos;
+    if (!usable) bag.refuse("name", "= '" + round.name + "' must be a name without slash, comma, quote or space");
+    if (!names.insert(round.name).second) bag.refuse("name", "= '" + round.name + "' appears twice");
+    rounds.push_back(std::move(round));
+  }
+  if (rounds.size() < 2) yaml.refuse("bags", "has one round only; a map and another round to drive are needed");
+  return rounds;
+}
+
+/// The rounds that a name of a pair stands for: one round, or all of a group.
+std::vector<std::size_t> roundsNamed(const std::string& name, const std::vector<RoundSpec>& rounds) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < rounds.size(); ++i) {
+    if (rounds[i].name == name) return {i};
+    if (rounds[i].group == name) found.push_back(i);
+  }
+  return found;
+}
+
+std::vector<PairSpec> readPairs(YamlMap& yaml, const std::vector<RoundSpec>& rounds) {
+  std::vector<PairSpec> pairs;
+  for (const std::vector<std::string>& names : yaml.textLists("pairs", 2)) {
+    const std::string shown = "[" + names[0] + ", " + names[1] + "]";
+    for (const std::string& name : names) {
+      if (roundsNamed(name, rounds).empty())
+        yaml.refuse("pairs", shown + ": no round or group is called '" + name + "'");
+    }
+    const std::size_t before = pairs.size();
+    for (const std::size_t map : roundsNamed(names[0], rounds)) {
+      for (const std::size_t drive : roundsNamed(names[1], rounds)) {
+        if (map != drive) pairs.push_back({map, drive});
+      }
+    }
+    if (pairs.size() == before) yaml.refuse("pairs", shown + " needs two different rounds, but there is one only");
+  }
+  std::set<std::pair<std::size_t, std::size_t>> seen;
+  for (const PairSpec& pair : pairs) {
+    if (seen.insert({pair.map, pair.drive}).second) continue;
+    yaml.refuse("pairs",
+                "name the pair of map " + rounds[pair.map].name + " and drive " + rounds[pair.drive].name + " twice");
+  }
+  return pairs;
+}
+
+/// All combinations of the sweep's values, the last key changing fastest; one empty combination without a sweep.
+std::vector<std::vector<Setting>> combinationsOf(
+    const std::vector<std::pair<std::string, std::vector<std::string>>>& sweep) {
+  std::vector<std::vector<Setting>> combinations{{}};
+  for (const auto& [key, values] : sweep) {
+    std::vector<std::vector<Setting>> longer;
+    for (const auto& combination : combinations) {
+      for (const std::string& value : values) {
+        longer.push_back(combination);
+        longer.back().emplace_back(key, value);
+      }
+    }
+    combinations = std::move(longer);
+  }
+  return combinations;
+}
+
+std::string withValues(std::string name, const std::vector<Setting>& settings) {
+  for (const auto& [key, value] : settings) {
+    const std::string placeholder = "{" + key + "}";
+    for (auto at = name.find(placeholder); at != std::string::npos; at = name.find(placeholder)) {
+      name.replace(at, placeholder.size(), value);
+    }
+  }
+  return name;
+}
+
+bool concernsFrontEnd(const std::string& parameter) {
+  return parameter.rfind("match/", 0) == 0 || parameter == "prune" || parameter == "max_image_gap";
+}
+
+/// What the entry of one method says before the sweep's values are filled in.
+struct MethodEntry {
+  std::string name;
+  MethodSpec method;
+  ParameterValues parameters;
+};
+
+void applyParameters(MethodEntry& entry, const YamlMap& yaml) {
+  for (const auto& [key, value] : entry.parameters) {
+    if (concernsFrontEnd(key)) yaml.refuse("parameters", "'" + key + "' holds for all methods: set it at the top");
+    entry.method.settings.emplace_back(key, parameters::toString(value));
+  }
+  try {
+    if (entry.method.isTracker()) {
+      entry.parameters["tracker"] = entry.method.tracker;
+      assignParameters(entry.method.localizer, entry.parameters);
+    } else {
+      assignParameters(entry.method.recogniser, entry.parameters);
+    }
+  } catch (const ParameterError& error) {
+    yaml.refuse("parameters", std::string("of '") + entry.method.name + "': " + error.what());
+  }
+}
+
+MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const YamlMap& yaml) {
+  MethodSpec& method = entry.method;
+  method.name = withValues(entry.name, swept);
+  for (const auto& [key, value] : swept) {
+    if (key != "speed") {
+      entry.parameters[key] = parameters::parseScalar(value);
+      continue;
+    }
+    if (!YAML::convert<double>::decode(YAML::Node(value), method.speed)) method.speed = 0.0;
+    if (!(method.speed >= kSlowest && method.speed <= kFastest)) {
+      yaml.refuse("sweep", "speed = " + value + " must be a number in [1/64, 64]");
+    }
+  }
+  method.settings = {{"tracker", method.tracker},
+                     {"features", method.localizer.features},
+                     {"speed", parameters::toString(method.speed)},
+                     {"kidnapped", method.kidnapped ? "true" : "false"}};
+  applyParameters(entry, yaml);
+  return method;
+}
+
+std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
+  MethodEntry entry;
+  entry.name = yaml.text("name");
+  entry.method.localizer = base;
+  entry.method.tracker = yaml.text("tracker", base.tracker);
+  const std::vector<std::string>& recognisers = placeRecogniserNames();
+  const bool is_recogniser =
+      std::find(recognisers.begin(), recognisers.end(), entry.method.tracker) != recognisers.end();
+  try {
+    ParameterValues chosen{{"features", yaml.text("features", base.features)}};
+    if (!is_recogniser) chosen["tracker"] = entry.method.tracker;
+    assignParameters(entry.method.localizer, chosen);
+  } catch (const ParameterError& error) {
+    std::string others;
+    for (const std::string& name : recognisers) others += ", " + name;
+    yaml.refuse("name", "'" + entry.name + "': " + error.what() + " (beside the trackers: " + others.substr(2) + ")");
+  }
+  if (is_recogniser && entry.method.localizer.features == "hybrid") {
+    yaml.refuse("features", "= hybrid needs a tracker's cloud, and '" + entry.method.tracker + "' has none");
+  }
+  entry.method.speed = yaml.real("speed", 1.0, kSlowest, kFastest);
+  entry.method.kidnapped = yaml.flag("kidnapped", false);
+  entry.parameters = yaml.parameters("parameters");
+  std::vector<MethodSpec> methods;
+  for (const auto& swept : combinationsOf(yaml.sweep("sweep"))) methods.push_back(completed(entry, swept, yaml));
+  yaml.requireNoMore();
+  return methods;
+}
+
+std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) {
+  std::vector<MethodSpec> methods;
+  std::set<std::string> names;
+  for (YamlMap& entry : yaml.maps("methods")) {
+    for (MethodSpec& method : readMethod(entry, base)) {
+      if (!names.insert(method.name).second) entry.refuse("name", "= '" + method.name + "' appears twice");
+      methods.push_back(std::move(method));
+    }
+  }
+  return methods;
+}
+
+template <class Config>
+Config configured(YamlMap& yaml, const std::string& key) {
+  Config config;
+  try {
+    assignParameters(config, yaml.parameters(key));
+  } catch (const ParameterError& error) {
+    yaml.refuse(key, error.what());
+  }
+  return config;
+}
+
+Experiment parse(YamlMap yaml) {
+  Experiment experiment;
+  experiment.name = yaml.text("experiment");
+  for (const char* for_the_report : {"title", "source", "discussion"}) yaml.text(for_the_report, "");
+  YamlMap rounds = yaml.map("rounds");
+  experiment.closed = rounds.flag("closed", true);
+  experiment.rounds = readRounds(rounds);
+  rounds.requireNoMore();
+  experiment.pairs = readPairs(yaml, experiment.rounds);
+  if (yaml.text("starts", "all") != "all") experiment.starts = yaml.count("starts", 0, 1);
+  experiment.trace_start = yaml.count("trace_start", 0, 0);
+  experiment.map = configured<MapBuilderConfig>(yaml, "map_parameters");
+  experiment.front_end = configured<LocalizerConfig>(yaml, "parameters");
+  experiment.methods = readMethods(yaml, experiment.front_end);
+  yaml.requireNoMore();
+  const auto kidnapped = std::find_if(experiment.methods.begin(), experiment.methods.end(),
+                                      [](const MethodSpec& method) { return method.kidnapped; });
+  if (!experiment.closed && kidnapped != experiment.methods.end()) {
+    yaml.refuse("methods", "'" + kidnapped->name + "' is kidnapped, which needs closed rounds");
+  }
+  return experiment;
+}
+
+}  // namespace
+
+bool MethodSpec::isTracker() const {
+  const std::vector<std::string>& recognisers = placeRecogniserNames();
+  return std::find(recognisers.begin(), recognisers.end(), tracker) == recognisers.end();
+}
+
+Experiment readExperiment(const std::string& path) {
+  try {
+    return parse(YamlMap::load(path));
+  } catch (const YAML::Exception& error) {
+    throw ParameterError(path + ": not valid: " + error.what());
+  }
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,77 @@
+#include "visual_localization/evaluation/parallel.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace visual_localization {
+namespace {
+
+/// The tasks that are left, shared by the threads that do them.
+class TaskQueue {
+ public:
+  TaskQueue(std::size_t count, const std::function<void(std::size_t)>& task) : count_(count), task_(task) {}
+
+  void work() {
+    for (std::size_t i = next_++; i < count_; i = next_++) {
+      try {
+        task_(i);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (!error_) error_ = std::current_exception();
+        next_ = count_;
+      }
+      ++done_;
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++finished_threads_;
+    changed_.notify_all();
+  }
+
+  void waitFor(std::size_t threads, const ProgressCallback& progress) {
+    constexpr std::chrono::milliseconds kInterval{100};
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!changed_.wait_for(lock, kInterval, [&] { return finished_threads_ == threads; })) {
+      if (!progress) continue;
+      lock.unlock();
+      progress(done_, count_);
+      lock.lock();
+    }
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  const std::size_t count_;
+  const std::function<void(std::size_t)>& task_;
+  std::atomic<std::size_t> next_{0};
+  std::atomic<std::size_t> done_{0};
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::exception_ptr error_;
+  std::size_t finished_threads_ = 0;
+};
+
+}  // namespace
+
+void parallelFor(std::size_t count, std::size_t threads, const std::function<void(std::size_t)>& task,
+                 const ProgressCallback& progress) {
+  TaskQueue queue(count, task);
+  const std::size_t workers = std::max<std::size_t>(1, std::min(threads, count));
+  std::vector<std::thread> pool;
+  for (std::size_t i = 0; i < workers; ++i) pool.emplace_back([&queue] { queue.work(); });
+  std::exception_ptr error;
+  try {
+    queue.waitFor(workers, progress);
+  } catch (...) {
+    error = std::current_exception();
+  }
+  for (std::thread& thread : pool) thread.join();
+  if (error) std::rethrow_exception(error);
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,203 @@
+#include "visual_localization/evaluation/result_tables.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <locale>
+#include <sstream>
+#include <utility>
+
+#include "visual_localization/io/partial_file.h"
+
+namespace visual_localization {
+namespace {
+
+const char* const kMeasures =
+    "runs,mean_err_m,std_err_m,comparisons_per_image,ms_per_image,sift_share,median_err_m,within_5m,steps_to_localise,"
+    "steps_to_relocalise,recall_at_p99,extract_ms,match_ms,update_ms";
+
+/// A field of a CSV file (RFC 4180).
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+std::ostringstream table(const std::string& header) {
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out.precision(6);
+  out << header << '\n';
+  return out;
+}
+
+double medianOf(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Mean of a figure over runs, each counted by its images.
+template <class Figure>
+double meanOf(const std::vector<RunFigures>& runs, Figure figure) {
+  double sum = 0.0;
+  double images = 0.0;
+  for (const RunFigures& run : runs) {
+    sum += static_cast<double>(run.images) * figure(run);
+    images += static_cast<double>(run.images);
+  }
+  return sum / images;
+}
+
+/// Standard deviation of the runs' mean errors, as the papers' tables give it.
+double deviationOf(const std::vector<RunFigures>& runs) {
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const RunFigures& run : runs) {
+    sum += run.mean_err_m;
+    squares += run.mean_err_m * run.mean_err_m;
+  }
+  const auto count = static_cast<double>(runs.size());
+  return std::sqrt(std::max(0.0, squares / count - sum * sum / (count * count)));
+}
+
+/// One method on several pairs.
+std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
+  std::vector<RunFigures> runs;
+  double median_m = 0.0;
+  double recall = 0.0;
+  for (const UnitResult& unit : units) {
+    runs.insert(runs.end(), unit.runs.begin(), unit.runs.end());
+    median_m += unit.median_err_m / static_cast<double>(units.size());
+    recall += unit.recall_at_p99 / static_cast<double>(units.size());
+  }
+  std::vector<double> localised;
+  std::vector<double> relocalised;
+  for (const RunFigures& run : runs) {
+    localised.push_back(static_cast<double>(run.steps_to_localise));
+    relocalised.push_back(static_cast<double>(run.steps_to_relocalise));
+  }
+  const double extract_ms = meanOf(runs, [](const RunFigures& run) { return run.extract_ms; });
+  const double match_ms = meanOf(runs, [](const RunFigures& run) { return run.match_ms; });
+  const double update_ms = meanOf(runs, [](const RunFigures& run) { return run.update_ms; });
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out << runs.size() << ',' << meanOf(runs, [](const RunFigures& run) { return run.mean_err_m; }) << ','
+      << deviationOf(runs) << ',' << meanOf(runs, [](const RunFigures& run) { return run.comparisons_per_image; })
+      << ',' << extract_ms + match_ms + update_ms << ','
+      << meanOf(runs, [](const RunFigures& run) { return run.sift_share; }) << ',' << median_m << ','
+      << meanOf(runs, [](const RunFigures& run) { return run.within_5m; }) << ',' << medianOf(localised) << ',';
+  if (kidnapped) out << medianOf(relocalised);
+  out << ',' << recall << ',' << extract_ms << ',' << match_ms << ',' << update_ms;
+  return out.str();
+}
+
+using Groups = std::pair<std::string, std::string>;
+
+/// Indices of pairs by the groups of their rounds, in the order of the experiment.
+std::vector<std::pair<Groups, std::vector<std::size_t>>> pairsByGroups(const Experiment& experiment) {
+  std::vector<std::pair<Groups, std::vector<std::size_t>>> sorted;
+  for (std::size_t i = 0; i < experiment.pairs.size(); ++i) {
+    const Groups groups{experiment.rounds[experiment.pairs[i].map].group,
+                        experiment.rounds[experiment.pairs[i].drive].group};
+    const auto found =
+        std::find_if(sorted.begin(), sorted.end(), [&groups](const auto& entry) { return entry.first == groups; });
+    auto& entry = found == sorted.end() ? sorted.emplace_back(groups, std::vector<std::size_t>()) : *found;
+    entry.second.push_back(i);
+  }
+  return sorted;
+}
+
+std::vector<StepSums> sumOfSteps(const std::vector<UnitResult>& units) {
+  std::vector<StepSums> sums;
+  for (const UnitResult& unit : units) {
+    if (sums.size() < unit.steps.size()) sums.resize(unit.steps.size());
+    for (std::size_t i = 0; i < unit.steps.size(); ++i) {
+      sums[i].runs += unit.steps[i].runs;
+      sums[i].judged += unit.steps[i].judged;
+      sums[i].err_m += unit.steps[i].err_m;
+      sums[i].comparisons += unit.steps[i].comparisons;
+      sums[i].sift += unit.steps[i].sift;
+    }
+  }
+  return sums;
+}
+
+void addSteps(const std::vector<StepSums>& steps, const std::string& prefix, std::ostringstream& out) {
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const auto runs = static_cast<double>(steps[i].runs);
+    out << prefix << ',' << i << ',';
+    if (steps[i].judged > 0) out << steps[i].err_m / static_cast<double>(steps[i].judged);
+    out << ',' << static_cast<double>(steps[i].comparisons) / runs << ',' << static_cast<double>(steps[i].sift) / runs
+        << '\n';
+  }
+}
+
+void writeGroupTables(const Experiment& experiment, const ResultFolder& results) {
+  std::ostringstream summary = table(std::string("experiment,train_group,test_group,method,") + kMeasures);
+  std::ostringstream steps = table("train_group,test_group,method,step,mean_err_m,comparisons,sift_share");
+  for (const auto& [groups, pairs] : pairsByGroups(experiment)) {
+    for (std::size_t method = 0; method < experiment.methods.size(); ++method) {
+      const MethodSpec& spec = experiment.methods[method];
+      std::vector<UnitResult> units;
+      for (const std::size_t pair : pairs) units.push_back(results.load(pair, method));
+      const std::string prefix = field(groups.first) + ',' + field(groups.second) + ',' + field(spec.name);
+      summary << field(experiment.name) << ',' << prefix << ',' << measuresOf(units, spec.kidnapped) << '\n';
+      addSteps(sumOfSteps(units), prefix, steps);
+    }
+  }
+  writeFile(results.path() + "/steps.csv", steps.str());
+  writeFile(results.path() + "/summary.csv", summary.str());
+}
+
+void writePairTables(const Experiment& experiment, const ResultFolder& results) {
+  std::ostringstream measures = table(std::string("train_round,test_round,train_group,test_group,method,") + kMeasures);
+  std::ostringstream traces = table(std::string("train_round,test_round,method,") + kTraceColumns);
+  for (std::size_t pair = 0; pair < experiment.pairs.size(); ++pair) {
+    const RoundSpec& map = experiment.rounds[experiment.pairs[pair].map];
+    const RoundSpec& drive = experiment.rounds[experiment.pairs[pair].drive];
+    for (std::size_t method = 0; method < experiment.methods.size(); ++method) {
+      const MethodSpec& spec = experiment.methods[method];
+      const UnitResult unit = results.load(pair, method);
+      measures << field(map.name) << ',' << field(drive.name) << ',' << field(map.group) << ',' << field(drive.group)
+               << ',' << field(spec.name) << ',' << measuresOf({unit}, spec.kidnapped) << '\n';
+      const std::string prefix = field(map.name) + ',' + field(drive.name) + ',' + field(spec.name) + ',';
+      for (const std::string& row : unit.trace) traces << prefix << row << '\n';
+    }
+  }
+  writeFile(results.path() + "/pairs.csv", measures.str());
+  writeFile(results.path() + "/traces.csv", traces.str());
+}
+
+void writeMethods(const Experiment& experiment, const ResultFolder& results) {
+  std::ostringstream out = table("method,key,value");
+  for (const MethodSpec& method : experiment.methods) {
+    for (const auto& [key, value] : method.settings) {
+      out << field(method.name) << ',' << field(key) << ',' << field(value) << '\n';
+    }
+  }
+  writeFile(results.path() + "/methods.csv", out.str());
+}
+
+void requireComplete(const Experiment& experiment, const ResultFolder& results) {
+  for (std::size_t pair = 0; pair < experiment.pairs.size(); ++pair) {
+    for (std::size_t method = 0; method < experiment.methods.size(); ++method) {
+      if (results.has(pair, method)) continue;
+      throw ResultError(results.path() + ": the result of '" + experiment.methods[method].name + "' with map " +
+                        experiment.rounds[experiment.pairs[pair].map].name + " and drive " +
+                        experiment.rounds[experiment.pairs[pair].drive].name + " is missing");
+    }
+  }
+}
+
+}  // namespace
+
+void writeResultTables(const Experiment& experiment, const ResultFolder& results) {
+  requireComplete(experiment, results);
+  writeMethods(experiment, results);
+  writePairTables(experiment, results);
+  writeGroupTables(experiment, results);
+}
+
+}  // namespace visual_localization

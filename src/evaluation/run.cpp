@@ -1,0 +1,80 @@
+#include "visual_localization/evaluation/run.h"
+
+#include <cmath>
+#include <limits>
+
+#include "visual_localization/evaluation/image_order.h"
+#include "visual_localization/localizer/stopwatch.h"
+
+namespace visual_localization {
+namespace {
+
+/// Images from step `begin` on until the first of three right estimates in a row; all of them when that never comes.
+std::size_t stepsUntilRight(const std::vector<StepRecord>& steps, std::size_t begin, std::size_t end) {
+  constexpr std::size_t kInARow = 3;
+  std::size_t right = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    right = steps[i].error_m < kRight_m ? right + 1 : 0;
+    if (right == kInARow) return i + 2 - kInARow - begin;
+  }
+  return end - begin;
+}
+
+/// Counts the extractions that a live front end would have made.
+class ExtractionCounter {
+ public:
+  void add(const RecordedImage& image, RunRecord& record) {
+    const bool sift = image.siftComparisons() > 0;
+    // Pruning needs the SIFT features of the image before; a hybrid that comes from global features has none yet.
+    if (sift) record.sift_extractions += first_ || previous_had_sift_ ? 1 : 2;
+    if (image.globalComparisons() > 0) ++record.global_extractions;
+    record.sift_comparisons += image.siftComparisons();
+    record.global_comparisons += image.globalComparisons();
+    previous_had_sift_ = sift;
+    first_ = false;
+  }
+
+ private:
+  bool first_ = true;
+  bool previous_had_sift_ = false;
+};
+
+float errorOf(const Eigen::Vector2d& position_m, const DriveImage& image, const TrainingMap& map) {
+  if (!image.truth) return std::numeric_limits<float>::quiet_NaN();
+  return static_cast<float>((position_m - map.frame().toEastNorth(*image.truth)).norm());
+}
+
+/// Different for every run, the same whenever it is repeated.
+std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
+  return static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start);
+}
+
+}  // namespace
+
+RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace) {
+  const SiftSimilarity sift(method.localizer.match, method.localizer.similarity);
+  const GlobalSimilarity global(method.localizer.similarity);
+  const auto contestant = makeContestant(method, context.map, seedOf(method, start), context.closed);
+  const std::vector<std::size_t> order =
+      imageOrder(context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped});
+  RunRecord record;
+  record.start = start;
+  ExtractionCounter counter;
+  for (std::size_t i : order) {
+    const DriveImage& shown = context.drive.images[i];
+    RecordedImage image(context.table, i, sift, global);
+    const Stopwatch stopwatch;
+    const Verdict verdict = contestant->process(shown.stamp_ns, image);
+    record.method_ms += stopwatch.elapsed_ms();
+    counter.add(image, record);
+    record.steps.push_back({errorOf(verdict.position_m, shown, *context.map), static_cast<float>(verdict.confidence),
+                            static_cast<std::uint32_t>(verdict.comparisons), verdict.features == FeatureKind::kSift});
+    if (trace && verdict.estimate) record.trace.push_back({i, contestant->diversity_m(), *verdict.estimate});
+  }
+  const std::size_t half = method.kidnapped ? order.size() / 2 : order.size();
+  record.steps_to_localise = stepsUntilRight(record.steps, 0, half);
+  record.steps_to_relocalise = stepsUntilRight(record.steps, half, order.size());
+  return record;
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,68 @@
+#include "visual_localization/evaluation/score_table.h"
+
+#include "visual_localization/evaluation/parallel.h"
+#include "visual_localization/localizer/stopwatch.h"
+
+namespace visual_localization {
+namespace {
+
+/// Times of one row, so that no two threads write to the same place.
+struct RowTimes {
+  double sift_ms = 0.0;
+  double global_ms = 0.0;
+};
+
+RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimilarity& sift,
+                 const GlobalSimilarity& global, ScoreTable::Entry* row) {
+  RowTimes times;
+  const Stopwatch sift_watch;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const Score score = sift.compare(image.sift, map.image(i).sift);
+    row[i].sift = score.similarity;
+    row[i].matches = static_cast<std::uint32_t>(score.matches);
+  }
+  times.sift_ms = sift_watch.elapsed_ms();
+  const Stopwatch global_watch;
+  for (std::size_t i = 0; i < map.size(); ++i)
+    row[i].global = global.compare(image.global, map.image(i).global).similarity;
+  times.global_ms = global_watch.elapsed_ms();
+  return times;
+}
+
+}  // namespace
+
+ScoreTable::ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads)
+    : training_images_(map.size()), entries_(drive.images.size() * map.size()) {
+  const SimilarityConfig config;  // what a similarity means is each method's own; the similarity itself is not
+  const SiftSimilarity sift(match, config);
+  const GlobalSimilarity global(config);
+  std::vector<RowTimes> times(drive.images.size());
+  parallelFor(drive.images.size(), threads, [&](std::size_t i) {
+    times[i] = fillRow(drive.images[i], map, sift, global, &entries_[i * training_images_]);
+  });
+  for (const RowTimes& row : times) {
+    sift_compare_ms_ += row.sift_ms / static_cast<double>(entries_.size());
+    global_compare_ms_ += row.global_ms / static_cast<double>(entries_.size());
+  }
+}
+
+Score RecordedImage::compare(FeatureKind kind, std::size_t training_image) {
+  const ScoreTable::Entry& entry = table_.at(drive_image_, training_image);
+  if (kind == FeatureKind::kSift) {
+    ++sift_comparisons_;
+    return sift_.scoreOf(entry.sift, entry.matches);
+  }
+  ++global_comparisons_;
+  return global_.scoreOf(entry.global);
+}
+
+void RecordedImage::row(FeatureKind kind, std::vector<double>& similarities) {
+  similarities.resize(table_.trainingImages());
+  for (std::size_t i = 0; i < similarities.size(); ++i) {
+    const ScoreTable::Entry& entry = table_.at(drive_image_, i);
+    similarities[i] = kind == FeatureKind::kSift ? entry.sift : entry.global;
+  }
+  (kind == FeatureKind::kSift ? sift_comparisons_ : global_comparisons_) += similarities.size();
+}
+
+}  // namespace visual_localization

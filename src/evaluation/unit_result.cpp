@@ -1,0 +1,186 @@
+#include "visual_localization/evaluation/unit_result.h"
+
+#include <cmath>
+#include <limits>
+#include <locale>
+#include <sstream>
+#include <stdexcept>
+
+#include "visual_localization/evaluation/error_statistics.h"
+#include "visual_localization/evaluation/precision_recall.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kPrecision = 0.99;
+
+std::ostringstream numbers() {
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out.precision(std::numeric_limits<double>::digits10);
+  return out;
+}
+
+RunFigures figuresOf(const RunRecord& run, const StageCosts& costs) {
+  RunFigures figures;
+  figures.start = run.start;
+  figures.images = run.steps.size();
+  figures.steps_to_localise = run.steps_to_localise;
+  figures.steps_to_relocalise = run.steps_to_relocalise;
+  for (const StepRecord& step : run.steps) {
+    figures.comparisons_per_image += step.comparisons;
+    figures.sift_share += step.sift ? 1.0 : 0.0;
+    if (std::isnan(step.error_m)) continue;
+    ++figures.judged;
+    figures.mean_err_m += static_cast<double>(step.error_m);
+    figures.within_5m += static_cast<double>(step.error_m) < kRight_m ? 1.0 : 0.0;
+  }
+  const auto images = static_cast<double>(figures.images);
+  const auto judged = static_cast<double>(std::max<std::size_t>(1, figures.judged));
+  figures.mean_err_m /= judged;
+  figures.within_5m /= judged;
+  figures.comparisons_per_image /= images;
+  figures.sift_share /= images;
+  figures.extract_ms = (static_cast<double>(run.sift_extractions) * costs.sift_extraction_ms +
+                        static_cast<double>(run.global_extractions) * costs.global_extraction_ms) /
+                       images;
+  figures.match_ms = (static_cast<double>(run.sift_comparisons) * costs.sift_comparison_ms +
+                      static_cast<double>(run.global_comparisons) * costs.global_comparison_ms) /
+                     images;
+  figures.update_ms = run.method_ms / images;
+  return figures;
+}
+
+void add(const StepRecord& step, StepSums& sums) {
+  ++sums.runs;
+  sums.comparisons += step.comparisons;
+  sums.sift += step.sift ? 1 : 0;
+  if (std::isnan(step.error_m)) return;
+  ++sums.judged;
+  sums.err_m += static_cast<double>(step.error_m);
+}
+
+std::string traceRow(const RunRecord& run, std::size_t step) {
+  const TraceRecord& trace = run.trace[step];
+  const Estimate& estimate = trace.estimate;
+  const TrackerTuning& tuning = estimate.tuning;
+  std::ostringstream out = numbers();
+  out << run.start << ',' << step << ',' << trace.image << ',';
+  if (!std::isnan(run.steps[step].error_m)) out << run.steps[step].error_m;
+  if (tuning.v0 > 0.0) {
+    out << ',' << tuning.v0 << ',' << tuning.speed_ema << ',' << tuning.quantum_share << ',' << tuning.phi2;
+  } else {
+    out << ",,,,";  // a particle filter has nothing to tune
+  }
+  out << ',' << (tuning.recovering ? 1 : 0) << ',' << estimate.spread_m.x() << ',' << estimate.spread_m.y() << ','
+      << trace.diversity_m << ',' << estimate.best.similarity << ',' << estimate.comparisons << ','
+      << toString(estimate.features);
+  return out.str();
+}
+
+/// Reads lines of a section until an empty one.
+class SectionReader {
+ public:
+  explicit SectionReader(const std::string& text) : in_(text) {}
+
+  void expect(const std::string& title) {
+    std::string line;
+    if (!std::getline(in_, line) || line != title) throw std::runtime_error("section '" + title + "' is missing");
+  }
+  bool next(std::string& line) {
+    if (!std::getline(in_, line)) throw std::runtime_error("is cut off");
+    return !line.empty();
+  }
+
+ private:
+  std::istringstream in_;
+};
+
+/// The numbers of one line, in the order in which they were written.
+class NumberReader {
+ public:
+  explicit NumberReader(const std::string& line) : in_(line) { in_.imbue(std::locale::classic()); }
+
+  template <class Number>
+  NumberReader& operator>>(Number& number) {
+    if (!(in_ >> number)) throw std::runtime_error("has a line that is no list of numbers");
+    in_.ignore(1, ',');
+    return *this;
+  }
+
+ private:
+  std::istringstream in_;
+};
+
+}  // namespace
+
+const char* const kTraceColumns =
+    "start,step,image,err_m,v0,speed_ema,quantum_share,phi2,recovering,spread_x_m,spread_y_m,diversity_m,similarity,"
+    "comparisons,features";
+
+UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& costs) {
+  UnitResult unit;
+  std::vector<double> errors_m;
+  std::vector<Decision> decisions;
+  for (const RunRecord& run : runs) {
+    unit.runs.push_back(figuresOf(run, costs));
+    if (unit.steps.size() < run.steps.size()) unit.steps.resize(run.steps.size());
+    for (std::size_t i = 0; i < run.steps.size(); ++i) {
+      const StepRecord& step = run.steps[i];
+      add(step, unit.steps[i]);
+      if (std::isnan(step.error_m)) continue;
+      errors_m.push_back(static_cast<double>(step.error_m));
+      decisions.push_back({static_cast<double>(step.confidence), errors_m.back() < kRight_m});
+    }
+    for (std::size_t i = 0; i < run.trace.size(); ++i) unit.trace.push_back(traceRow(run, i));
+  }
+  unit.median_err_m = summarise(std::move(errors_m)).median_m;
+  unit.recall_at_p99 = recallAtPrecision(std::move(decisions), kPrecision);
+  return unit;
+}
+
+std::string serialise(const UnitResult& unit) {
+  std::ostringstream out = numbers();
+  out << "runs\n";
+  for (const RunFigures& run : unit.runs) {
+    out << run.start << ',' << run.images << ',' << run.judged << ',' << run.mean_err_m << ',' << run.within_5m << ','
+        << run.comparisons_per_image << ',' << run.sift_share << ',' << run.steps_to_localise << ','
+        << run.steps_to_relocalise << ',' << run.extract_ms << ',' << run.match_ms << ',' << run.update_ms << '\n';
+  }
+  out << "\nsteps\n";
+  for (const StepSums& step : unit.steps) {
+    out << step.runs << ',' << step.judged << ',' << step.err_m << ',' << step.comparisons << ',' << step.sift << '\n';
+  }
+  out << "\ntrace\n";
+  for (const std::string& row : unit.trace) out << row << '\n';
+  out << "\nall\n" << unit.median_err_m << ',' << unit.recall_at_p99 << "\n\n";
+  return out.str();
+}
+
+UnitResult parseUnit(const std::string& text) {
+  UnitResult unit;
+  SectionReader sections(text);
+  std::string line;
+  sections.expect("runs");
+  while (sections.next(line)) {
+    RunFigures run;
+    NumberReader(line) >> run.start >> run.images >> run.judged >> run.mean_err_m >> run.within_5m >>
+        run.comparisons_per_image >> run.sift_share >> run.steps_to_localise >> run.steps_to_relocalise >>
+        run.extract_ms >> run.match_ms >> run.update_ms;
+    unit.runs.push_back(run);
+  }
+  sections.expect("steps");
+  while (sections.next(line)) {
+    StepSums step;
+    NumberReader(line) >> step.runs >> step.judged >> step.err_m >> step.comparisons >> step.sift;
+    unit.steps.push_back(step);
+  }
+  sections.expect("trace");
+  while (sections.next(line)) unit.trace.push_back(line);
+  sections.expect("all");
+  while (sections.next(line)) NumberReader(line) >> unit.median_err_m >> unit.recall_at_p99;
+  if (unit.runs.empty()) throw std::runtime_error("has no run");
+  return unit;
+}
+
+}  // namespace visual_localization

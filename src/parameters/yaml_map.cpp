@@ -1,0 +1,187 @@
+#include "visual_localization/parameters/yaml_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace visual_localization::parameters {
+namespace {
+
+/// `depth`: how many mappings more are accepted; an alias may refer to the mapping that it is in.
+void flattenInto(const YAML::Node& node, const std::string& prefix, const std::string& path, int depth,
+                 ParameterValues& out) {
+  if (depth == 0) throw ParameterError(path + ": key '" + prefix + "' is nested too deeply");
+  for (const auto& entry : node) {
+    const auto key = entry.first.as<std::string>();
+    const std::string name = prefix.empty() ? key : prefix + "/" + key;
+    if (entry.second.IsMap()) {
+      flattenInto(entry.second, name, path, depth - 1, out);
+    } else if (entry.second.IsScalar()) {
+      // A quoted scalar carries the tag "!": it stays a string even when it looks like a number.
+      const std::string text = entry.second.Scalar();
+      out[name] = entry.second.Tag() == "!" ? ParameterValue(text) : parseScalar(text);
+    } else {
+      throw ParameterError(path + ": key '" + name + "' must be a single value or a mapping");
+    }
+  }
+}
+
+std::string quoted(const std::string& text) { return "'" + text + "'"; }
+
+}  // namespace
+
+ParameterValues flatten(const YAML::Node& mapping, const std::string& path) {
+  constexpr int kDeepestNesting = 8;
+  ParameterValues out;
+  flattenInto(mapping, "", path, kDeepestNesting, out);
+  return out;
+}
+
+YamlMap::YamlMap(YAML::Node node, std::string path, std::string prefix)
+    : node_(std::move(node)), path_(std::move(path)), prefix_(std::move(prefix)) {}
+
+YamlMap YamlMap::load(const std::string& path) {
+  try {
+    const YAML::Node root = YAML::LoadFile(path);
+    if (!root.IsMap()) throw ParameterError(path + ": must be a mapping");
+    return {root, path, ""};
+  } catch (const YAML::BadFile&) {
+    throw ParameterError(path + ": cannot be opened");
+  } catch (const YAML::Exception& error) {
+    throw ParameterError(path + ": not valid YAML: " + error.what());
+  }
+}
+
+bool YamlMap::has(const std::string& key) const { return node_[key].IsDefined() && !node_[key].IsNull(); }
+
+YAML::Node YamlMap::take(const std::string& key) {
+  known_.insert(key);
+  return has(key) ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+}
+
+YAML::Node YamlMap::takeRequired(const std::string& key) {
+  const YAML::Node value = take(key);
+  if (!value.IsDefined()) refuse(key, "is missing");
+  return value;
+}
+
+std::string YamlMap::text(const std::string& key) {
+  const YAML::Node value = takeRequired(key);
+  if (!value.IsScalar()) refuse(key, "must be a single value");
+  return value.Scalar();
+}
+
+std::string YamlMap::text(const std::string& key, const std::string& otherwise) {
+  known_.insert(key);
+  return has(key) ? text(key) : otherwise;
+}
+
+bool YamlMap::flag(const std::string& key, bool otherwise) {
+  const std::string value = text(key, otherwise ? "true" : "false");
+  const ParameterValue parsed = parseScalar(value);
+  if (!std::holds_alternative<bool>(parsed)) refuse(key, "= " + value + " must be true or false");
+  return std::get<bool>(parsed);
+}
+
+double YamlMap::real(const std::string& key, double otherwise, double min, double max) {
+  if (!has(key)) {
+    known_.insert(key);
+    return otherwise;
+  }
+  const std::string value = text(key);
+  double parsed = std::nan("");
+  const bool is_number = YAML::convert<double>::decode(YAML::Node(value), parsed);
+  if (!is_number || !(parsed >= min && parsed <= max)) {
+    refuse(key, "= " + value + " must be a number in [" + toString(min) + ", " + toString(max) + "]");
+  }
+  return parsed;
+}
+
+std::size_t YamlMap::count(const std::string& key, std::size_t otherwise, std::size_t min) {
+  if (!has(key)) {
+    known_.insert(key);
+    return otherwise;
+  }
+  const std::string value = text(key);
+  std::int64_t parsed = -1;
+  const bool is_number = YAML::convert<std::int64_t>::decode(YAML::Node(value), parsed);
+  if (!is_number || parsed < static_cast<std::int64_t>(min)) {
+    refuse(key, "= " + value + " must be an integer of at least " + std::to_string(min));
+  }
+  return static_cast<std::size_t>(parsed);
+}
+
+YamlMap YamlMap::map(const std::string& key) {
+  const YAML::Node value = takeRequired(key);
+  if (!value.IsMap()) refuse(key, "must be a mapping");
+  return {value, path_, prefix_ + key + "/"};
+}
+
+std::vector<YamlMap> YamlMap::maps(const std::string& key) {
+  const YAML::Node value = takeRequired(key);
+  if (!value.IsSequence() || value.size() == 0) refuse(key, "must be a list of mappings");
+  std::vector<YamlMap> maps;
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (!value[i].IsMap()) refuse(key, "must be a list of mappings");
+    maps.push_back({value[i], path_, prefix_ + key + "[" + std::to_string(i) + "]/"});
+  }
+  return maps;
+}
+
+std::vector<std::vector<std::string>> YamlMap::textLists(const std::string& key, std::size_t length) {
+  const YAML::Node value = takeRequired(key);
+  const std::string expected = "must be a list of lists of " + std::to_string(length) + " names";
+  if (!value.IsSequence() || value.size() == 0) refuse(key, expected);
+  std::vector<std::vector<std::string>> lists;
+  for (const YAML::Node& item : value) {
+    if (!item.IsSequence() || item.size() != length) refuse(key, expected);
+    std::vector<std::string> list;
+    for (const YAML::Node& name : item) {
+      if (!name.IsScalar()) refuse(key, expected);
+      list.push_back(name.Scalar());
+    }
+    lists.push_back(std::move(list));
+  }
+  return lists;
+}
+
+ParameterValues YamlMap::parameters(const std::string& key) {
+  const YAML::Node value = take(key);
+  if (!value.IsDefined()) return {};
+  if (!value.IsMap()) refuse(key, "must be a mapping of parameter names to values");
+  return flatten(value, path_ + ": " + prefix_ + key);
+}
+
+std::vector<std::pair<std::string, std::vector<std::string>>> YamlMap::sweep(const std::string& key) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> sweep;
+  const YAML::Node value = take(key);
+  if (!value.IsDefined()) return sweep;
+  const std::string expected = "must be a mapping of parameter names to lists of values";
+  if (!value.IsMap()) refuse(key, expected);
+  for (const auto& entry : value) {
+    if (!entry.second.IsSequence() || entry.second.size() == 0) refuse(key, expected);
+    std::vector<std::string> values;
+    for (const YAML::Node& item : entry.second) {
+      if (!item.IsScalar()) refuse(key, expected);
+      values.push_back(item.Scalar());
+    }
+    sweep.emplace_back(entry.first.as<std::string>(), std::move(values));
+  }
+  return sweep;
+}
+
+void YamlMap::requireNoMore() const {
+  for (const auto& entry : node_) {
+    const auto key = entry.first.as<std::string>();
+    if (known_.count(key) != 0) continue;
+    std::string allowed;
+    for (const std::string& name : known_) allowed += (allowed.empty() ? "" : ", ") + name;
+    refuse(key, "is unknown; allowed here: " + allowed);
+  }
+}
+
+void YamlMap::refuse(const std::string& key, const std::string& why) const {
+  throw ParameterError(path_ + ": " + quoted(prefix_ + key) + " " + why);
+}
+
+}  // namespace visual_localization::parameters
