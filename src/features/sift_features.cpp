@@ -1,6 +1,7 @@
 #include "visual_localization/features/sift_features.h"
 
-#include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -11,6 +12,11 @@ SiftFeatures::SiftFeatures(std::vector<SiftKeypoint> keypoints, std::vector<std:
   if (descriptors_.size() != keypoints_.size() * kDescriptorSize) {
     throw std::invalid_argument("SIFT features: " + std::to_string(keypoints_.size()) + " keypoints but " +
                                 std::to_string(descriptors_.size()) + " descriptor bytes");
+  }
+  inverse_norms_.reserve(size());
+  for (std::size_t i = 0; i < size(); ++i) {
+    const std::int32_t squared = std::inner_product(descriptor(i), descriptor(i) + kDescriptorSize, descriptor(i), 0);
+    inverse_norms_.push_back(squared > 0 ? 1.0F / std::sqrt(static_cast<float>(squared)) : 0.0F);
   }
 }
 

@@ -56,6 +56,31 @@ class OrderedResults {
   std::vector<std::pair<double, std::uint32_t>> found_;
 };
 
+/// The best so far, of equals the first. Without any memory to allocate: trackers ask for it per particle and image.
+class NearestResult {
+ public:
+  using DistanceType = double;
+
+  std::size_t size() const { return full() ? 1 : 0; }
+  bool full() const { return index_ != kNone; }
+  bool addPoint(double squared_m2, std::uint32_t index) {
+    if (squared_m2 > squared_m2_ || (squared_m2 == squared_m2_ && index > index_)) return true;
+    squared_m2_ = squared_m2;
+    index_ = index;
+    return true;
+  }
+  double worstDist() const { return squared_m2_ * (1.0 + 1e-9) + std::numeric_limits<double>::min(); }
+  void sort() {}
+
+  Neighbour found() const { return {index_, std::sqrt(squared_m2_)}; }
+
+ private:
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+  double squared_m2_ = std::numeric_limits<double>::max();
+  std::uint32_t index_ = kNone;
+};
+
 }  // namespace
 
 class PositionIndex::Tree {
@@ -64,6 +89,12 @@ class PositionIndex::Tree {
       : points_{std::move(positions_m)}, tree_(2, points_, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
     // Needed up to nanoflann 1.3, where the constructor leaves the tree empty.
     tree_.buildIndex();
+  }
+
+  Neighbour nearest(const Eigen::Vector2d& position_m) const {
+    NearestResult result;
+    tree_.findNeighbors(result, position_m.data(), {});
+    return result.found();
   }
 
   std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
@@ -94,6 +125,11 @@ PositionIndex::PositionIndex(std::vector<Eigen::Vector2d> positions_m) {
 }
 
 PositionIndex::~PositionIndex() = default;
+
+Neighbour PositionIndex::nearest(const Eigen::Vector2d& position_m) const {
+  if (!position_m.allFinite()) throw std::invalid_argument("position index: the position is not finite");
+  return tree_->nearest(position_m);
+}
 
 std::vector<Neighbour> PositionIndex::nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
   if (count == 0 || !position_m.allFinite()) return {};

@@ -60,11 +60,7 @@ TrainingMap::TrainingMap(MapHeader header, std::vector<TrainingImage> images)
       area_(boundingBox(images_)),
       index_(positionsOf(images_)) {}
 
-Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const {
-  const std::vector<Neighbour> found = index_.nearest(position_m, 1);
-  if (found.empty()) throw std::invalid_argument("training map: nearest image to a position that is not finite");
-  return found.front();
-}
+Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const { return index_.nearest(position_m); }
 
 std::vector<Neighbour> TrainingMap::nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
   return index_.nearest(position_m, count);

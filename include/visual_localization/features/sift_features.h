@@ -28,6 +28,8 @@ class SiftFeatures {
   const std::vector<SiftKeypoint>& keypoints() const { return keypoints_; }
   const std::vector<std::uint8_t>& descriptors() const { return descriptors_; }
   const std::uint8_t* descriptor(std::size_t i) const { return descriptors_.data() + i * kDescriptorSize; }
+  /// 1 / |descriptor i|; 0 for the zero vector.
+  float inverseNorm(std::size_t i) const { return inverse_norms_[i]; }
 
   /// The features at `indices`, in that order.
   SiftFeatures subset(const std::vector<std::size_t>& indices) const;
@@ -35,6 +37,7 @@ class SiftFeatures {
  private:
   std::vector<SiftKeypoint> keypoints_;
   std::vector<std::uint8_t> descriptors_;
+  std::vector<float> inverse_norms_;
 };
 
 }  // namespace visual_localization

@@ -24,6 +24,8 @@ class PositionIndex {
   PositionIndex(const PositionIndex&) = delete;
   PositionIndex& operator=(const PositionIndex&) = delete;
 
+  /// The nearest. Throws std::invalid_argument when `position_m` is not finite.
+  Neighbour nearest(const Eigen::Vector2d& position_m) const;
   /// The `count` nearest, closest first; fewer when there are fewer. A position that is not finite has none.
   std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const;
 

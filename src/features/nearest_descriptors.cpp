@@ -1,0 +1,238 @@
+// Compiled once for each kind of CPU by foreach_target.h; HWY_DYNAMIC_DISPATCH takes the best one at run time.
+// Vectors whose length is not known to the compiler cannot be kept in arrays, as it is done here.
+#define HWY_WANT_AVX3_DL
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/features/nearest_descriptors.cpp"
+#include "visual_localization/features/nearest_descriptors.h"
+
+#include <cmath>
+#include <cstring>
+
+#include <hwy/aligned_allocator.h>
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+#if HWY_TARGET == HWY_AVX3_DL
+HWY_PUSH_ATTRIBUTES("avx512vnni")  // which Highway asks of such a CPU, but does not tell the compiler
+#endif
+namespace visual_localization {
+namespace HWY_NAMESPACE {
+namespace {
+
+#if HWY_TARGET == HWY_SCALAR
+void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+  findNearestPlain(a, b, nearest);
+}
+#else
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Ints = hn::ScalableTag<std::int32_t>;
+using Floats = hn::ScalableTag<float>;
+using Shorts = hn::Repartition<std::int16_t, Ints>;
+
+constexpr std::size_t kBins = SiftFeatures::kDescriptorSize;
+
+/// Descriptors of one image side by side, so that one vector instruction takes a step in as many scalar products as
+/// it has lanes: for each tile of that many descriptors, for each group of bins, the groups of all of them.
+///
+/// CPUs with VNNI multiply four unsigned by four signed bytes in a step, so there a group is four bins minus 128, and
+/// the difference, 128 times the sum of the other descriptor, is added back. All others multiply two 16-bit numbers.
+#if HWY_TARGET == HWY_AVX3_DL
+constexpr std::size_t kGroup = 4;
+using Packed = std::uint8_t;
+Packed packed(std::uint8_t bin) { return static_cast<std::uint8_t>(bin ^ 0x80U); }
+#else
+constexpr std::size_t kGroup = 2;
+using Packed = std::int16_t;
+Packed packed(std::uint8_t bin) { return bin; }
+#endif
+constexpr std::size_t kGroups = kBins / kGroup;
+
+void pack(const SiftFeatures& features, std::size_t lanes, std::vector<Packed>& to) {
+  const std::size_t tiles = (features.size() + lanes - 1) / lanes;
+  to.assign(tiles * lanes * kBins, packed(0));
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const std::uint8_t* from = features.descriptor(i);
+    Packed* tile = to.data() + i / lanes * lanes * kBins + i % lanes * kGroup;
+    for (std::size_t group = 0; group < kGroups; ++group) {
+      for (std::size_t bin = 0; bin < kGroup; ++bin) {
+        tile[group * lanes * kGroup + bin] = packed(from[group * kGroup + bin]);
+      }
+    }
+  }
+}
+
+/// One descriptor of the other image, every group of which meets all lanes of a tile at once.
+struct Row {
+  alignas(4) Packed groups[kBins];
+  std::int32_t correction = 0;  ///< what the packing took away from each scalar product
+
+  void set(const std::uint8_t* descriptor) {
+#if HWY_TARGET == HWY_AVX3_DL
+    std::memcpy(groups, descriptor, kBins);
+    correction = 0;
+    for (std::size_t i = 0; i < kBins; ++i) correction += std::int32_t{128} * descriptor[i];
+#else
+    for (std::size_t i = 0; i < kBins; ++i) groups[i] = descriptor[i];
+#endif
+  }
+};
+
+HWY_INLINE hn::Vec<Ints> broadcast(const Row& row, std::size_t group) {
+  std::int32_t bits = 0;
+  std::memcpy(&bits, row.groups + group * kGroup, sizeof(bits));
+  return hn::Set(Ints(), bits);
+}
+
+/// `sum` + the scalar products of one group with a tile's.
+HWY_INLINE hn::Vec<Ints> multiplyAdd(hn::Vec<Ints> row, const Packed* tile, hn::Vec<Ints>& sum, hn::Vec<Ints>& odd) {
+#if HWY_TARGET == HWY_AVX3_DL
+  (void)odd;
+  return hn::Vec<Ints>{_mm512_dpbusd_epi32(sum.raw, row.raw, _mm512_loadu_si512(tile))};
+#else
+  return hn::ReorderWidenMulAccumulate(Ints(), hn::BitCast(Shorts(), row), hn::LoadU(Shorts(), tile), sum, odd);
+#endif
+}
+
+constexpr std::size_t kRows = 4;  ///< of B at a time: each load of a tile serves so many scalar products
+
+/// Scalar products of kRows rows with a tile, one lane each.
+HWY_INLINE void multiply(const Row* rows, const Packed* tile, hn::Vec<Ints>* products) {
+  const Ints ints;
+  const std::size_t step = hn::Lanes(ints) * kGroup;
+  hn::Vec<Ints> s0 = hn::Set(ints, rows[0].correction), s1 = hn::Set(ints, rows[1].correction),
+                s2 = hn::Set(ints, rows[2].correction), s3 = hn::Set(ints, rows[3].correction);
+  hn::Vec<Ints> o0 = hn::Zero(ints), o1 = hn::Zero(ints), o2 = hn::Zero(ints), o3 = hn::Zero(ints);
+  for (std::size_t group = 0; group < kGroups; ++group, tile += step) {
+    s0 = multiplyAdd(broadcast(rows[0], group), tile, s0, o0);
+    s1 = multiplyAdd(broadcast(rows[1], group), tile, s1, o1);
+    s2 = multiplyAdd(broadcast(rows[2], group), tile, s2, o2);
+    s3 = multiplyAdd(broadcast(rows[3], group), tile, s3, o3);
+  }
+#if HWY_TARGET == HWY_AVX3_DL
+  products[0] = s0, products[1] = s1, products[2] = s2, products[3] = s3;
+#else
+  products[0] = hn::RearrangeToOddPlusEven(s0, o0);
+  products[1] = hn::RearrangeToOddPlusEven(s1, o1);
+  products[2] = hn::RearrangeToOddPlusEven(s2, o2);
+  products[3] = hn::RearrangeToOddPlusEven(s3, o3);
+#endif
+}
+
+/// The two nearest of each lane.
+struct Lanes {
+  hn::Vec<Floats> best;
+  hn::Vec<Floats> second;
+  hn::Vec<Ints> index;
+
+  HWY_INLINE void offer(hn::Vec<Floats> cosine, hn::Vec<Ints> candidate) {
+    const auto better = hn::Gt(cosine, best);
+    second = hn::IfThenElse(better, best, hn::Max(second, cosine));
+    best = hn::IfThenElse(better, cosine, best);
+    index = hn::IfThenElse(hn::RebindMask(Ints(), better), candidate, index);
+  }
+};
+
+HWY_INLINE Lanes noLanes() { return {hn::Set(Floats(), -1.0F), hn::Set(Floats(), -1.0F), hn::Zero(Ints())}; }
+
+/// The two nearest over all lanes; of equals the lane with the lowest index.
+HWY_INLINE TwoNearest reduce(const Lanes& lanes) {
+  const Floats floats;
+  const Ints ints;
+  const auto best = hn::MaxOfLanes(floats, lanes.best);
+  const auto is_best = hn::RebindMask(ints, hn::Eq(lanes.best, best));
+  const auto index = hn::MinOfLanes(ints, hn::IfThenElse(is_best, lanes.index, hn::Set(ints, INT32_MAX)));
+  const auto winner = hn::RebindMask(floats, hn::And(is_best, hn::Eq(lanes.index, index)));
+  const auto second = hn::MaxOfLanes(floats, hn::IfThenElse(winner, lanes.second, lanes.best));
+  return {hn::GetLane(best), hn::GetLane(second), static_cast<std::uint32_t>(hn::GetLane(index))};
+}
+
+/// Memory that is kept from call to call.
+struct Workspace {
+  std::vector<Packed> packed;
+  hwy::AlignedFreeUniquePtr<float[]> inverse_norms;
+  hwy::AlignedFreeUniquePtr<float[]> best;
+  hwy::AlignedFreeUniquePtr<float[]> second;
+  hwy::AlignedFreeUniquePtr<std::int32_t[]> index;
+  std::size_t capacity = 0;
+
+  void reserve(std::size_t count) {
+    if (count <= capacity) return;
+    capacity = 2 * count;
+    inverse_norms = hwy::AllocateAligned<float>(capacity);
+    best = hwy::AllocateAligned<float>(capacity);
+    second = hwy::AllocateAligned<float>(capacity);
+    index = hwy::AllocateAligned<std::int32_t>(capacity);
+  }
+};
+
+void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+  const Floats floats;
+  const Ints ints;
+  const std::size_t lanes = hn::Lanes(ints);
+  const std::size_t padded = (a.size() + lanes - 1) / lanes * lanes;
+  static thread_local Workspace work;
+  work.reserve(padded);
+  pack(a, lanes, work.packed);
+  for (std::size_t i = 0; i < padded; ++i) {
+    work.inverse_norms[i] = i < a.size() ? a.inverseNorm(i) : 0.0F;
+    work.best[i] = work.second[i] = -1.0F;
+    work.index[i] = 0;
+  }
+  nearest.of_a.resize(a.size());
+  nearest.of_b.resize(b.size());
+  Row rows[kRows];
+  for (std::size_t first = 0; first < b.size(); first += kRows) {
+    const std::size_t count = HWY_MIN(kRows, b.size() - first);
+    for (std::size_t r = 0; r < count; ++r) rows[r].set(b.descriptor(first + r));
+    Lanes of_row[kRows] = {noLanes(), noLanes(), noLanes(), noLanes()};
+    for (std::size_t i = 0; i < padded; i += lanes) {
+      hn::Vec<Ints> products[kRows];
+      multiply(rows, work.packed.data() + i * kBins, products);
+      const auto inverse_norms = hn::Load(floats, work.inverse_norms.get() + i);
+      Lanes of_tile{hn::Load(floats, work.best.get() + i), hn::Load(floats, work.second.get() + i),
+                    hn::Load(ints, work.index.get() + i)};
+      const auto used = hn::FirstN(floats, a.size() - i);  // the last tile is filled up
+      const auto indices = hn::Iota(ints, static_cast<std::int32_t>(i));
+      for (std::size_t r = 0; r < count; ++r) {
+        const auto product = hn::Mul(hn::Mul(hn::ConvertTo(floats, products[r]), inverse_norms),
+                                     hn::Set(floats, b.inverseNorm(first + r)));
+        const auto cosine = hn::IfThenElse(used, product, hn::Set(floats, -1.0F));
+        of_row[r].offer(cosine, indices);
+        of_tile.offer(cosine, hn::Set(ints, static_cast<std::int32_t>(first + r)));
+      }
+      hn::Store(of_tile.best, floats, work.best.get() + i);
+      hn::Store(of_tile.second, floats, work.second.get() + i);
+      hn::Store(of_tile.index, ints, work.index.get() + i);
+    }
+    for (std::size_t r = 0; r < count; ++r) nearest.of_b[first + r] = reduce(of_row[r]);
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    nearest.of_a[i] = {work.best[i], work.second[i], static_cast<std::uint32_t>(work.index[i])};
+  }
+}
+
+#endif  // HWY_SCALAR
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace visual_localization
+#if HWY_TARGET == HWY_AVX3_DL
+HWY_POP_ATTRIBUTES
+#endif
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace visual_localization {
+
+HWY_EXPORT(findNearestImpl);
+
+void findNearest(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+  HWY_DYNAMIC_DISPATCH(findNearestImpl)(a, b, nearest);
+}
+
+}  // namespace visual_localization
+#endif

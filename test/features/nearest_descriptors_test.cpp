@@ -1,0 +1,118 @@
+#include "visual_localization/features/nearest_descriptors.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "test/support/synthetic.h"
+#include "visual_localization/features/angle_ratio_test.h"
+
+namespace visual_localization {
+namespace {
+
+SiftFeatures withDescriptors(const std::vector<std::vector<std::uint8_t>>& descriptors) {
+  return test::featuresOf(descriptors);
+}
+
+/// Bins up to `largest`, and every `duplicate_every`-th descriptor equal to the one before.
+SiftFeatures randomDescriptors(std::size_t count, int largest, std::size_t duplicate_every, std::mt19937& random) {
+  std::uniform_int_distribution<int> bin(0, largest);
+  std::vector<std::vector<std::uint8_t>> descriptors(count, std::vector<std::uint8_t>(SiftFeatures::kDescriptorSize));
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::uint8_t& value : descriptors[i]) value = static_cast<std::uint8_t>(bin(random));
+    if (i % duplicate_every == duplicate_every - 1) descriptors[i] = descriptors[i - 1];
+  }
+  return withDescriptors(descriptors);
+}
+
+void expectEqual(const std::vector<TwoNearest>& actual, const std::vector<TwoNearest>& expected) {
+  ASSERT_EQ(actual.size(), expected.size());
+  for (std::size_t i = 0; i < actual.size(); ++i) {
+    ASSERT_EQ(actual[i].index, expected[i].index) << i;
+    ASSERT_EQ(actual[i].best, expected[i].best) << i;
+    ASSERT_EQ(actual[i].second, expected[i].second) << i;
+  }
+}
+
+void expectLikePlain(const SiftFeatures& a, const SiftFeatures& b) {
+  NearestDescriptors fast;
+  NearestDescriptors plain;
+  findNearest(a, b, fast);
+  findNearestPlain(a, b, plain);
+  SCOPED_TRACE(std::to_string(a.size()) + " x " + std::to_string(b.size()));
+  expectEqual(fast.of_a, plain.of_a);
+  expectEqual(fast.of_b, plain.of_b);
+}
+
+TEST(NearestDescriptors, AreThoseOfThePlainLoopForEverySize) {
+  std::mt19937 random(1);
+  for (const std::size_t a : {1, 2, 3, 4, 7, 8, 15, 16, 17, 31, 33, 64, 100}) {
+    for (const std::size_t b : {1, 2, 3, 5, 16, 18, 101}) {
+      expectLikePlain(randomDescriptors(a, 255, 5, random), randomDescriptors(b, 255, 5, random));
+    }
+  }
+}
+
+TEST(NearestDescriptors, AreThoseOfThePlainLoopAmongManyEquals) {
+  std::mt19937 random(2);
+  for (int round = 0; round < 20; ++round) {
+    const SiftFeatures a = randomDescriptors(40, 1, 2, random);
+    expectLikePlain(a, randomDescriptors(50, 1, 3, random));
+    expectLikePlain(a, a);
+  }
+}
+
+TEST(NearestDescriptors, ExtremesDoNotOverflow) {
+  const std::vector<std::uint8_t> zero(SiftFeatures::kDescriptorSize, 0);
+  const std::vector<std::uint8_t> full(SiftFeatures::kDescriptorSize, 255);
+  std::vector<std::uint8_t> half = zero;
+  std::fill_n(half.begin(), 64, std::uint8_t{255});
+  const SiftFeatures all = withDescriptors({zero, full, half, zero, full});
+  expectLikePlain(all, all);
+  expectLikePlain(withDescriptors({zero, zero, zero}), all);
+  expectLikePlain(all, withDescriptors({zero, zero}));
+  NearestDescriptors nearest;
+  findNearest(all, all, nearest);
+  EXPECT_FLOAT_EQ(nearest.of_a[1].best, 1.0F);
+  EXPECT_FLOAT_EQ(nearest.of_a[2].second, std::sqrt(0.5F));
+  EXPECT_EQ(nearest.of_a[4].index, 1U) << "the first of equals";
+  EXPECT_EQ(nearest.of_a[0].best, 0.0F) << "the zero vector is orthogonal to everything";
+}
+
+TEST(NearestDescriptors, NothingHasNoNeighbours) {
+  NearestDescriptors nearest;
+  findNearest({}, withDescriptors({std::vector<std::uint8_t>(SiftFeatures::kDescriptorSize, 1)}), nearest);
+  EXPECT_TRUE(nearest.of_a.empty());
+  ASSERT_EQ(nearest.of_b.size(), 1U);
+  EXPECT_EQ(nearest.of_b[0].best, -1.0F);
+}
+
+TEST(AngleRatioTest, DecidesLikeTheAnglesThemselves) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> cosine(0.0F, 1.0F);
+  for (const double ratio : {0.1, 0.6, 0.8, 1.0}) {
+    const AngleRatioTest test(ratio);
+    for (int i = 0; i < 200000; ++i) {
+      const float second = cosine(random);
+      // Half of the pairs lie at the threshold, where rounding decides.
+      const auto threshold = static_cast<float>(std::cos(ratio * std::acos(static_cast<double>(second))));
+      const float best =
+          i % 2 == 0 ? cosine(random) : std::min(1.0F, std::nextafter(threshold, i % 4 == 1 ? 2.0F : 0.0F));
+      const bool expected = std::acos(static_cast<double>(best)) < ratio * std::acos(static_cast<double>(second));
+      ASSERT_EQ(test.passes(best, second), expected) << ratio << ' ' << best << ' ' << second;
+    }
+  }
+}
+
+TEST(AngleRatioTest, HoldsAtTheEnds) {
+  const AngleRatioTest test(0.6);
+  EXPECT_FALSE(test.passes(1.0F, 1.0F)) << "twins";
+  EXPECT_TRUE(test.passes(1.0F, 0.999F));
+  EXPECT_FALSE(test.passes(0.0F, 0.0F));
+  EXPECT_TRUE(test.passes(std::nextafter(1.0F, 2.0F), 0.5F)) << "a cosine above one by rounding";
+  EXPECT_FALSE(test.passes(std::nextafter(1.0F, 2.0F), std::nextafter(1.0F, 2.0F)));
+}
+
+}  // namespace
+}  // namespace visual_localization
