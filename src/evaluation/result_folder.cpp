@@ -5,6 +5,8 @@
 #include <sstream>
 #include <utility>
 
+#include <yaml-cpp/yaml.h>
+
 #include "visual_localization/io/partial_file.h"
 
 namespace visual_localization {
@@ -18,6 +20,23 @@ std::string readFile(const std::string& path) {
   text << file.rdbuf();
   if (!file) throw ResultError(path + ": cannot be read");
   return text.str();
+}
+
+/// The part of an experiment's YAML that decides about results: no comments, no words for the report.
+std::string decisivePart(const std::string& yaml) {
+  YAML::Node node = YAML::Load(yaml);
+  for (const char* words : {"title", "source", "discussion"}) node.remove(words);
+  return YAML::Dump(node);
+}
+
+void requireSameConfiguration(const std::string& folder, const std::string& yaml) {
+  const std::string path = folder + "/experiment.yaml";
+  if (fs::exists(path) && decisivePart(readFile(path)) != decisivePart(yaml)) {
+    throw ResultError(folder +
+                      ": holds results of another configuration (experiment.yaml differs); choose another "
+                      "folder");
+  }
+  writeFile(path, yaml);
 }
 
 /// Keeps `text` as the file `name`, or finds the same text there.
@@ -37,7 +56,7 @@ ResultFolder::ResultFolder(std::string path, const std::string& yaml, const std:
   std::error_code error;
   fs::create_directories(path_ + "/units", error);
   if (error) throw ResultError(path_ + ": cannot be created: " + error.message());
-  requireSame(path_, "experiment.yaml", yaml, "another configuration");
+  requireSameConfiguration(path_, yaml);
   requireSame(path_, "provenance.csv", provenance, "other rounds or another version");
 }
 

@@ -72,8 +72,7 @@ Recognition SequenceMatcher::update(const std::vector<double>& similarities) {
   requireRow(similarities, route_.size());
   route_ = Route(similarities.size(), closed_);
   remember(similarities);
-  scores_.resize(route_.size());
-  for (std::size_t end = 0; end < route_.size(); ++end) scores_[end] = bestLineEndingAt(end);
+  scoreLines();
   const auto best = static_cast<std::size_t>(std::min_element(scores_.begin(), scores_.end()) - scores_.begin());
   return {best, confidence(best)};
 }
@@ -91,19 +90,28 @@ void SequenceMatcher::remember(const std::vector<double>& similarities) {
   columns_.push_back(std::move(column));
 }
 
-double SequenceMatcher::meanDifference(std::size_t end, const std::vector<std::ptrdiff_t>& line) const {
-  double sum = 0.0;
+/// Adds the differences along one line to `sums`, for the lines of this speed ending at every image at once.
+void SequenceMatcher::addLines(const std::vector<std::ptrdiff_t>& line, std::vector<double>& sums) const {
+  const std::size_t images = route_.size();
   for (std::size_t ago = 0; ago < columns_.size(); ++ago) {
-    const auto image = route_.at(end, -line[ago]);
-    if (image) sum += columns_[columns_.size() - 1 - ago][*image];
+    const std::vector<double>& column = columns_[columns_.size() - 1 - ago];
+    const auto back = static_cast<std::size_t>(line[ago]);
+    const std::size_t behind = closed_ ? back % images : std::min(back, images);
+    for (std::size_t end = behind; end < images; ++end) sums[end] += column[end - behind];
+    if (!closed_) continue;  // lines that begin before an open route are no different from the average there
+    for (std::size_t end = 0; end < behind; ++end) sums[end] += column[end + images - behind];
   }
-  return sum / static_cast<double>(columns_.size());
 }
 
-double SequenceMatcher::bestLineEndingAt(std::size_t end) const {
-  double best = std::numeric_limits<double>::infinity();
-  for (const auto& line : lines_) best = std::min(best, meanDifference(end, line));
-  return best;
+/// Mean difference along the best line ending at each image.
+void SequenceMatcher::scoreLines() {
+  scores_.assign(route_.size(), std::numeric_limits<double>::infinity());
+  for (const auto& line : lines_) {
+    sums_.assign(route_.size(), 0.0);
+    addLines(line, sums_);
+    for (std::size_t end = 0; end < scores_.size(); ++end) scores_[end] = std::min(scores_[end], sums_[end]);
+  }
+  for (double& score : scores_) score /= static_cast<double>(columns_.size());
 }
 
 double SequenceMatcher::confidence(std::size_t best) const {

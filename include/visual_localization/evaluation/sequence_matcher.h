@@ -43,8 +43,8 @@ class SequenceMatcher final : public PlaceRecogniser {
 
  private:
   void remember(const std::vector<double>& similarities);
-  double meanDifference(std::size_t end, const std::vector<std::ptrdiff_t>& line) const;
-  double bestLineEndingAt(std::size_t end) const;
+  void addLines(const std::vector<std::ptrdiff_t>& line, std::vector<double>& sums) const;
+  void scoreLines();
   double confidence(std::size_t best) const;
 
   SequenceConfig config_;
@@ -52,6 +52,7 @@ class SequenceMatcher final : public PlaceRecogniser {
   std::vector<std::vector<std::ptrdiff_t>> lines_;  ///< per speed: training images back from the end, newest first
   Route route_;                                     ///< empty until the first image tells how long it is
   std::deque<std::vector<double>> columns_;         ///< locally normalised differences of the last images
+  std::vector<double> sums_;                        ///< along the lines of one speed ending at each training image
   std::vector<double> scores_;                      ///< of the best line ending at each training image
 };
 
