@@ -56,30 +56,8 @@ class OrderedResults {
   std::vector<std::pair<double, std::uint32_t>> found_;
 };
 
-/// The best so far, of equals the first. Without any memory to allocate: trackers ask for it per particle and image.
-class NearestResult {
- public:
-  using DistanceType = double;
-
-  std::size_t size() const { return full() ? 1 : 0; }
-  bool full() const { return index_ != kNone; }
-  bool addPoint(double squared_m2, std::uint32_t index) {
-    if (squared_m2 > squared_m2_ || (squared_m2 == squared_m2_ && index > index_)) return true;
-    squared_m2_ = squared_m2;
-    index_ = index;
-    return true;
-  }
-  double worstDist() const { return squared_m2_ * (1.0 + 1e-9) + std::numeric_limits<double>::min(); }
-  void sort() {}
-
-  Neighbour found() const { return {index_, std::sqrt(squared_m2_)}; }
-
- private:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-
-  double squared_m2_ = std::numeric_limits<double>::max();
-  std::uint32_t index_ = kNone;
-};
+/// Positions up to this number get a grid; building one for a city would take longer than it saves.
+constexpr std::size_t kLargestGrid = 20000;
 
 }  // namespace
 
@@ -91,10 +69,17 @@ class PositionIndex::Tree {
     tree_.buildIndex();
   }
 
-  Neighbour nearest(const Eigen::Vector2d& position_m) const {
-    NearestResult result;
-    tree_.findNeighbors(result, position_m.data(), {});
-    return result.found();
+  const std::vector<Eigen::Vector2d>& positions() const { return points_.positions_m; }
+
+  /// In order of index.
+  std::vector<std::uint32_t> within(const Eigen::Vector2d& centre_m, double radius_m) const {
+    std::vector<std::pair<std::uint32_t, double>> found;
+    tree_.radiusSearch(centre_m.data(), radius_m * radius_m, found, {});
+    std::vector<std::uint32_t> indices;
+    indices.reserve(found.size());
+    for (const auto& [index, squared_m2] : found) indices.push_back(index);
+    std::sort(indices.begin(), indices.end());
+    return indices;
   }
 
   std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
@@ -122,13 +107,19 @@ PositionIndex::PositionIndex(std::vector<Eigen::Vector2d> positions_m) {
     if (!position.allFinite()) throw std::invalid_argument("position index: a position is not finite");
   }
   tree_ = std::make_unique<Tree>(std::move(positions_m));
+  if (tree_->positions().size() > kLargestGrid) return;
+  grid_ = std::make_unique<NearestGrid>(
+      tree_->positions(),
+      [this](const Eigen::Vector2d& place_m) { return tree_->nearest(place_m, 1).front().distance_m; },
+      [this](const Eigen::Vector2d& centre_m, double radius_m) { return tree_->within(centre_m, radius_m); });
 }
 
 PositionIndex::~PositionIndex() = default;
 
 Neighbour PositionIndex::nearest(const Eigen::Vector2d& position_m) const {
   if (!position_m.allFinite()) throw std::invalid_argument("position index: the position is not finite");
-  return tree_->nearest(position_m);
+  const auto found = grid_ ? grid_->nearest(position_m) : std::nullopt;
+  return found ? Neighbour{found->index, std::sqrt(found->squared_m2)} : tree_->nearest(position_m, 1).front();
 }
 
 std::vector<Neighbour> PositionIndex::nearest(const Eigen::Vector2d& position_m, std::size_t count) const {

@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "visual_localization/map/nearest_grid.h"
+
 namespace visual_localization {
 
 /// A training image and how far it is from the place asked about.
@@ -14,8 +16,8 @@ struct Neighbour {
   double distance_m = 0.0;
 };
 
-/// Finds the nearest of many positions: a k-d tree. Of equally distant positions the one with the lower index
-/// comes first, so that the answer does not depend on how the tree was split.
+/// Finds the nearest of many positions: a k-d tree, and for small maps a grid. Of equally distant positions the one
+/// with the lower index comes first, so that the answer does not depend on how the tree was split.
 class PositionIndex {
  public:
   /// `positions_m`: finite, at least one; throws std::invalid_argument otherwise.
@@ -32,6 +34,7 @@ class PositionIndex {
  private:
   class Tree;
   std::unique_ptr<Tree> tree_;
+  std::unique_ptr<const NearestGrid> grid_;  ///< of small maps
 };
 
 }  // namespace visual_localization
