@@ -1,6 +1,7 @@
 #include "visual_localization/features/subimage_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -24,13 +25,13 @@ SubimageGrid::Axis SubimageGrid::axis(int length_px, double relative_std) {
 
 void SubimageGrid::addRow(int row, int begin, int end, const float* values, const std::uint8_t* bins,
                           GlobalFeatures::Histogram& histogram) const {
-  const auto y = static_cast<std::size_t>(row);
-  GlobalFeatures::Histogram sums{};  // of one row of subimages; the row's weight is common to all its pixels
+  constexpr std::size_t kRowOfSubimages = GlobalFeatures::kGridSide * GlobalFeatures::kBins;
+  std::array<float, kRowOfSubimages> sums{};  // without the row's weight, which is common to all its pixels
   const auto last = static_cast<std::size_t>(std::max(begin, end));
   for (auto x = static_cast<std::size_t>(begin); x < last; ++x) {
     sums[columns_.subimage[x] * GlobalFeatures::kBins + bins[x]] += values[x] * columns_.weight[x];
   }
-  constexpr std::size_t kRowOfSubimages = GlobalFeatures::kGridSide * GlobalFeatures::kBins;
+  const auto y = static_cast<std::size_t>(row);
   float* to = &histogram[rows_.subimage[y] * kRowOfSubimages];
   for (std::size_t i = 0; i < kRowOfSubimages; ++i) to[i] += rows_.weight[y] * sums[i];
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,7 +11,8 @@
 namespace visual_localization {
 
 /// The 4 x 4 subimages of an image and how much a pixel counts in its own: a 2-D Gaussian around the subimage's
-/// centre (Weiss et al., section II). Separable: one table for the columns, one for the rows.
+/// centre (Weiss et al., section II). Separable: one table for the columns, one for the rows. A pixel on the border of
+/// two subimages belongs to the one that holds its centre.
 class SubimageGrid {
  public:
   SubimageGrid() = default;

@@ -1,0 +1,127 @@
+#include "visual_localization/features/global_extractor.h"
+
+#include <numeric>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "test/support/synthetic.h"
+#include "visual_localization/features/histogram_intersection.h"
+
+namespace visual_localization {
+namespace {
+
+double similarity(const GlobalFeatures& query, const GlobalFeatures& training) {
+  return histogramIntersection(query.wgoh, training.wgoh) * histogramIntersection(query.wgii, training.wgii);
+}
+
+bool same(const GlobalFeatures& a, const GlobalFeatures& b) { return a.wgoh == b.wgoh && a.wgii == b.wgii; }
+
+float sumOf(const GlobalFeatures::Histogram& histogram) {
+  return std::accumulate(histogram.begin(), histogram.end(), 0.0F);
+}
+
+TEST(GlobalExtractor, ScalesBothToSumOne) {
+  for (const int width_px : {320, 64}) {
+    const GlobalFeatures features = GlobalExtractor().extract(test::wall(width_px, 240, 1));
+    EXPECT_NEAR(sumOf(features.wgoh), 1.0F, 1e-5F);
+    EXPECT_NEAR(sumOf(features.wgii), 1.0F, 1e-5F);
+  }
+}
+
+TEST(GlobalExtractor, TheSameImageIsWhollySimilar) {
+  const GlobalFeatures features = GlobalExtractor().extract(test::viewOf(test::wall(320, 240, 2), 0));
+  EXPECT_DOUBLE_EQ(similarity(features, features), 1.0);
+}
+
+TEST(GlobalExtractor, ASmallShiftIsMoreSimilarThanALargeOneOrAnotherPlace) {
+  const cv::Mat wall = test::wall(600, 240, 3);
+  GlobalExtractor extractor;
+  const GlobalFeatures here = extractor.extract(test::viewOf(wall, 0));
+  const double near = similarity(here, extractor.extract(test::viewOf(wall, 8)));
+  const double farther = similarity(here, extractor.extract(test::viewOf(wall, 24)));
+  const double elsewhere = similarity(here, extractor.extract(test::viewOf(wall, 200)));
+  const double another = similarity(here, extractor.extract(test::viewOf(test::wall(320, 240, 4), 0)));
+  EXPECT_GT(near, farther);
+  EXPECT_GT(farther, elsewhere);
+  EXPECT_GT(farther, another);
+}
+
+TEST(GlobalExtractor, BrighterIsTheSame) {
+  const cv::Mat image = test::viewOf(test::wall(320, 240, 5), 0) / 2;
+  GlobalExtractor extractor;
+  const GlobalFeatures features = extractor.extract(image);
+  EXPECT_TRUE(same(extractor.extract(image + 100), features));
+}
+
+TEST(GlobalExtractor, WithMoreContrastTheOrientationsStay) {
+  const cv::Mat image = test::viewOf(test::wall(320, 240, 6), 0) / 3;
+  GlobalExtractor extractor;
+  const GlobalFeatures features = extractor.extract(image);
+  const GlobalFeatures contrasty = extractor.extract(image * 3);
+  EXPECT_NEAR(histogramIntersection(contrasty.wgoh, features.wgoh), 1.0, 1e-5);
+  EXPECT_LT(histogramIntersection(contrasty.wgii, features.wgii), 0.99);  // epsilon is absolute
+}
+
+TEST(GlobalExtractor, APlainImageHasInvariantsOnly) {
+  const GlobalFeatures features = GlobalExtractor().extract(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)));
+  EXPECT_EQ(features.wgoh, GlobalFeatures::Histogram{});
+  EXPECT_NEAR(sumOf(features.wgii), 1.0F, 1e-5F);
+  EXPECT_EQ(similarity(features, features), 0.0);
+}
+
+TEST(GlobalExtractor, RemembersNothingOfTheImagesBefore) {
+  const cv::Mat image = test::viewOf(test::wall(320, 240, 7), 0);
+  const cv::Mat small = test::wall(40, 30, 8);
+  GlobalExtractor used;
+  used.extract(small);
+  used.extract(test::wall(640, 300, 9));
+  EXPECT_TRUE(same(used.extract(image), GlobalExtractor().extract(image)));
+  EXPECT_TRUE(same(used.extract(image), GlobalExtractor().extract(image)));
+  EXPECT_TRUE(same(used.extract(small), GlobalExtractor().extract(small)));
+}
+
+TEST(GlobalExtractor, RefusesOtherImages) {
+  GlobalExtractor extractor;
+  EXPECT_THROW(extractor.extract(cv::Mat()), std::invalid_argument);
+  EXPECT_THROW(extractor.extract(cv::Mat(240, 320, CV_8UC3, cv::Scalar::all(0))), std::invalid_argument);
+  EXPECT_THROW(extractor.extract(cv::Mat(240, 320, CV_16UC1, cv::Scalar(0))), std::invalid_argument);
+  EXPECT_THROW(extractor.extract(cv::Mat(15, 320, CV_8UC1, cv::Scalar(0))), std::invalid_argument);
+  EXPECT_THROW(extractor.extract(cv::Mat(240, 15, CV_8UC1, cv::Scalar(0))), std::invalid_argument);
+}
+
+TEST(HistogramIntersection, IsTheCommonShareOfTheQuery) {
+  GlobalFeatures::Histogram query{};
+  GlobalFeatures::Histogram training{};
+  query[0] = 3.0F;
+  query[5] = 1.0F;
+  query[127] = 4.0F;
+  training[0] = 1.0F;
+  training[6] = 9.0F;
+  training[127] = 5.0F;
+  EXPECT_DOUBLE_EQ(histogramIntersection(query, training), 5.0 / 8.0);
+  EXPECT_DOUBLE_EQ(histogramIntersection(training, query), 5.0 / 15.0);
+  EXPECT_DOUBLE_EQ(histogramIntersection(query, query), 1.0);
+}
+
+TEST(HistogramIntersection, CountsEveryEntry) {
+  for (std::size_t i = 0; i < GlobalFeatures::kSize; ++i) {
+    GlobalFeatures::Histogram one{};
+    one[i] = 0.5F;
+    GlobalFeatures::Histogram half{};
+    half.fill(0.25F);
+    EXPECT_DOUBLE_EQ(histogramIntersection(one, half), 0.5) << i;
+    EXPECT_DOUBLE_EQ(histogramIntersection(half, one), 1.0 / GlobalFeatures::kSize) << i;
+  }
+}
+
+TEST(HistogramIntersection, NothingIsSimilarToNothing) {
+  GlobalFeatures::Histogram something{};
+  something[3] = 1.0F;
+  EXPECT_EQ(histogramIntersection({}, something), 0.0);
+  EXPECT_EQ(histogramIntersection(something, {}), 0.0);
+  EXPECT_EQ(histogramIntersection({}, {}), 0.0);
+}
+
+}  // namespace
+}  // namespace visual_localization
