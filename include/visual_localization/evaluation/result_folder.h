@@ -19,9 +19,9 @@ class ResultError : public std::runtime_error {
 /// resumes and several machines may share it. Belongs to one configuration of one set of rounds.
 class ResultFolder {
  public:
-  /// Creates the folder, or opens the one of an earlier call. `yaml`, but for its comments and the words for the report,
-  /// and `provenance` identify what the results were made with. Throws ResultError when the folder holds results of
-  /// something else.
+  /// Creates the folder, or opens the one of an earlier call. `yaml`, but for its comments and the words for the
+  /// report, and `provenance` identify what the results were made with. Throws ResultError when the folder holds
+  /// results of something else.
   ResultFolder(std::string path, const std::string& yaml, const std::string& provenance);
 
   const std::string& path() const { return path_; }
