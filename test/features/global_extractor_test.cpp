@@ -90,38 +90,5 @@ TEST(GlobalExtractor, RefusesOtherImages) {
   EXPECT_THROW(extractor.extract(cv::Mat(240, 15, CV_8UC1, cv::Scalar(0))), std::invalid_argument);
 }
 
-TEST(HistogramIntersection, IsTheCommonShareOfTheQuery) {
-  GlobalFeatures::Histogram query{};
-  GlobalFeatures::Histogram training{};
-  query[0] = 3.0F;
-  query[5] = 1.0F;
-  query[127] = 4.0F;
-  training[0] = 1.0F;
-  training[6] = 9.0F;
-  training[127] = 5.0F;
-  EXPECT_DOUBLE_EQ(histogramIntersection(query, training), 5.0 / 8.0);
-  EXPECT_DOUBLE_EQ(histogramIntersection(training, query), 5.0 / 15.0);
-  EXPECT_DOUBLE_EQ(histogramIntersection(query, query), 1.0);
-}
-
-TEST(HistogramIntersection, CountsEveryEntry) {
-  for (std::size_t i = 0; i < GlobalFeatures::kSize; ++i) {
-    GlobalFeatures::Histogram one{};
-    one[i] = 0.5F;
-    GlobalFeatures::Histogram half{};
-    half.fill(0.25F);
-    EXPECT_DOUBLE_EQ(histogramIntersection(one, half), 0.5) << i;
-    EXPECT_DOUBLE_EQ(histogramIntersection(half, one), 1.0 / GlobalFeatures::kSize) << i;
-  }
-}
-
-TEST(HistogramIntersection, NothingIsSimilarToNothing) {
-  GlobalFeatures::Histogram something{};
-  something[3] = 1.0F;
-  EXPECT_EQ(histogramIntersection({}, something), 0.0);
-  EXPECT_EQ(histogramIntersection(something, {}), 0.0);
-  EXPECT_EQ(histogramIntersection({}, {}), 0.0);
-}
-
 }  // namespace
 }  // namespace visual_localization
