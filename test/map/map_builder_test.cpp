@@ -105,6 +105,22 @@ TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   for (const SiftKeypoint& keypoint : map->image(1).sift.keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
 
+TEST(MapBuilder, GlobalFeaturesAreThoseOfTheImageInTheMapsSize) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound());
+  builder.addImage(kSecond_ns, scene(1, 0));
+  cv::Mat large;
+  cv::resize(scene(1, 3), large, {640, 480});
+  builder.addImage(2 * kSecond_ns, large);
+  const auto map = builder.build();
+  cv::Mat small;
+  cv::resize(large, small, {320, 240}, 0.0, 0.0, cv::INTER_AREA);
+  GlobalExtractor extractor;
+  EXPECT_EQ(map->image(0).global.wgoh, extractor.extract(scene(1, 0)).wgoh);
+  EXPECT_EQ(map->image(1).global.wgoh, extractor.extract(small).wgoh);
+  EXPECT_EQ(map->image(1).global.wgii, extractor.extract(small).wgii);
+}
+
 TEST(MapBuilder, RoundsBecomeSessionsOfOneMap) {
   MapBuilder builder({});
   for (const char* name : {"first", "second"}) {

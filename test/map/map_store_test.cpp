@@ -41,6 +41,8 @@ void expectSame(const TrainingMap& a, const TrainingMap& b) {
     EXPECT_EQ(a.image(i).position_m, b.image(i).position_m);
     EXPECT_EQ(a.image(i).yaw_rad, b.image(i).yaw_rad);
     EXPECT_EQ(a.image(i).preview_jpeg, b.image(i).preview_jpeg);
+    EXPECT_EQ(a.image(i).global.wgoh, b.image(i).global.wgoh);
+    EXPECT_EQ(a.image(i).global.wgii, b.image(i).global.wgii);
     EXPECT_EQ(a.image(i).sift.descriptors(), b.image(i).sift.descriptors());
     ASSERT_EQ(a.image(i).sift.size(), b.image(i).sift.size());
     if (a.image(i).sift.empty()) continue;
@@ -206,6 +208,34 @@ TEST_F(MapStore, RefusesChangedContent) {
     test::writeAll(path_, whole);
     tamper(sql);
     EXPECT_NE(refusal(path_), "") << sql;
+  }
+}
+
+/// `count` floats as an SQL blob; the last one has these bytes in the file, in hexadecimal digits.
+std::string histogramBlob(std::size_t count, const std::string& last) {
+  return "x'" + std::string(8 * (count - 1), '0') + last + "'";
+}
+
+TEST_F(MapStore, RefusesWhatIsNoHistogram) {
+  const std::string whole = test::readAll(path_);
+  const std::string one = "0000803F";  // 1.0F, little-endian
+  const struct {
+    std::string blob, reason;
+  } cases[] = {{histogramBlob(127, one), "global descriptor has a wrong size"},
+               {histogramBlob(129, one), "global descriptor has a wrong size"},
+               {histogramBlob(128, one + "00"), "global descriptor has a wrong size"},
+               {"x''", "global descriptor has a wrong size"},
+               {histogramBlob(128, "0000C07F"), "global descriptor is not finite"},              // NaN
+               {histogramBlob(128, "0000807F"), "global descriptor is not finite"},              // infinity
+               {histogramBlob(128, "000080BF"), "global descriptor is not finite or negative"},  // -1.0F
+               {histogramBlob(128, "01000080"), "global descriptor is not finite or negative"},  // the smallest below 0
+               {histogramBlob(128, one), "does not agree with its checksum"}};  // a good one, but not that image's
+  for (const char* column : {"wgoh", "wgii"}) {
+    for (const auto& [blob, reason] : cases) {
+      test::writeAll(path_, whole);
+      tamper(std::string("UPDATE images SET ") + column + " = " + blob + " WHERE id = 3");
+      EXPECT_THAT(refusal(path_), HasSubstr(reason)) << column << " " << blob;
+    }
   }
 }
 

@@ -19,6 +19,13 @@ inline SiftFeatures randomFeatures(std::size_t count, std::mt19937& random) {
   return SiftFeatures(keypoints, descriptors);
 }
 
+inline GlobalFeatures::Histogram randomHistogram(std::mt19937& random) {
+  std::uniform_real_distribution<float> share(0.0F, 0.01F);
+  GlobalFeatures::Histogram histogram{};
+  for (float& value : histogram) value = share(random);
+  return histogram;
+}
+
 inline MapHeader exampleHeader() {
   MapHeader header;
   header.datum = {48.5, 9.05, 430.25};
@@ -28,7 +35,7 @@ inline MapHeader exampleHeader() {
   return header;
 }
 
-/// `count` images on a curve, half of them in each session; the first has neither features nor preview.
+/// `count` images on a curve, half of them in each session; the first has no features of any kind and no preview.
 inline std::vector<TrainingImage> exampleImages(std::size_t count, std::size_t features = 20, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::vector<TrainingImage> images(count);
@@ -40,6 +47,8 @@ inline std::vector<TrainingImage> exampleImages(std::size_t count, std::size_t f
     images[i].yaw_rad = turn - 1.0 / 3.0;
     if (i == 0) continue;
     images[i].sift = randomFeatures(features, random);
+    images[i].global.wgoh = randomHistogram(random);
+    images[i].global.wgii = randomHistogram(random);
     images[i].preview_jpeg = {0xFF, 0xD8, static_cast<std::uint8_t>(i)};
   }
   return images;
