@@ -17,8 +17,6 @@ using test::onCircle;
 using test::roundWorld;
 using test::World;
 
-using test::sumOfWeights;
-
 std::size_t countOf(const std::vector<Particle>& particles, ParticleKind kind) {
   return static_cast<std::size_t>(
       std::count_if(particles.begin(), particles.end(), [kind](const Particle& p) { return p.kind == kind; }));
@@ -36,35 +34,17 @@ TEST(Dpso, FindsAndFollowsARobot) {
   EXPECT_LT(error_sum_m / 140.0, 1.5);
 }
 
-TEST(Dpso, WeightsSumToOneAndParticlesStayInTheArea) {
+TEST(Dpso, ParticlesStayInTheArea) {
   World world = roundWorld();
   Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 2);
   const Area& area = world.map().area();
   for (int step = 0; step < 50; ++step) {
     tracker.update(step % 10 == 9 ? world.inTheDark() : world.from(onCircle(0.6 * step)));
-    EXPECT_NEAR(sumOfWeights(tracker.particles()), 1.0, 1e-9);
     for (const Particle& particle : tracker.particles()) {
-      ASSERT_TRUE(particle.position_m.allFinite());
       ASSERT_TRUE((particle.position_m.array() >= area.min_m.array()).all());
       ASSERT_TRUE((particle.position_m.array() <= area.max_m.array()).all());
-      ASSERT_GE(particle.weight, 0.0);
     }
   }
-}
-
-TEST(Dpso, TheSameSeedGivesTheSameTrack) {
-  World world = roundWorld();
-  Dpso first(world.map(), DpsoConfig(), FitnessConfig(), 3);
-  Dpso second(world.map(), DpsoConfig(), FitnessConfig(), 3);
-  Dpso other(world.map(), DpsoConfig(), FitnessConfig(), 4);
-  bool differs = false;
-  for (int step = 0; step < 30; ++step) {
-    const Eigen::Vector2d robot = onCircle(0.6 * step);
-    const Eigen::Vector2d position = first.update(world.from(robot)).position_m;
-    EXPECT_EQ(position, second.update(world.from(robot)).position_m);
-    differs = differs || position != other.update(world.from(robot)).position_m;
-  }
-  EXPECT_TRUE(differs);
 }
 
 TEST(Dpso, TheSharesOfTheKindsAreKept) {
@@ -202,15 +182,6 @@ TEST(Dpso, ASingleFalseMatchDoesNotHideHowFarTheSearchReaches) {
       [&given](std::size_t) { return std::exchange(given, true) ? Score{} : World::scoreAt(0.01); });
   const TrackerEstimate estimate = tracker.update(input);
   EXPECT_GT(estimate.cloud_covariance_m2.trace(), 400.0);
-}
-
-TEST(Dpso, ResetDrawsFromThePrior) {
-  World world = roundWorld();
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
-  tracker.reset(around({20.0, 5.0}, 2.0));
-  for (const Particle& particle : tracker.particles()) {
-    EXPECT_LE((particle.position_m - Eigen::Vector2d(20.0, 5.0)).norm(), 2.0);
-  }
 }
 
 TEST(Dpso, CountsAtMostOneComparisonAParticle) {

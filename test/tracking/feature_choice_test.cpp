@@ -1,0 +1,87 @@
+#include "visual_localization/tracking/feature_choice.h"
+
+#include <gtest/gtest.h>
+
+namespace visual_localization {
+namespace {
+
+constexpr FeatureKind kSift = FeatureKind::kSift;
+constexpr FeatureKind kGlobal = FeatureKind::kGlobal;
+
+FeatureKind after(FeatureChoice& choice, double sigma_x, double sigma_y) {
+  choice.update({sigma_x, sigma_y});
+  return choice.next();
+}
+
+/// A hybrid choice whose next image is compared by `kind`.
+FeatureChoice hybridAt(FeatureKind kind, const HybridConfig& config = {}) {
+  FeatureChoice choice("hybrid", config);
+  if (kind == kGlobal) choice.update({0.0, 0.0});
+  EXPECT_EQ(choice.next(), kind);
+  return choice;
+}
+
+TEST(FeatureChoice, HybridBeginsWithSift) { EXPECT_EQ(FeatureChoice("hybrid", HybridConfig()).next(), kSift); }
+
+TEST(FeatureChoice, AfterSiftBothSigmasMustBeBelow) {
+  const struct {
+    double x, y;
+    FeatureKind next;
+  } cases[] = {{6.99, 6.99, kGlobal}, {7.0, 0.0, kSift},   {0.0, 7.0, kSift},   {7.01, 0.0, kSift},
+               {0.0, 7.01, kSift},    {6.0, 6.0, kGlobal}, {0.0, 0.0, kGlobal}, {50.0, 50.0, kSift}};
+  for (const auto& [x, y, next] : cases) {
+    FeatureChoice choice = hybridAt(kSift);
+    EXPECT_EQ(after(choice, x, y), next) << x << " " << y;
+  }
+}
+
+TEST(FeatureChoice, AfterGlobalFeaturesOneSigmaAboveIsEnough) {
+  const struct {
+    double x, y;
+    FeatureKind next;
+  } cases[] = {{5.49, 5.49, kGlobal}, {5.5, 5.5, kGlobal}, {5.51, 0.0, kSift},
+               {0.0, 5.51, kSift},    {6.0, 6.0, kSift},   {0.0, 0.0, kGlobal}};
+  for (const auto& [x, y, next] : cases) {
+    FeatureChoice choice = hybridAt(kGlobal);
+    EXPECT_EQ(after(choice, x, y), next) << x << " " << y;
+  }
+}
+
+/// The papers' d_global is the smaller one: a cloud between the two takes turns.
+TEST(FeatureChoice, BetweenThePapersThresholdsTheKindsTakeTurns) {
+  FeatureChoice choice = hybridAt(kSift);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_EQ(after(choice, 6.0, 1.0), kGlobal);
+    EXPECT_EQ(after(choice, 1.0, 6.0), kSift);
+  }
+}
+
+TEST(FeatureChoice, BetweenThresholdsTheOtherWayRoundTheKindStays) {
+  HybridConfig config;
+  config.sift_below_m = 3.0;
+  config.global_above_m = 8.0;
+  for (const FeatureKind kind : {kSift, kGlobal}) {
+    FeatureChoice choice = hybridAt(kind, config);
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(after(choice, 5.0, 7.0), kind);
+  }
+}
+
+TEST(FeatureChoice, AChoiceThatIsFixedNeverChanges) {
+  for (const FeatureKind kind : {kSift, kGlobal}) {
+    FeatureChoice choice(kind == kSift ? "sift" : "global", HybridConfig());
+    EXPECT_EQ(choice.next(), kind);
+    for (const double sigma : {0.0, 6.0, 100.0, 6.0, 0.0}) EXPECT_EQ(after(choice, sigma, sigma), kind);
+    choice.reset();
+    EXPECT_EQ(choice.next(), kind);
+  }
+}
+
+TEST(FeatureChoice, ResetBeginsWithSiftAgain) {
+  FeatureChoice choice = hybridAt(kGlobal);
+  choice.reset();
+  EXPECT_EQ(choice.next(), kSift);
+  EXPECT_EQ(after(choice, 1.0, 1.0), kGlobal);
+}
+
+}  // namespace
+}  // namespace visual_localization
