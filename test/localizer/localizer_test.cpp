@@ -1,78 +1,77 @@
 #include "visual_localization/localizer/localizer.h"
 
+#include <string>
+#include <tuple>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "test/localizer/wall_street.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/features/pruning.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr int kPixelsPerImage = 20;
-constexpr double kMetresPerImage = 0.6;
-constexpr std::int64_t kSecond = 1000000000;
+using test::kSecond;
 
-/// A street of 60 training images along a wall, and a camera that drives along it.
-class LocalizerTest : public ::testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    wall_ = test::wall(60 * kPixelsPerImage + 320, 240, 21);
-    const auto extractor = makeSiftExtractor(SiftConfig());
-    std::vector<TrainingImage> images(60);
-    std::vector<SiftFeatures> all;
-    for (int i = 0; i < 60; ++i) all.push_back(extractor->extract(test::viewOf(wall_, i * kPixelsPerImage)));
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      const auto& neighbour = all[i == 0 ? 1 : i - 1];
-      images[i].stamp_ns = static_cast<std::int64_t>(i) * kSecond;
-      images[i].position_m = {kMetresPerImage * static_cast<double>(i), 0.0};
-      images[i].sift = keepSeenIn(all[i], {&neighbour}, 0.6);
-    }
-    MapHeader header;
-    header.datum = {48.5, 9.0, 400.0};
-    header.image_size = {320, 240};
-    header.sessions = {"wall"};
-    map_ = std::make_shared<TrainingMap>(header, std::move(images));
-  }
-  static void TearDownTestSuite() { map_.reset(); }
+using LocalizerTest = test::WallStreet;
 
-  /// What the camera sees at `metres` along the street.
-  static cv::Mat viewAt(double metres) {
-    return test::viewOf(wall_, static_cast<int>(metres / kMetresPerImage * kPixelsPerImage));
-  }
-
-  static inline cv::Mat wall_;
-  static inline std::shared_ptr<const TrainingMap> map_;
-};
-
-TEST_F(LocalizerTest, TracksACameraAlongTheStreet) {
-  Localizer localizer(map_, LocalizerConfig());
+TEST_F(LocalizerTest, AnEstimateAgreesWithItself) {
+  Localizer localizer(map(), LocalizerConfig());
   Estimate estimate;
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < 10; ++i) {
     estimate = localizer.process(i * kSecond, viewAt(0.5 * i + 0.3));
     EXPECT_EQ(estimate.stamp_ns, i * kSecond);
   }
-  EXPECT_EQ(estimate.state, LocalizationState::kTracking);
-  EXPECT_NEAR(estimate.pose.position_m.x(), 0.5 * 39 + 0.3, 1.5);
-  EXPECT_GT(estimate.best.similarity, 0.2);
-  EXPECT_LE(estimate.features_kept, estimate.features_extracted);
+  EXPECT_GT(estimate.features_kept, 0U);
+  EXPECT_LT(estimate.features_kept, estimate.features_extracted);
   EXPECT_GE(estimate.pose.covariance_m2(0, 0), 0.25);
-  const Eigen::Vector2d geodetic = map_->frame().toEastNorth(estimate.pose.geodetic);
+  const Eigen::Vector2d geodetic = map()->frame().toEastNorth(estimate.pose.geodetic);
   EXPECT_LT((geodetic - estimate.pose.position_m).norm(), 1e-6);
 }
 
-TEST_F(LocalizerTest, TheSameSeedGivesTheSameTrack) {
-  Localizer first(map_, LocalizerConfig());
-  Localizer second(map_, LocalizerConfig());
-  for (int i = 0; i < 10; ++i) {
-    const cv::Mat view = viewAt(0.5 * i);
-    EXPECT_EQ(first.process(i * kSecond, view).pose.position_m, second.process(i * kSecond, view).pose.position_m);
+/// Every tracker with every choice of features.
+class EveryCombination : public test::WallStreet,
+                         public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {};
+
+INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, EveryCombination,
+                         ::testing::Combine(::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+                                            ::testing::Values("sift", "global", "hybrid")),
+                         [](const auto& combination) {
+                           return std::string(std::get<0>(combination.param)) + "_" + std::get<1>(combination.param);
+                         });
+
+TEST_P(EveryCombination, TracksACameraAlongTheStreet) {
+  LocalizerConfig config;
+  std::tie(config.tracker, config.features) = GetParam();
+  Localizer localizer(map(), config);
+  Estimate estimate;
+  int by_sift = 0;
+  double error_sum_m = 0.0;
+  for (int i = 0; i < 45; ++i) {
+    const double along_m = 0.6 * i + 0.3;
+    estimate = localizer.process(i * kSecond, viewAt(along_m));
+    const bool sift = estimate.features == FeatureKind::kSift;
+    by_sift += sift ? 1 : 0;
+    EXPECT_EQ(estimate.features_extracted > 0, sift) << "global features need no SIFT";
+    EXPECT_EQ(localizer.lastSift().size(), estimate.features_kept);
+    EXPECT_EQ(estimate.best.matches > 0, sift);
+    if (i >= 15) error_sum_m += (estimate.pose.position_m - Eigen::Vector2d(along_m, 0.0)).norm();
   }
+  EXPECT_LT(error_sum_m / 30.0, 1.5);
+  EXPECT_EQ(estimate.state, LocalizationState::kTracking);
+  EXPECT_GT(estimate.best.similarity, config.features == "sift" ? 0.2 : 0.8);
+  EXPECT_LE(estimate.comparisons, map()->size());
+  const bool hybrid = config.features == "hybrid";
+  EXPECT_GE(by_sift, hybrid ? 1 : config.features == "sift" ? 45 : 0);
+  EXPECT_LE(by_sift, hybrid ? 10 : config.features == "sift" ? 45 : 0);
 }
 
-TEST_F(LocalizerTest, FogIsNeverATrackedPosition) {
-  Localizer localizer(map_, LocalizerConfig());
+TEST_P(EveryCombination, FogIsNeverATrackedPosition) {
+  LocalizerConfig config;
+  std::tie(config.tracker, config.features) = GetParam();
+  Localizer localizer(map(), config);
   const cv::Mat fog(240, 320, CV_8UC1, cv::Scalar(90));
   for (int i = 0; i < 20; ++i) {
     const Estimate estimate = localizer.process(i * kSecond, fog);
@@ -82,16 +81,30 @@ TEST_F(LocalizerTest, FogIsNeverATrackedPosition) {
   }
 }
 
+TEST_F(LocalizerTest, TheSameSeedGivesTheSameTrack) {
+  Localizer first(map(), LocalizerConfig());
+  Localizer second(map(), LocalizerConfig());
+  for (int i = 0; i < 10; ++i) {
+    const cv::Mat view = viewAt(0.5 * i);
+    EXPECT_EQ(first.process(i * kSecond, view).pose.position_m, second.process(i * kSecond, view).pose.position_m);
+  }
+}
+
+/// By SIFT only: by global features two walls of the same blocks are alike.
 TEST_F(LocalizerTest, AnotherPlaceIsNeverATrackedPosition) {
-  Localizer localizer(map_, LocalizerConfig());
   const cv::Mat elsewhere = test::wall(1000, 240, 99);
-  for (int i = 0; i < 30; ++i) {
-    EXPECT_NE(localizer.process(i * kSecond, test::viewOf(elsewhere, 15 * i)).state, LocalizationState::kTracking);
+  for (const char* tracker : {"dpso", "pf_gaussian", "pf_linear"}) {
+    LocalizerConfig config;
+    config.tracker = tracker;
+    Localizer localizer(map(), config);
+    for (int i = 0; i < 30; ++i) {
+      EXPECT_NE(localizer.process(i * kSecond, test::viewOf(elsewhere, 15 * i)).state, LocalizationState::kTracking);
+    }
   }
 }
 
 TEST_F(LocalizerTest, RelocalizeForgetsAndFindsAgain) {
-  Localizer localizer(map_, LocalizerConfig());
+  Localizer localizer(map(), LocalizerConfig());
   for (int i = 0; i < 20; ++i) localizer.process(i * kSecond, viewAt(5.0));
   localizer.relocalize(around({30.0, 0.0}, 3.0));
   const Estimate first = localizer.process(20 * kSecond, viewAt(30.0));
@@ -103,8 +116,59 @@ TEST_F(LocalizerTest, RelocalizeForgetsAndFindsAgain) {
   EXPECT_NEAR(last.pose.position_m.x(), 30.0, 1.5);
 }
 
+TEST_F(LocalizerTest, HybridBeginsWithSiftWheneverThePositionIsUnknown) {
+  LocalizerConfig config;
+  config.features = "hybrid";
+  Localizer localizer(map(), config);
+  std::int64_t stamp_ns = 0;
+  const auto next = [&] { return localizer.process(stamp_ns += kSecond, viewAt(12.0)); };
+  for (const bool with_prior : {false, true}) {
+    EXPECT_EQ(next().features, FeatureKind::kSift);
+    Estimate estimate;
+    for (int i = 0; i < 10; ++i) estimate = next();
+    EXPECT_EQ(estimate.features, FeatureKind::kGlobal);
+    EXPECT_EQ(estimate.features_extracted, 0U);
+    EXPECT_TRUE(localizer.lastSift().empty());
+    with_prior ? localizer.relocalize(around({12.0, 0.0}, 1.0)) : localizer.relocalize();
+  }
+  EXPECT_EQ(next().features, FeatureKind::kSift);
+}
+
+/// An image that counts what it is asked for.
+class CountingImage final : public ComparableImage {
+ public:
+  explicit CountingImage(double similarity) : similarity_(similarity) {}
+  Score compare(FeatureKind kind, std::size_t) override {
+    ++(kind == FeatureKind::kSift ? by_sift : by_global);
+    return {similarity_, similarity_, 50, similarity_ > 0.5};
+  }
+  std::size_t by_sift = 0;
+  std::size_t by_global = 0;
+
+ private:
+  double similarity_;
+};
+
+TEST_F(LocalizerTest, ALargeMapIsWeighedOnlyWhileThePositionIsUnknown) {
+  LocalizerConfig config;
+  config.max_proposal_images = 20;
+  Localizer localizer(map(), config);
+  for (int i = 0; i < 3; ++i) {
+    CountingImage unknown(0.1);
+    const Estimate estimate = localizer.process(i * kSecond, unknown);
+    EXPECT_EQ(unknown.by_global, 20U);
+    EXPECT_EQ(unknown.by_sift, estimate.comparisons) << "weighing the map is no comparison";
+  }
+  CountingImage known(0.9);
+  localizer.process(3 * kSecond, known);
+  CountingImage still_known(0.9);
+  localizer.process(4 * kSecond, still_known);
+  EXPECT_EQ(still_known.by_global, 0U);
+  EXPECT_GT(still_known.by_sift, 0U);
+}
+
 TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {
-  Localizer localizer(map_, LocalizerConfig());
+  Localizer localizer(map(), LocalizerConfig());
   cv::Mat large;
   Estimate estimate;
   for (int i = 0; i < 30; ++i) {
@@ -116,7 +180,7 @@ TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {
 }
 
 TEST_F(LocalizerTest, RefusesABadImageAndGoesOn) {
-  Localizer localizer(map_, LocalizerConfig());
+  Localizer localizer(map(), LocalizerConfig());
   EXPECT_THROW(localizer.process(0, cv::Mat()), std::invalid_argument);
   EXPECT_THROW(localizer.process(0, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
   EXPECT_THROW(localizer.process(0, cv::Mat(4, 4, CV_8UC1)), std::invalid_argument);
@@ -126,26 +190,10 @@ TEST_F(LocalizerTest, RefusesABadImageAndGoesOn) {
 TEST_F(LocalizerTest, RefusesABadConfiguration) {
   LocalizerConfig config;
   config.dpso.particles = 0;
-  EXPECT_THROW(Localizer(map_, config), ParameterError);
+  EXPECT_THROW(Localizer(map(), config), ParameterError);
   config = LocalizerConfig();
   config.tracker = "crystal_ball";
-  EXPECT_THROW(Localizer(map_, config), ParameterError);
-}
-
-TEST_F(LocalizerTest, OnlyAnImageThatFollowsIsPruned) {
-  FrontEnd front_end(SiftConfig(), MatchConfig(), {320, 240}, true, 5.0);
-  const auto pruned = [&](std::int64_t stamp_ns) {
-    front_end.setImage(stamp_ns, viewAt(10.0 + 1e-9 * static_cast<double>(stamp_ns)));
-    return front_end.sift().size() < front_end.siftExtracted();
-  };
-  EXPECT_FALSE(pruned(0)) << "the first image has none before it";
-  EXPECT_TRUE(pruned(1 * kSecond));
-  EXPECT_FALSE(pruned(7 * kSecond)) << "after a gap";
-  EXPECT_TRUE(pruned(8 * kSecond));
-  EXPECT_FALSE(pruned(8 * kSecond)) << "a stamp that stands still";
-  EXPECT_FALSE(pruned(2 * kSecond)) << "a stamp that goes back";
-  front_end.setImage(3 * kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
-  EXPECT_FALSE(pruned(4 * kSecond)) << "the image before was black";
+  EXPECT_THROW(Localizer(map(), config), ParameterError);
 }
 
 }  // namespace

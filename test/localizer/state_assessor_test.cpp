@@ -55,6 +55,31 @@ TEST(StateAssessor, AShareOfFewFeaturesIsNoEvidence) {
     EXPECT_EQ(assessor.assess(seen(0.5, 2), FeatureKind::kSift, false), LocalizationState::kInitializing);
 }
 
+/// After ten images of this similarity by global features, which count no matches.
+LocalizationState afterGlobal(double similarity, double best_distance_m = 0.0) {
+  StateAssessor assessor{StateConfig()};
+  TrackerEstimate estimate = seen(similarity, 0);
+  estimate.best_distance_m = best_distance_m;
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 10; ++i) state = assessor.assess(estimate, FeatureKind::kGlobal, false);
+  return state;
+}
+
+TEST(StateAssessor, GlobalFeaturesConfirmByTheirOwnThreshold) {
+  EXPECT_EQ(afterGlobal(0.65), LocalizationState::kTracking);
+  EXPECT_EQ(afterGlobal(0.649), LocalizationState::kInitializing) << "more than enough for SIFT";
+  EXPECT_EQ(afterGlobal(0.9, 5.01), LocalizationState::kInitializing) << "elsewhere";
+}
+
+TEST(StateAssessor, BothKindsOfEvidenceAddUp) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 2);
+  EXPECT_EQ(assessor.assess(seen(0.7, 0), FeatureKind::kGlobal, false), LocalizationState::kInitializing);
+  EXPECT_EQ(assessor.assess(seen(0.7, 0), FeatureKind::kGlobal, false), LocalizationState::kTracking);
+  for (int i = 0; i < 2; ++i) assessor.assess(seen(0.3, 0), FeatureKind::kGlobal, false);
+  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, false), LocalizationState::kUncertain);
+}
+
 TEST(StateAssessor, AMatchElsewhereDoesNotConfirmThisPlace) {
   StateAssessor assessor{StateConfig()};
   TrackerEstimate estimate = seen(0.3, 30);

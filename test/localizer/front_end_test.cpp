@@ -1,0 +1,154 @@
+#include "visual_localization/localizer/front_end.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "test/localizer/wall_street.h"
+#include "visual_localization/localizer/live_image.h"
+
+namespace visual_localization {
+namespace {
+
+using test::kSecond;
+
+class FrontEndTest : public test::WallStreet {
+ protected:
+  static FrontEnd makeFrontEnd(bool prune = true) { return {SiftConfig(), MatchConfig(), {320, 240}, prune, 5.0}; }
+};
+
+TEST_F(FrontEndTest, OnlyAnImageThatFollowsIsPruned) {
+  FrontEnd front_end = makeFrontEnd();
+  const auto pruned = [&](std::int64_t stamp_ns) {
+    front_end.setImage(stamp_ns, viewAt(10.0 + 1e-9 * static_cast<double>(stamp_ns)));
+    return front_end.sift().size() < front_end.siftExtracted();
+  };
+  EXPECT_FALSE(pruned(0)) << "the first image has none before it";
+  EXPECT_TRUE(pruned(1 * kSecond));
+  EXPECT_FALSE(pruned(7 * kSecond)) << "after a gap";
+  EXPECT_TRUE(pruned(8 * kSecond));
+  EXPECT_FALSE(pruned(8 * kSecond)) << "a stamp that stands still";
+  EXPECT_FALSE(pruned(2 * kSecond)) << "a stamp that goes back";
+  front_end.setImage(3 * kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  EXPECT_FALSE(pruned(4 * kSecond)) << "the image before was black";
+}
+
+TEST_F(FrontEndTest, ExtractsOnlyWhatIsAskedFor) {
+  FrontEnd front_end = makeFrontEnd();
+  for (int i = 0; i < 3; ++i) {
+    front_end.setImage(i * kSecond, viewAt(10.0 + i));
+    EXPECT_EQ(front_end.global().wgoh, GlobalExtractor().extract(viewAt(10.0 + i)).wgoh);
+    EXPECT_FALSE(front_end.siftIfExtracted());
+    EXPECT_EQ(front_end.siftExtracted(), 0U);
+  }
+  const SiftFeatures& sift = front_end.sift();
+  ASSERT_TRUE(front_end.siftIfExtracted());
+  EXPECT_EQ(front_end.siftIfExtracted()->descriptors(), sift.descriptors());
+  EXPECT_GT(front_end.siftExtracted(), sift.size());
+  front_end.setImage(3 * kSecond, viewAt(13.0));
+  EXPECT_FALSE(front_end.siftIfExtracted()) << "a new image forgets the features of the last one";
+  EXPECT_EQ(front_end.siftExtracted(), 0U);
+}
+
+TEST_F(FrontEndTest, AfterGlobalFeaturesSiftIsPrunedByTheImageBeforeAllTheSame) {
+  FrontEnd always = makeFrontEnd();
+  FrontEnd switching = makeFrontEnd();
+  for (int i = 0; i < 4; ++i) {
+    always.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+    switching.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+    always.sift();
+    if (i < 3) switching.global();
+  }
+  EXPECT_EQ(switching.sift().descriptors(), always.sift().descriptors());
+  EXPECT_LT(switching.sift().size(), switching.siftExtracted());
+}
+
+TEST_F(FrontEndTest, KeepsThePreviousImageWhenTheCamerasBufferIsUsedAgain) {
+  FrontEnd own_buffers = makeFrontEnd();
+  FrontEnd shared_buffer = makeFrontEnd();
+  cv::Mat buffer;
+  for (int i = 0; i < 3; ++i) {
+    const cv::Mat view = viewAt(10.0 + 0.5 * i);
+    view.copyTo(buffer);
+    own_buffers.setImage(i * kSecond, view);
+    shared_buffer.setImage(i * kSecond, buffer);
+    buffer.setTo(0);
+  }
+  EXPECT_GT(own_buffers.sift().size(), 50U);
+  EXPECT_EQ(shared_buffer.sift().descriptors(), own_buffers.sift().descriptors());
+  EXPECT_EQ(shared_buffer.global().wgii, own_buffers.global().wgii);
+}
+
+TEST_F(FrontEndTest, WithoutPruningAllFeaturesAreKept) {
+  FrontEnd front_end = makeFrontEnd(false);
+  for (int i = 0; i < 3; ++i) {
+    front_end.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+    EXPECT_GT(front_end.sift().size(), 50U);
+    EXPECT_EQ(front_end.sift().size(), front_end.siftExtracted());
+  }
+}
+
+TEST_F(FrontEndTest, BothKindsSeeTheImageInTheMapsSize) {
+  FrontEnd front_end = makeFrontEnd();
+  cv::Mat large;
+  cv::resize(viewAt(10.0), large, cv::Size(640, 480), 0, 0, cv::INTER_CUBIC);
+  cv::Mat small;
+  cv::resize(large, small, cv::Size(320, 240), 0, 0, cv::INTER_AREA);
+  front_end.setImage(0, large);
+  EXPECT_EQ(front_end.global().wgoh, GlobalExtractor().extract(small).wgoh);
+  EXPECT_EQ(front_end.sift().descriptors(), makeSiftExtractor(SiftConfig())->extract(small).descriptors());
+}
+
+TEST_F(FrontEndTest, ARefusedImageChangesNothing) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, viewAt(10.0));
+  front_end.setImage(kSecond, viewAt(10.5));
+  const SiftFeatures before = front_end.sift();
+  EXPECT_THROW(front_end.setImage(2 * kSecond, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
+  EXPECT_EQ(front_end.sift().descriptors(), before.descriptors());
+  FrontEnd undisturbed = makeFrontEnd();
+  undisturbed.setImage(kSecond, viewAt(10.5));
+  for (FrontEnd* each : {&front_end, &undisturbed}) each->setImage(3 * kSecond, viewAt(11.0));
+  EXPECT_EQ(front_end.sift().descriptors(), undisturbed.sift().descriptors());
+}
+
+TEST_F(FrontEndTest, TheTimeCountsWhatWasExtracted) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, viewAt(10.0));
+  const double none_ms = front_end.extract_ms();
+  front_end.global();
+  const double global_ms = front_end.extract_ms();
+  EXPECT_GT(global_ms, none_ms);
+  front_end.global();
+  EXPECT_EQ(front_end.extract_ms(), global_ms);
+  front_end.sift();
+  const double both_ms = front_end.extract_ms();
+  EXPECT_GT(both_ms, global_ms);
+  front_end.sift();
+  EXPECT_EQ(front_end.extract_ms(), both_ms);
+}
+
+TEST_F(FrontEndTest, ALiveImageComparesByTheKindThatIsAskedFor) {
+  FrontEnd front_end = makeFrontEnd();
+  const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
+  const GlobalSimilarity global{SimilarityConfig()};
+  front_end.setImage(0, viewAt(12.0 + 1e-9));
+  LiveImage image(front_end, *map(), sift, global);
+  EXPECT_FALSE(front_end.siftIfExtracted()) << "nothing was asked for yet";
+
+  const Score by_global = image.compare(FeatureKind::kGlobal, 20);
+  EXPECT_FALSE(front_end.siftIfExtracted()) << "global features need no SIFT";
+  EXPECT_EQ(by_global.similarity, 1.0);  // training image 20 was taken here
+  EXPECT_EQ(by_global.matches, 0U);
+  EXPECT_LT(image.compare(FeatureKind::kGlobal, 40).similarity, 0.9);
+  const double global_ms = image.match_ms();
+  EXPECT_GT(global_ms, 0.0);
+
+  const Score by_sift = image.compare(FeatureKind::kSift, 20);
+  EXPECT_EQ(by_sift.similarity, sift.compare(front_end.sift(), map()->image(20).sift).similarity);
+  EXPECT_GT(by_sift.matches, 50U);
+  EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kSift, 50).matches);
+  EXPECT_GT(image.match_ms(), global_ms);
+}
+
+}  // namespace
+}  // namespace visual_localization
