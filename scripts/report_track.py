@@ -16,8 +16,9 @@ matplotlib.use('Agg')
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-STATES = ['INITIALIZING', 'TRACKING', 'UNCERTAIN', 'RECOVERING']
-COLOURS = {'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e', 'RECOVERING': '#d62728'}
+STATES = ['INITIALIZING', 'TRACKING', 'UNCERTAIN', 'RECOVERING', 'OFF_MAP']
+COLOURS = {'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e', 'RECOVERING': '#d62728',
+           'OFF_MAP': '#9467bd'}
 
 
 class Track:

@@ -36,6 +36,7 @@ ScoreTable::ScoreTable(const Drive& drive, const TrainingMap& map, const MatchCo
   const SimilarityConfig config;  // what a similarity means is each method's own; the similarity itself is not
   const SiftSimilarity sift(match, config);
   const GlobalSimilarity global(config);
+  for (const DriveImage& image : drive.images) sift_features_.push_back(image.sift.size());
   std::vector<RowTimes> times(drive.images.size());
   parallelFor(drive.images.size(), threads, [&](std::size_t i) {
     times[i] = fillRow(drive.images[i], map, sift, global, &entries_[i * training_images_]);

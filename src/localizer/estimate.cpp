@@ -14,6 +14,8 @@ std::string toString(LocalizationState state) {
       return "UNCERTAIN";
     case LocalizationState::kRecovering:
       return "RECOVERING";
+    case LocalizationState::kOffMap:
+      return "OFF_MAP";
   }
   return "UNKNOWN";
 }

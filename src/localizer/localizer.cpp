@@ -37,6 +37,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       places_(map_->size(), static_cast<std::size_t>(config_.max_proposal_images)),
       tracker_(makeTracker(*map_, config_)),
       choice_(config_.features, config_.hybrid),
+      place_check_(*map_, static_cast<std::size_t>(config_.state.place_check_images), config_.state.max_distance_m),
       assessor_(config_.state) {}
 
 Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
@@ -56,13 +57,16 @@ Estimate Localizer::process(std::int64_t stamp_ns, ComparableImage& image) {
   scores_.startImage([&](std::size_t i) { return image.compare(features, i); });
   places_.startImage([&](std::size_t i) { return image.compare(FeatureKind::kGlobal, i).weight; });
   const TrackerEstimate tracked = tracker_->update({scores_, places_});
-  choice_.update(tracked.spread_m);
+  const Evidence evidence = evidenceOf(stamp_ns, tracked, features, image);
 
   Estimate estimate;
   estimate.stamp_ns = stamp_ns;
   estimate.features = features;
   estimate.tuning = tracker_->tuning();
-  estimate.state = assessor_.assess(tracked, features, estimate.tuning.recovering);
+  estimate.state = assessor_.assess(tracked, evidence);
+  choice_.update(tracked.spread_m, assessor_.isDoubtful());
+  estimate.place_ratio = evidence.place_ratio;
+  estimate.course_residual_m = assessor_.courseResidual_m();
   estimate.pose = poseOf(tracked, estimate.state);
   estimate.best = tracked.best;
   estimate.best_image = tracked.best_image;
@@ -70,6 +74,21 @@ Estimate Localizer::process(std::int64_t stamp_ns, ComparableImage& image) {
   estimate.comparisons = scores_.comparisons();
   estimate.spread_m = tracked.spread_m;
   return estimate;
+}
+
+/// Asks the second witness only when the first is not sure, so that SIFT alone does without global features while all
+/// is well.
+Evidence Localizer::evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
+                               ComparableImage& image) {
+  const StateConfig& state = config_.state;
+  Evidence evidence{stamp_ns, features, tracker_->tuning().recovering};
+  const bool sift = features == FeatureKind::kSift;
+  const bool sure =
+      sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
+  if (state.place_check && !sure) evidence.place_ratio = place_check_.ratio(image, tracked.position_m);
+  evidence.blind =
+      sift ? image.siftFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
+  return evidence;
 }
 
 void Localizer::relocalize() {

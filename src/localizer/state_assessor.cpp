@@ -1,6 +1,7 @@
 #include "visual_localization/localizer/state_assessor.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace visual_localization {
 
@@ -19,6 +20,23 @@ void StateConfig::declare(ParameterVisitor& visitor) {
                   images_to_confirm, 1, 1000);
   visitor.real({"state/max_step", "m", "a larger jump of the estimate between two images voids earlier confirmations"},
                max_step_m, 0.1, 10000.0);
+  visitor.flag({"state/place_check", "", "ask the global features whether another place of the map looks more alike"},
+               place_check);
+  visitor.real({"state/sure_similarity", "1", "a stronger SIFT match needs no place check"}, sure_similarity, 0.0, 1.0);
+  visitor.real({"state/min_place_ratio", "1",
+                "global similarity here over the best anywhere, mean over the window; below, the position is in doubt"},
+               min_place_ratio, 0.0, 1.0);
+  visitor.integer({"state/place_check_images", "1", "of a larger map the place check looks at so many images only"},
+                  place_check_images, 1, 100'000'000);
+  visitor.integer({"state/course_length", "1", "so many of the last estimates must follow a steady motion"},
+                  course_length, 2, 1000);
+  visitor.real({"state/max_course_residual", "m", "up to this root mean square distance from it"},
+               max_course_residual_m, 0.0, 10000.0);
+  visitor.integer({"state/off_map_images", "1", "so many images in a row without TRACKING mean OFF_MAP"},
+                  off_map_images, 1, 100000);
+  visitor.integer(
+      {"state/min_features", "1", "images with fewer SIFT features are blind and say nothing about OFF_MAP"},
+      min_features, 0, 10000);
 }
 
 std::vector<std::string> StateConfig::violations() const {
@@ -28,19 +46,43 @@ std::vector<std::string> StateConfig::violations() const {
 
 void StateAssessor::reset() { *this = StateAssessor(config_); }
 
-LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, FeatureKind features, bool recovering) {
-  const bool jumped = last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m;
-  last_position_m_ = estimate.position_m;
-  if (jumped) confirmations_.clear();
-  confirmations_.push_back(confirms(estimate, features));
-  if (confirmations_.size() > static_cast<std::size_t>(config_.window)) confirmations_.pop_front();
-
-  const auto confirmed = std::count(confirmations_.begin(), confirmations_.end(), true);
-  const bool certain = confirmed >= config_.images_to_confirm;
+LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, const Evidence& evidence) {
+  remember(estimate, evidence);
+  const bool certain = isCertain();
   ever_confirmed_ = ever_confirmed_ || certain;
-  if (recovering) return LocalizationState::kRecovering;
+  if (certain) unconfirmed_ = 0;
+  if (!certain && !evidence.blind) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
+  if (unconfirmed_ >= config_.off_map_images) return LocalizationState::kOffMap;
+  if (evidence.recovering) return LocalizationState::kRecovering;
   if (certain) return LocalizationState::kTracking;
   return ever_confirmed_ ? LocalizationState::kUncertain : LocalizationState::kInitializing;
+}
+
+void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& evidence) {
+  if (last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m) {
+    confirmations_.clear();
+    place_ratios_.clear();
+    course_.clear();
+  }
+  last_position_m_ = estimate.position_m;
+  course_.add(evidence.stamp_ns, estimate.position_m);
+  confirmations_.push_back(confirms(estimate, evidence.features));
+  place_ratios_.push_back(evidence.place_ratio);
+  const auto window = static_cast<std::size_t>(config_.window);
+  if (confirmations_.size() > window) confirmations_.pop_front();
+  if (place_ratios_.size() > window) place_ratios_.pop_front();
+}
+
+bool StateAssessor::isCertain() const {
+  const auto confirmed = std::count(confirmations_.begin(), confirmations_.end(), true);
+  return confirmed >= config_.images_to_confirm && !isDoubtful() &&
+         course_.residual_m() <= config_.max_course_residual_m;
+}
+
+bool StateAssessor::isDoubtful() const {
+  if (place_ratios_.empty()) return false;
+  const double sum = std::accumulate(place_ratios_.begin(), place_ratios_.end(), 0.0);
+  return sum < config_.min_place_ratio * static_cast<double>(place_ratios_.size());
 }
 
 bool StateAssessor::confirms(const TrackerEstimate& estimate, FeatureKind features) const {

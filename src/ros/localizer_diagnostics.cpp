@@ -60,6 +60,8 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
   status.add("Best similarity", estimate_->best.similarity);
   status.add("Matched features", estimate_->best.matches);
   status.add("Features kept", estimate_->features_kept);
+  status.addf("Looks like here, of the best anywhere", "%.3f", estimate_->place_ratio);
+  status.addf("Residual of the course (m)", "%.2f", estimate_->course_residual_m);
   status.add("Images compared", estimate_->comparisons);
   status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->spread_m.x(), estimate_->spread_m.y());
   status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->times.extract_ms, estimate_->times.match_ms,

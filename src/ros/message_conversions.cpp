@@ -49,7 +49,8 @@ bool isFinite(const Estimate& estimate) {
   return pose.position_m.allFinite() && pose.covariance_m2.allFinite() && std::isfinite(pose.yaw_rad) &&
          std::isfinite(pose.yaw_variance_rad2) && std::isfinite(pose.geodetic.latitude_deg) &&
          std::isfinite(pose.geodetic.longitude_deg) && std::isfinite(pose.geodetic.altitude_m) &&
-         std::isfinite(estimate.best.similarity) && estimate.spread_m.allFinite();
+         std::isfinite(estimate.best.similarity) && estimate.spread_m.allFinite() &&
+         std::isfinite(estimate.place_ratio) && std::isfinite(estimate.course_residual_m);
 }
 
 bool isFinite(const Particle& particle) {
@@ -96,6 +97,8 @@ LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& he
   message.comparisons = count(estimate.comparisons);
   message.features_extracted = count(estimate.features_extracted);
   message.features_kept = count(estimate.features_kept);
+  message.place_ratio = estimate.place_ratio;
+  message.course_residual = estimate.course_residual_m;
   message.v0 = estimate.tuning.v0;
   message.speed_ema = estimate.tuning.speed_ema;
   message.quantum_share = estimate.tuning.quantum_share;

@@ -8,6 +8,8 @@ void HybridConfig::declare(ParameterVisitor& visitor) {
       sift_below_m, 0.0, 10000.0);
   visitor.real({"hybrid/global_above", "m", "after global features, SIFT follows when a sigma is above (d_global)"},
                global_above_m, 0.0, 10000.0);
+  visitor.flag({"hybrid/sift_in_doubt", "", "SIFT also as long as the images look more like another place"},
+               sift_in_doubt);
 }
 
 FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& config)
@@ -18,8 +20,12 @@ FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& co
 
 void FeatureChoice::reset() { next_ = first_; }
 
-void FeatureChoice::update(const Eigen::Vector2d& spread_m) {
+void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool doubtful) {
   if (!hybrid_) return;
+  if (doubtful && config_.sift_in_doubt) {
+    next_ = FeatureKind::kSift;
+    return;
+  }
   const double largest_m = spread_m.maxCoeff();
   if (next_ == FeatureKind::kSift && largest_m < config_.sift_below_m) {
     next_ = FeatureKind::kGlobal;

@@ -142,6 +142,7 @@ class CountingImage final : public ComparableImage {
     ++(kind == FeatureKind::kSift ? by_sift : by_global);
     return {similarity_, similarity_, 50, similarity_ > 0.5};
   }
+  std::size_t siftFeatures() override { return 100; }
   std::size_t by_sift = 0;
   std::size_t by_global = 0;
 
@@ -152,6 +153,7 @@ class CountingImage final : public ComparableImage {
 TEST_F(LocalizerTest, ALargeMapIsWeighedOnlyWhileThePositionIsUnknown) {
   LocalizerConfig config;
   config.max_proposal_images = 20;
+  config.state.place_check = false;
   Localizer localizer(map(), config);
   for (int i = 0; i < 3; ++i) {
     CountingImage unknown(0.1);
@@ -165,6 +167,21 @@ TEST_F(LocalizerTest, ALargeMapIsWeighedOnlyWhileThePositionIsUnknown) {
   localizer.process(4 * kSecond, still_known);
   EXPECT_EQ(still_known.by_global, 0U);
   EXPECT_GT(still_known.by_sift, 0U);
+}
+
+TEST_F(LocalizerTest, TheWholeMapIsAskedOnlyWhenTheMatchIsNotSure) {
+  LocalizerConfig config;
+  config.dpso.recovery = "none";
+  config.state.place_check_images = 15;
+  config.state.max_distance_m = 1000.0;  // alike everywhere, so the best match may be anywhere
+  Localizer localizer(map(), config);
+  CountingImage sure(0.9);
+  EXPECT_EQ(localizer.process(0, sure).place_ratio, 1.0);
+  EXPECT_EQ(sure.by_global, 0U);
+  CountingImage weak(0.1);
+  EXPECT_EQ(localizer.process(kSecond, weak).place_ratio, 1.0) << "alike everywhere";
+  EXPECT_GE(weak.by_global, 15U);
+  EXPECT_LE(weak.by_global, 15U + 32U) << "every fourth image, and those around the estimate";
 }
 
 TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {

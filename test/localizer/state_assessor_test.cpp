@@ -15,9 +15,15 @@ TrackerEstimate seen(double similarity, std::size_t matches, double x = 0.0) {
 const TrackerEstimate kGood = seen(0.3, 30);
 const TrackerEstimate kBad = seen(0.01, 1);
 
+Evidence sift() { return {0, FeatureKind::kSift}; }
+Evidence global() { return {0, FeatureKind::kGlobal}; }
+Evidence lost() { return {0, FeatureKind::kSift, true}; }
+Evidence placeRatio(double ratio) { return {0, FeatureKind::kSift, false, ratio}; }
+Evidence blind() { return {0, FeatureKind::kSift, false, 1.0, true}; }
+
 LocalizationState afterGood(StateAssessor& assessor, int images) {
   LocalizationState state = LocalizationState::kNoMap;
-  for (int i = 0; i < images; ++i) state = assessor.assess(kGood, FeatureKind::kSift, false);
+  for (int i = 0; i < images; ++i) state = assessor.assess(kGood, sift());
   return state;
 }
 
@@ -30,15 +36,15 @@ TEST(StateAssessor, EnoughGoodImagesConfirmAPosition) {
 TEST(StateAssessor, OneBadImageIsForgivenTwoAreNot) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
-  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, false), LocalizationState::kTracking);
-  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, false), LocalizationState::kUncertain);
-  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, true), LocalizationState::kRecovering);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kTracking);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(kBad, lost()), LocalizationState::kRecovering);
 }
 
 TEST(StateAssessor, AfterALossThePositionMustBeConfirmedAgain) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
-  for (int i = 0; i < 5; ++i) assessor.assess(kBad, FeatureKind::kSift, true);
+  for (int i = 0; i < 5; ++i) assessor.assess(kBad, lost());
   EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kUncertain);
   EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
 }
@@ -46,22 +52,21 @@ TEST(StateAssessor, AfterALossThePositionMustBeConfirmedAgain) {
 TEST(StateAssessor, AJumpVoidsEarlierConfirmations) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
-  EXPECT_EQ(assessor.assess(seen(0.3, 30, 60.0), FeatureKind::kSift, false), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(seen(0.3, 30, 60.0), sift()), LocalizationState::kUncertain);
 }
 
 TEST(StateAssessor, AShareOfFewFeaturesIsNoEvidence) {
   StateAssessor assessor{StateConfig()};
-  for (int i = 0; i < 20; ++i)
-    EXPECT_EQ(assessor.assess(seen(0.5, 2), FeatureKind::kSift, false), LocalizationState::kInitializing);
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(assessor.assess(seen(0.5, 2), sift()), LocalizationState::kInitializing);
 }
 
-/// After ten images of this similarity by global features, which count no matches.
+/// After nine images of this similarity by global features, which count no matches.
 LocalizationState afterGlobal(double similarity, double best_distance_m = 0.0) {
   StateAssessor assessor{StateConfig()};
   TrackerEstimate estimate = seen(similarity, 0);
   estimate.best_distance_m = best_distance_m;
   LocalizationState state = LocalizationState::kNoMap;
-  for (int i = 0; i < 10; ++i) state = assessor.assess(estimate, FeatureKind::kGlobal, false);
+  for (int i = 0; i < 9; ++i) state = assessor.assess(estimate, global());
   return state;
 }
 
@@ -74,28 +79,72 @@ TEST(StateAssessor, GlobalFeaturesConfirmByTheirOwnThreshold) {
 TEST(StateAssessor, BothKindsOfEvidenceAddUp) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 2);
-  EXPECT_EQ(assessor.assess(seen(0.7, 0), FeatureKind::kGlobal, false), LocalizationState::kInitializing);
-  EXPECT_EQ(assessor.assess(seen(0.7, 0), FeatureKind::kGlobal, false), LocalizationState::kTracking);
-  for (int i = 0; i < 2; ++i) assessor.assess(seen(0.3, 0), FeatureKind::kGlobal, false);
-  EXPECT_EQ(assessor.assess(kBad, FeatureKind::kSift, false), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(seen(0.7, 0), global()), LocalizationState::kInitializing);
+  EXPECT_EQ(assessor.assess(seen(0.7, 0), global()), LocalizationState::kTracking);
+  for (int i = 0; i < 2; ++i) assessor.assess(seen(0.3, 0), global());
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kUncertain);
 }
 
 TEST(StateAssessor, AMatchElsewhereDoesNotConfirmThisPlace) {
   StateAssessor assessor{StateConfig()};
   TrackerEstimate estimate = seen(0.3, 30);
   estimate.best_distance_m = 20.0;
-  for (int i = 0; i < 10; ++i)
-    EXPECT_EQ(assessor.assess(estimate, FeatureKind::kSift, false), LocalizationState::kInitializing);
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(assessor.assess(estimate, sift()), LocalizationState::kInitializing);
 }
 
 TEST(StateAssessor, ResetForgets) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);
   assessor.reset();
-  EXPECT_EQ(assessor.assess(kGood, FeatureKind::kSift, false), LocalizationState::kInitializing);
+  EXPECT_EQ(assessor.assess(kGood, sift()), LocalizationState::kInitializing);
+}
+
+TEST(StateAssessor, AnImageThatLooksMoreLikeAnotherPlaceCastsDoubt) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.assess(kGood, placeRatio(0.94)), LocalizationState::kTracking) << "mean of five: 0.988";
+  EXPECT_FALSE(assessor.isDoubtful());
+  EXPECT_EQ(assessor.assess(kGood, placeRatio(0.94)), LocalizationState::kUncertain);
+  EXPECT_TRUE(assessor.isDoubtful());
+  EXPECT_EQ(afterGood(assessor, 4), LocalizationState::kTracking) << "one of the two is out of the window";
+}
+
+TEST(StateAssessor, AnEstimateThatJumpsToAndFroIsNotTrusted) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 6; ++i) state = assessor.assess(seen(0.3, 30, i % 2 == 0 ? 8.0 : 0.0), sift());
+  EXPECT_EQ(state, LocalizationState::kUncertain);
+  EXPECT_GT(assessor.courseResidual_m(), 2.5);
+}
+
+TEST(StateAssessor, AFastRobotIsNotARestlessOne) {
+  StateAssessor assessor{StateConfig()};
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 10; ++i) state = assessor.assess(seen(0.3, 30, 9.5 * i), sift());
+  EXPECT_EQ(state, LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, LongWithoutConfirmationIsOffTheMap) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  assessor.assess(kBad, lost());  // forgiven
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(assessor.assess(kBad, lost()), LocalizationState::kRecovering);
+  EXPECT_EQ(assessor.assess(kBad, lost()), LocalizationState::kOffMap);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kOffMap);
+  EXPECT_EQ(afterGood(assessor, 4), LocalizationState::kTracking) << "back on the map";
+}
+
+TEST(StateAssessor, ACoveredCameraIsNotOffTheMap) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 30; ++i) state = assessor.assess(kBad, blind());
+  EXPECT_EQ(state, LocalizationState::kUncertain);
 }
 
 TEST(StateAssessor, NamesOfTheStates) {
+  EXPECT_EQ(toString(LocalizationState::kOffMap), "OFF_MAP");
   EXPECT_EQ(toString(LocalizationState::kNoMap), "NO_MAP");
   EXPECT_EQ(toString(LocalizationState::kRecovering), "RECOVERING");
 }

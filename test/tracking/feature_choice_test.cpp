@@ -9,14 +9,14 @@ constexpr FeatureKind kSift = FeatureKind::kSift;
 constexpr FeatureKind kGlobal = FeatureKind::kGlobal;
 
 FeatureKind after(FeatureChoice& choice, double sigma_x, double sigma_y) {
-  choice.update({sigma_x, sigma_y});
+  choice.update({sigma_x, sigma_y}, false);
   return choice.next();
 }
 
 /// A hybrid choice whose next image is compared by `kind`.
 FeatureChoice hybridAt(FeatureKind kind, const HybridConfig& config = {}) {
   FeatureChoice choice("hybrid", config);
-  if (kind == kGlobal) choice.update({0.0, 0.0});
+  if (kind == kGlobal) choice.update({0.0, 0.0}, false);
   EXPECT_EQ(choice.next(), kind);
   return choice;
 }
@@ -71,9 +71,25 @@ TEST(FeatureChoice, AChoiceThatIsFixedNeverChanges) {
     FeatureChoice choice(kind == kSift ? "sift" : "global", HybridConfig());
     EXPECT_EQ(choice.next(), kind);
     for (const double sigma : {0.0, 6.0, 100.0, 6.0, 0.0}) EXPECT_EQ(after(choice, sigma, sigma), kind);
+    choice.update({0.0, 0.0}, true);
+    EXPECT_EQ(choice.next(), kind);
     choice.reset();
     EXPECT_EQ(choice.next(), kind);
   }
+}
+
+TEST(FeatureChoice, InDoubtASmallCloudIsNoReasonForGlobalFeatures) {
+  for (const FeatureKind kind : {kSift, kGlobal}) {
+    FeatureChoice choice = hybridAt(kind);
+    choice.update({1.0, 1.0}, true);
+    EXPECT_EQ(choice.next(), kSift);
+    EXPECT_EQ(after(choice, 1.0, 1.0), kGlobal) << "no longer in doubt";
+  }
+  HybridConfig paper;
+  paper.sift_in_doubt = false;
+  FeatureChoice choice = hybridAt(kGlobal, paper);
+  choice.update({1.0, 1.0}, true);
+  EXPECT_EQ(choice.next(), kGlobal);
 }
 
 TEST(FeatureChoice, ResetBeginsWithSiftAgain) {

@@ -26,6 +26,8 @@ class ScoreTable {
   const Entry& at(std::size_t drive_image, std::size_t training_image) const {
     return entries_[drive_image * training_images_ + training_image];
   }
+  /// Number of SIFT features of an image of the drive.
+  std::size_t siftFeatures(std::size_t drive_image) const { return sift_features_[drive_image]; }
   /// Mean wall-clock time of one comparison.
   double siftCompare_ms() const { return sift_compare_ms_; }
   double globalCompare_ms() const { return global_compare_ms_; }
@@ -33,6 +35,7 @@ class ScoreTable {
  private:
   std::size_t training_images_;
   std::vector<Entry> entries_;
+  std::vector<std::size_t> sift_features_;
   double sift_compare_ms_ = 0.0;
   double global_compare_ms_ = 0.0;
 };
@@ -46,6 +49,7 @@ class RecordedImage final : public ComparableImage {
       : table_(table), drive_image_(drive_image), sift_(sift), global_(global) {}
 
   Score compare(FeatureKind kind, std::size_t training_image) override;
+  std::size_t siftFeatures() override { return table_.siftFeatures(drive_image_); }
   /// Similarities to all training images.
   void row(FeatureKind kind, std::vector<double>& similarities);
   std::size_t siftComparisons() const { return sift_comparisons_; }

@@ -21,6 +21,7 @@ enum class LocalizationState : std::uint8_t {
   kTracking = 2,      ///< recognised images confirm the position
   kUncertain = 3,     ///< the last images do not confirm it
   kRecovering = 4,    ///< taken to be lost; the tracker searches
+  kOffMap = 5,        ///< nothing in the map has been recognised for long: probably far from all of it
 };
 
 /// "NO_MAP", "INITIALIZING", ...
@@ -54,6 +55,8 @@ struct Estimate {
   std::size_t comparisons = 0;                ///< distinct training images compared
   std::size_t features_extracted = 0;         ///< SIFT features of the image before pruning; 0 when there was no need
   std::size_t features_kept = 0;              ///< after pruning
+  double place_ratio = 1.0;                   ///< see PlaceCheck; 1 when there was no need to ask
+  double course_residual_m = 0.0;             ///< see Course; of the last estimates
   TrackerTuning tuning;
   Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();  ///< sigma x, y of the cloud
   StageTimes times;

@@ -15,6 +15,7 @@ class LiveImage final : public ComparableImage {
       : front_end_(front_end), map_(map), sift_(sift), global_(global) {}
 
   Score compare(FeatureKind kind, std::size_t training_image) override;
+  std::size_t siftFeatures() override { return front_end_.sift().size(); }
   /// Time spent on comparisons, without the extraction that they brought about.
   double match_ms() const { return match_ms_; }
 

@@ -9,6 +9,7 @@
 #include "visual_localization/localizer/estimate.h"
 #include "visual_localization/localizer/front_end.h"
 #include "visual_localization/localizer/localizer_config.h"
+#include "visual_localization/localizer/place_check.h"
 #include "visual_localization/localizer/state_assessor.h"
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/similarity/comparable_image.h"
@@ -45,6 +46,8 @@ class Localizer {
   SiftFeatures lastSift() const { return front_end_.siftIfExtracted().value_or(SiftFeatures()); }
 
  private:
+  Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
+                      ComparableImage& image);
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state) const;
   double yawVariance(const TrackerEstimate& tracked) const;
 
@@ -57,6 +60,7 @@ class Localizer {
   PlaceProposal places_;
   std::unique_ptr<Tracker> tracker_;
   FeatureChoice choice_;
+  PlaceCheck place_check_;
   StateAssessor assessor_;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "visual_localization/localizer/course.h"
 #include "visual_localization/localizer/estimate.h"
 #include "visual_localization/parameters/parameter_visitor.h"
 
@@ -21,27 +23,53 @@ struct StateConfig {
   int window = 5;                       ///< so many of the last images are looked at
   int images_to_confirm = 4;            ///< so many of them must confirm the position
   double max_step_m = 10.0;             ///< a larger jump between two images makes what came before worthless
+  bool place_check = true;              ///< ask the whole image whether another place looks more alike
+  double sure_similarity = 0.2;         ///< a stronger SIFT match needs no such second witness
+  double min_place_ratio = 0.985;       ///< mean over the window; below, the position is in doubt
+  int place_check_images = 1000;        ///< of a larger map only so many images are asked per image
+  int course_length = 10;               ///< so many of the last estimates must follow a steady motion
+  double max_course_residual_m = 2.5;   ///< up to this root mean square distance from it
+  int off_map_images = 10;              ///< so many images in a row without confirmation: off the map
+  int min_features = 10;                ///< images with fewer SIFT features are blind: they say nothing either way
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const;
+};
+
+/// What one image says about the position.
+struct Evidence {
+  std::int64_t stamp_ns = 0;
+  FeatureKind features = FeatureKind::kSift;
+  bool recovering = false;   ///< the tracker takes itself to be lost
+  double place_ratio = 1.0;  ///< see PlaceCheck
+  bool blind = false;        ///< there is hardly anything to see in the image
 };
 
 /// Turns the evidence of successive images into a state. The cloud alone cannot tell whether a robot is lost;
 /// the image match is independent evidence.
 class StateAssessor {
  public:
-  explicit StateAssessor(const StateConfig& config) : config_(config) {}
+  explicit StateAssessor(const StateConfig& config)
+      : config_(config), course_(static_cast<std::size_t>(config.course_length)) {}
   /// The position is unknown again.
   void reset();
   /// The state after one more image.
-  LocalizationState assess(const TrackerEstimate& estimate, FeatureKind features, bool recovering);
+  LocalizationState assess(const TrackerEstimate& estimate, const Evidence& evidence);
+  /// Whether the last images look more like another place.
+  bool isDoubtful() const;
+  double courseResidual_m() const { return course_.residual_m(); }
 
  private:
   bool confirms(const TrackerEstimate& estimate, FeatureKind features) const;
+  void remember(const TrackerEstimate& estimate, const Evidence& evidence);
+  bool isCertain() const;
 
   StateConfig config_;
   std::deque<bool> confirmations_;  ///< of the last images, newest at the back
-  bool ever_confirmed_ = false;     ///< since the last reset
+  std::deque<double> place_ratios_;
+  Course course_;
+  int unconfirmed_ = 0;          ///< images in a row after which the position was not certain, blind ones not counted
+  bool ever_confirmed_ = false;  ///< since the last reset
   std::optional<Eigen::Vector2d> last_position_m_;
 };
 

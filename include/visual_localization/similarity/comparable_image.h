@@ -14,6 +14,8 @@ class ComparableImage {
  public:
   virtual ~ComparableImage() = default;
   virtual Score compare(FeatureKind kind, std::size_t training_image) = 0;
+  /// Number of SIFT features that it is compared by; extracts them if that has not been done.
+  virtual std::size_t siftFeatures() = 0;
 };
 
 }  // namespace visual_localization

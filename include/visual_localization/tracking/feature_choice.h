@@ -14,6 +14,7 @@ namespace visual_localization {
 struct HybridConfig {
   double sift_below_m = 7.0;    ///< d_SIFT: after SIFT, global features are next when both sigmas are below
   double global_above_m = 5.5;  ///< d_global: after global features, SIFT is next when one sigma is above
+  bool sift_in_doubt = true;    ///< SIFT also as long as the image looks more like another place
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const { return {}; }
@@ -31,8 +32,9 @@ class FeatureChoice {
   /// The position is unknown: the hybrid choice begins with SIFT.
   void reset();
   FeatureKind next() const { return next_; }
-  /// After an image that was compared by next(): `spread_m` is sigma_x, sigma_y of the cloud (Eq. 2).
-  void update(const Eigen::Vector2d& spread_m);
+  /// After an image that was compared by next(): `spread_m` is sigma_x, sigma_y of the cloud (Eq. 2). `doubtful`: the
+  /// last images look more like another place than like this one, which a small cloud at the wrong place cannot see.
+  void update(const Eigen::Vector2d& spread_m, bool doubtful);
 
  private:
   bool hybrid_;

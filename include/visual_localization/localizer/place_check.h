@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+
+#include <Eigen/Core>
+
+#include "visual_localization/map/training_map.h"
+#include "visual_localization/similarity/comparable_image.h"
+
+namespace visual_localization {
+
+/// A second witness beside the tracker's own comparisons: the whole image should look at least as much like the
+/// training images around the estimate as like any other of the map. A swarm that has settled at the wrong place
+/// compares only what is there, and never sees that another place fits better.
+class PlaceCheck {
+ public:
+  /// Of a map with more than `max_images` every k-th image is looked at, beginning with another one each time.
+  PlaceCheck(const TrainingMap& map, std::size_t max_images, double near_m);
+
+  /// Best global similarity within `near_m` of `position_m`, as a share of the best in the whole map, in [0, 1]. One
+  /// when nothing looks alike anywhere.
+  double ratio(ComparableImage& image, const Eigen::Vector2d& position_m);
+
+ private:
+  const TrainingMap& map_;
+  double near_m_;
+  std::size_t stride_;
+  std::size_t first_ = 0;  ///< of the training images that are looked at
+};
+
+}  // namespace visual_localization

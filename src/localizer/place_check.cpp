@@ -1,0 +1,23 @@
+#include "visual_localization/localizer/place_check.h"
+
+#include <algorithm>
+
+namespace visual_localization {
+
+PlaceCheck::PlaceCheck(const TrainingMap& map, std::size_t max_images, double near_m)
+    : map_(map), near_m_(near_m), stride_((map.size() + max_images - 1) / max_images) {}
+
+double PlaceCheck::ratio(ComparableImage& image, const Eigen::Vector2d& position_m) {
+  constexpr std::size_t kNeighbours = 32;  // in a denser map the nearest ones speak for the others
+  const auto similarity = [&image](std::size_t i) { return image.compare(FeatureKind::kGlobal, i).similarity; };
+  double here = 0.0;
+  for (const Neighbour& neighbour : map_.nearest(position_m, kNeighbours)) {
+    if (neighbour.distance_m <= near_m_) here = std::max(here, similarity(neighbour.image));
+  }
+  double anywhere = here;
+  first_ = (first_ + 1) % stride_;
+  for (std::size_t i = first_; i < map_.size(); i += stride_) anywhere = std::max(anywhere, similarity(i));
+  return anywhere > 0.0 ? here / anywhere : 1.0;
+}
+
+}  // namespace visual_localization
