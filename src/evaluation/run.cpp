@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "visual_localization/evaluation/cpu_stopwatch.h"
 #include "visual_localization/evaluation/image_order.h"
-#include "visual_localization/localizer/stopwatch.h"
 
 namespace visual_localization {
 namespace {
@@ -63,7 +63,7 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
   for (std::size_t i : order) {
     const DriveImage& shown = context.drive.images[i];
     RecordedImage image(context.table, i, sift, global);
-    const Stopwatch stopwatch;
+    const CpuStopwatch stopwatch;
     const Verdict verdict = contestant->process(shown.stamp_ns, image);
     record.method_ms += stopwatch.elapsed_ms();
     counter.add(image, record);

@@ -1,7 +1,7 @@
 #include "visual_localization/evaluation/score_table.h"
 
+#include "visual_localization/evaluation/cpu_stopwatch.h"
 #include "visual_localization/evaluation/parallel.h"
-#include "visual_localization/localizer/stopwatch.h"
 
 namespace visual_localization {
 namespace {
@@ -15,14 +15,14 @@ struct RowTimes {
 RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimilarity& sift,
                  const GlobalSimilarity& global, ScoreTable::Entry* row) {
   RowTimes times;
-  const Stopwatch sift_watch;
+  const CpuStopwatch sift_watch;
   for (std::size_t i = 0; i < map.size(); ++i) {
     const Score score = sift.compare(image.sift, map.image(i).sift);
     row[i].sift = score.similarity;
     row[i].matches = static_cast<std::uint32_t>(score.matches);
   }
   times.sift_ms = sift_watch.elapsed_ms();
-  const Stopwatch global_watch;
+  const CpuStopwatch global_watch;
   for (std::size_t i = 0; i < map.size(); ++i)
     row[i].global = global.compare(image.global, map.image(i).global).similarity;
   times.global_ms = global_watch.elapsed_ms();

@@ -28,7 +28,7 @@ class ScoreTable {
   }
   /// Number of SIFT features of an image of the drive.
   std::size_t siftFeatures(std::size_t drive_image) const { return sift_features_[drive_image]; }
-  /// Mean wall-clock time of one comparison.
+  /// Mean processor time of one comparison.
   double siftCompare_ms() const { return sift_compare_ms_; }
   double globalCompare_ms() const { return global_compare_ms_; }
 

@@ -9,7 +9,7 @@
 
 namespace visual_localization {
 
-/// What extraction and comparisons cost in one pair of rounds, wall-clock milliseconds each.
+/// What extraction and comparisons cost in one pair of rounds, milliseconds of processor time each.
 struct StageCosts {
   double sift_extraction_ms = 0.0;
   double global_extraction_ms = 0.0;
