@@ -44,10 +44,19 @@ constexpr std::size_t kBins = SiftFeatures::kDescriptorSize;
 constexpr std::size_t kGroup = 4;
 using Packed = std::uint8_t;
 Packed packed(std::uint8_t bin) { return static_cast<std::uint8_t>(bin ^ 0x80U); }
+HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
+  std::uint32_t group = 0;
+  std::memcpy(&group, bins, sizeof(group));
+  group ^= 0x80808080U;
+  std::memcpy(to, &group, sizeof(group));
+}
 #else
 constexpr std::size_t kGroup = 2;
 using Packed = std::int16_t;
 Packed packed(std::uint8_t bin) { return bin; }
+HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
+  for (std::size_t i = 0; i < kGroup; ++i) to[i] = bins[i];
+}
 #endif
 constexpr std::size_t kGroups = kBins / kGroup;
 
@@ -58,9 +67,7 @@ void pack(const SiftFeatures& features, std::size_t lanes, std::vector<Packed>& 
     const std::uint8_t* from = features.descriptor(i);
     Packed* tile = to.data() + i / lanes * lanes * kBins + i % lanes * kGroup;
     for (std::size_t group = 0; group < kGroups; ++group) {
-      for (std::size_t bin = 0; bin < kGroup; ++bin) {
-        tile[group * lanes * kGroup + bin] = packed(from[group * kGroup + bin]);
-      }
+      packGroup(from + group * kGroup, tile + group * lanes * kGroup);
     }
   }
 }
@@ -70,11 +77,15 @@ struct Row {
   alignas(4) Packed groups[kBins];
   std::int32_t correction = 0;  ///< what the packing took away from each scalar product
 
-  void set(const std::uint8_t* descriptor) {
+  HWY_INLINE void set(const std::uint8_t* descriptor) {
 #if HWY_TARGET == HWY_AVX3_DL
     std::memcpy(groups, descriptor, kBins);
-    correction = 0;
-    for (std::size_t i = 0; i < kBins; ++i) correction += std::int32_t{128} * descriptor[i];
+    const __m512i ones = _mm512_set1_epi8(1);
+    __m512i sum = _mm512_setzero_si512();
+    for (std::size_t i = 0; i < kBins; i += sizeof(sum)) {
+      sum = _mm512_dpbusd_epi32(sum, _mm512_loadu_si512(descriptor + i), ones);
+    }
+    correction = 128 * _mm512_reduce_add_epi32(sum);
 #else
     for (std::size_t i = 0; i < kBins; ++i) groups[i] = descriptor[i];
 #endif
@@ -97,29 +108,45 @@ HWY_INLINE hn::Vec<Ints> multiplyAdd(hn::Vec<Ints> row, const Packed* tile, hn::
 #endif
 }
 
+/// The sum of all groups, of which some CPUs add the odd ones apart.
+HWY_INLINE hn::Vec<Ints> total(hn::Vec<Ints> sum, hn::Vec<Ints> odd) {
+#if HWY_TARGET == HWY_AVX3_DL
+  (void)odd;
+  return sum;
+#else
+  return hn::RearrangeToOddPlusEven(sum, odd);
+#endif
+}
+
 constexpr std::size_t kRows = 4;  ///< of B at a time: each load of a tile serves so many scalar products
 
-/// Scalar products of kRows rows with a tile, one lane each.
-HWY_INLINE void multiply(const Row* rows, const Packed* tile, hn::Vec<Ints>* products) {
+/// Scalar products of kRows rows with `kTiles` tiles, one lane each: those of the first tile, then of the second. Two
+/// tiles at a time keep eight sums going, enough to hide how long one step takes.
+template <std::size_t kTiles>
+HWY_INLINE void multiply(const Row* rows, const Packed* tiles, hn::Vec<Ints>* products) {
   const Ints ints;
   const std::size_t step = hn::Lanes(ints) * kGroup;
+  const Packed* second = tiles + (kTiles - 1) * kGroups * step;
   hn::Vec<Ints> s0 = hn::Set(ints, rows[0].correction), s1 = hn::Set(ints, rows[1].correction),
                 s2 = hn::Set(ints, rows[2].correction), s3 = hn::Set(ints, rows[3].correction);
-  hn::Vec<Ints> o0 = hn::Zero(ints), o1 = hn::Zero(ints), o2 = hn::Zero(ints), o3 = hn::Zero(ints);
-  for (std::size_t group = 0; group < kGroups; ++group, tile += step) {
-    s0 = multiplyAdd(broadcast(rows[0], group), tile, s0, o0);
-    s1 = multiplyAdd(broadcast(rows[1], group), tile, s1, o1);
-    s2 = multiplyAdd(broadcast(rows[2], group), tile, s2, o2);
-    s3 = multiplyAdd(broadcast(rows[3], group), tile, s3, o3);
+  hn::Vec<Ints> t0 = s0, t1 = s1, t2 = s2, t3 = s3;
+  hn::Vec<Ints> o0 = hn::Zero(ints), o1 = o0, o2 = o0, o3 = o0, p0 = o0, p1 = o0, p2 = o0, p3 = o0;
+  for (std::size_t group = 0; group < kGroups; ++group, tiles += step, second += step) {
+    const auto r0 = broadcast(rows[0], group), r1 = broadcast(rows[1], group), r2 = broadcast(rows[2], group),
+               r3 = broadcast(rows[3], group);
+    s0 = multiplyAdd(r0, tiles, s0, o0);
+    s1 = multiplyAdd(r1, tiles, s1, o1);
+    s2 = multiplyAdd(r2, tiles, s2, o2);
+    s3 = multiplyAdd(r3, tiles, s3, o3);
+    if (kTiles == 1) continue;
+    t0 = multiplyAdd(r0, second, t0, p0);
+    t1 = multiplyAdd(r1, second, t1, p1);
+    t2 = multiplyAdd(r2, second, t2, p2);
+    t3 = multiplyAdd(r3, second, t3, p3);
   }
-#if HWY_TARGET == HWY_AVX3_DL
-  products[0] = s0, products[1] = s1, products[2] = s2, products[3] = s3;
-#else
-  products[0] = hn::RearrangeToOddPlusEven(s0, o0);
-  products[1] = hn::RearrangeToOddPlusEven(s1, o1);
-  products[2] = hn::RearrangeToOddPlusEven(s2, o2);
-  products[3] = hn::RearrangeToOddPlusEven(s3, o3);
-#endif
+  products[0] = total(s0, o0), products[1] = total(s1, o1), products[2] = total(s2, o2), products[3] = total(s3, o3);
+  if (kTiles == 1) return;
+  products[4] = total(t0, p0), products[5] = total(t1, p1), products[6] = total(t2, p2), products[7] = total(t3, p3);
 }
 
 /// The two nearest of each lane.
@@ -189,9 +216,7 @@ void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescri
     const std::size_t count = HWY_MIN(kRows, b.size() - first);
     for (std::size_t r = 0; r < count; ++r) rows[r].set(b.descriptor(first + r));
     Lanes of_row[kRows] = {noLanes(), noLanes(), noLanes(), noLanes()};
-    for (std::size_t i = 0; i < padded; i += lanes) {
-      hn::Vec<Ints> products[kRows];
-      multiply(rows, work.packed.data() + i * kBins, products);
+    const auto offerTile = [&](std::size_t i, const hn::Vec<Ints>* products) HWY_ATTR {
       const auto inverse_norms = hn::Load(floats, work.inverse_norms.get() + i);
       Lanes of_tile{hn::Load(floats, work.best.get() + i), hn::Load(floats, work.second.get() + i),
                     hn::Load(ints, work.index.get() + i)};
@@ -207,6 +232,17 @@ void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescri
       hn::Store(of_tile.best, floats, work.best.get() + i);
       hn::Store(of_tile.second, floats, work.second.get() + i);
       hn::Store(of_tile.index, ints, work.index.get() + i);
+    };
+    hn::Vec<Ints> products[2 * kRows];
+    std::size_t i = 0;
+    for (; i + lanes < padded; i += 2 * lanes) {
+      multiply<2>(rows, work.packed.data() + i * kBins, products);
+      offerTile(i, products);
+      offerTile(i + lanes, products + kRows);
+    }
+    if (i < padded) {
+      multiply<1>(rows, work.packed.data() + i * kBins, products);
+      offerTile(i, products);
     }
     for (std::size_t r = 0; r < count; ++r) nearest.of_b[first + r] = reduce(of_row[r]);
   }
