@@ -1,0 +1,121 @@
+#include "visual_localization/map/nearest_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "test/support/synthetic.h"
+
+namespace visual_localization {
+namespace {
+
+using Positions = std::vector<Eigen::Vector2d>;
+
+/// The first of the nearest, found by looking at all.
+std::uint32_t nearestOf(const Positions& positions_m, const Eigen::Vector2d& place_m) {
+  const auto nearer = [&place_m](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return (a - place_m).squaredNorm() < (b - place_m).squaredNorm();
+  };
+  const auto first = std::min_element(positions_m.begin(), positions_m.end(), nearer);
+  return static_cast<std::uint32_t>(first - positions_m.begin());
+}
+
+NearestGrid gridOf(const Positions& positions_m) {
+  return NearestGrid(
+      positions_m,
+      [&](const Eigen::Vector2d& place_m) { return (positions_m[nearestOf(positions_m, place_m)] - place_m).norm(); },
+      [&](const Eigen::Vector2d& centre_m, double radius_m) {
+        std::vector<std::uint32_t> found;
+        for (std::uint32_t i = 0; i < positions_m.size(); ++i) {
+          if ((positions_m[i] - centre_m).norm() < radius_m) found.push_back(i);
+        }
+        return found;
+      });
+}
+
+/// Compares with all positions at random places in the square around the origin. Returns the share of answers.
+double shareAnsweredRightly(const Positions& positions_m, double half_side_m) {
+  const NearestGrid grid = gridOf(positions_m);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> coordinate_m(-half_side_m, half_side_m);
+  constexpr int kPlaces = 2000;
+  int answered = 0;
+  for (int i = 0; i < kPlaces; ++i) {
+    const Eigen::Vector2d place_m(coordinate_m(random), coordinate_m(random));
+    const auto found = grid.nearest(place_m);
+    if (!found) continue;
+    ++answered;
+    const std::uint32_t expected = nearestOf(positions_m, place_m);
+    EXPECT_EQ(found->index, expected) << place_m.transpose();
+    EXPECT_EQ(found->squared_m2, (positions_m[expected] - place_m).squaredNorm());
+  }
+  return static_cast<double>(answered) / kPlaces;
+}
+
+TEST(NearestGrid, AnswersOnARoundAsAllPositionsWould) {
+  EXPECT_GT(shareAnsweredRightly(test::circle(150, 30.0), 32.0), 0.9);  // all are near the middle
+}
+
+TEST(NearestGrid, AnswersOnACloudAsAllPositionsWould) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> coordinate_m(0.0, 10.0);
+  Positions cloud(200);
+  for (auto& position : cloud) position = {coordinate_m(random), coordinate_m(random)};
+  EXPECT_GT(shareAnsweredRightly(cloud, 20.0), 0.9);
+}
+
+TEST(NearestGrid, AnswersAlongALine) {
+  Positions line = test::street(100, 1.0);
+  for (auto& position : line) position.x() -= 50.0;
+  EXPECT_GT(shareAnsweredRightly(line, 5.0), 0.9);
+  for (auto& position : line) std::swap(position.x(), position.y());
+  EXPECT_GT(shareAnsweredRightly(line, 5.0), 0.9);
+}
+
+TEST(NearestGrid, GivesTheFirstOfEquals) {
+  const Positions twice{{0.0, 0.0}, {2.0, 0.0}, {2.0, 0.0}, {0.0, 0.0}, {4.0, 0.0}};
+  const NearestGrid grid = gridOf(twice);
+  EXPECT_EQ(grid.nearest({0.1, 0.1})->index, 0U);
+  EXPECT_EQ(grid.nearest({1.0, 0.0})->index, 0U);
+  EXPECT_EQ(grid.nearest({1.5, 0.0})->index, 1U);
+  EXPECT_EQ(grid.nearest({3.0, 0.25})->index, 1U);
+}
+
+TEST(NearestGrid, HasNoAnswerFarOutsideOrNowhere) {
+  const Positions round = test::circle(20, 10.0);
+  const NearestGrid grid = gridOf(round);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector2d& place_m :
+       Positions{{100.0, 0.0}, {-100.0, 0.0}, {0.0, 1e300}, {kNan, 0.0}, {0.0, kNan}, {kInfinity, 0.0}}) {
+    EXPECT_FALSE(grid.nearest(place_m)) << place_m.transpose();
+  }
+  EXPECT_TRUE(grid.nearest({10.5, 0.0}));
+}
+
+TEST(NearestGrid, KnowsTheOnlyPosition) {
+  const Positions one{{3.0, -4.0}};
+  const NearestGrid grid = gridOf(one);
+  const auto found = grid.nearest({3.0, -4.0});
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->index, 0U);
+  EXPECT_EQ(found->squared_m2, 0.0);
+}
+
+TEST(NearestGrid, GivesTheFirstOfAFewOnOneSpotAndNoneOfMany) {
+  const Positions few(20, Eigen::Vector2d(1.0, 1.0));
+  EXPECT_EQ(gridOf(few).nearest({1.0, 1.0})->index, 0U);
+  const Positions many(100, Eigen::Vector2d(1.0, 1.0));
+  EXPECT_FALSE(gridOf(many).nearest({1.0, 1.0}));
+}
+
+TEST(NearestGrid, AnswersBetweenPositionsThatAreFarApart) {
+  const Positions apart{{-1e6, -1e6}, {1e6, 1e6}, {1e6, -1e6}};
+  EXPECT_EQ(shareAnsweredRightly(apart, 1e6), 1.0);
+}
+
+}  // namespace
+}  // namespace visual_localization
