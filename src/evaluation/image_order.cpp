@@ -36,10 +36,14 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const
   if (images == 0) return {};
   requireIndex("start index", start, images);
   const std::size_t ahead = shape.closed ? images : images - start;
-  const auto steps = static_cast<std::size_t>(std::ceil(static_cast<double>(ahead) / shape.speed));
+  const auto travelledAt = [&shape](std::size_t step) {
+    return static_cast<std::size_t>(std::floor(static_cast<double>(step) * shape.speed));
+  };
+  auto steps = static_cast<std::size_t>(std::ceil(static_cast<double>(ahead) / shape.speed));
+  if (travelledAt(steps - 1) >= ahead) --steps;  // 21 / 0.7 is a little more than 30
   std::vector<std::size_t> order(steps);
   for (std::size_t step = 0; step < steps; ++step) {
-    const auto travelled = static_cast<std::size_t>(std::floor(static_cast<double>(step) * shape.speed));
+    const std::size_t travelled = travelledAt(step);
     const std::size_t jump = shape.kidnapped && step >= steps / 2 ? images / 2 : 0;
     order[step] = (start + travelled + jump) % images;
   }

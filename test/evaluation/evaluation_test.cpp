@@ -1,34 +1,12 @@
 #include <sstream>
-#include <stdexcept>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "visual_localization/evaluation/error_statistics.h"
-#include "visual_localization/evaluation/image_order.h"
 #include "visual_localization/evaluation/track_csv.h"
 
 namespace visual_localization {
 namespace {
-
-using ::testing::ElementsAre;
-
-TEST(ImageOrder, WrapsAroundTheClosedRound) {
-  EXPECT_THAT(imageOrder(5, 0, std::nullopt), ElementsAre(0, 1, 2, 3, 4));
-  EXPECT_THAT(imageOrder(5, 3, std::nullopt), ElementsAre(3, 4, 0, 1, 2));
-}
-
-TEST(ImageOrder, KidnappingJumpsAndGoesOnFromThere) {
-  EXPECT_THAT(imageOrder(6, 0, Kidnapping{3, 0}), ElementsAre(0, 1, 2, 0, 1, 2));
-  EXPECT_THAT(imageOrder(6, 4, Kidnapping{2, 5}), ElementsAre(4, 5, 5, 0, 1, 2));
-}
-
-TEST(ImageOrder, RefusesIndicesBeyondTheRound) {
-  EXPECT_THROW(imageOrder(5, 5, std::nullopt), std::invalid_argument);
-  EXPECT_THROW(imageOrder(5, 0, Kidnapping{5, 0}), std::invalid_argument);
-  EXPECT_THROW(imageOrder(5, 0, Kidnapping{0, 9}), std::invalid_argument);
-  EXPECT_TRUE(imageOrder(0, 0, std::nullopt).empty());
-}
 
 TEST(ErrorStatistics, KnownAnswers) {
   const ErrorStatistics odd = summarise({6.0, 1.0, 2.0});

@@ -1,0 +1,83 @@
+#include "visual_localization/evaluation/image_order.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace visual_localization {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::Lt;
+
+constexpr bool kClosed = true;
+constexpr bool kOpen = false;
+
+TEST(ImageOrder, WrapsAroundTheClosedRound) {
+  EXPECT_THAT(imageOrder(5, 0, std::nullopt), ElementsAre(0, 1, 2, 3, 4));
+  EXPECT_THAT(imageOrder(5, 3, std::nullopt), ElementsAre(3, 4, 0, 1, 2));
+}
+
+TEST(ImageOrder, KidnappingJumpsAndGoesOnFromThere) {
+  EXPECT_THAT(imageOrder(6, 0, Kidnapping{3, 0}), ElementsAre(0, 1, 2, 0, 1, 2));
+  EXPECT_THAT(imageOrder(6, 4, Kidnapping{2, 5}), ElementsAre(4, 5, 5, 0, 1, 2));
+}
+
+TEST(ImageOrder, RefusesIndicesBeyondTheRound) {
+  EXPECT_THROW(imageOrder(5, 5, std::nullopt), std::invalid_argument);
+  EXPECT_THROW(imageOrder(5, 0, Kidnapping{5, 0}), std::invalid_argument);
+  EXPECT_THROW(imageOrder(5, 0, Kidnapping{0, 9}), std::invalid_argument);
+  EXPECT_THROW(imageOrder(5, 5, RunShape{}), std::invalid_argument);
+  EXPECT_TRUE(imageOrder(0, 0, std::nullopt).empty());
+  EXPECT_TRUE(imageOrder(0, 0, RunShape{}).empty());
+}
+
+TEST(ImageOrder, AnOpenRoundIsDrivenToItsEnd) {
+  EXPECT_THAT(imageOrder(5, 2, RunShape{kOpen}), ElementsAre(2, 3, 4));
+  EXPECT_THAT(imageOrder(5, 4, RunShape{kOpen}), ElementsAre(4));
+  EXPECT_THAT(imageOrder(5, 2, RunShape{kClosed}), ElementsAre(2, 3, 4, 0, 1));
+}
+
+TEST(ImageOrder, SpeedSkipsImagesOrRepeatsThem) {
+  EXPECT_THAT(imageOrder(5, 0, RunShape{kOpen, 2.0}), ElementsAre(0, 2, 4));
+  EXPECT_THAT(imageOrder(5, 3, RunShape{kClosed, 2.0}), ElementsAre(3, 0, 2));
+  EXPECT_THAT(imageOrder(2, 0, RunShape{kOpen, 0.5}), ElementsAre(0, 0, 1, 1));
+  EXPECT_THAT(imageOrder(3, 1, RunShape{kOpen, 64.0}), ElementsAre(1));
+  EXPECT_EQ(imageOrder(10, 0, RunShape{kOpen, 1.0 / 64.0}).size(), 640U);
+}
+
+TEST(ImageOrder, NoSpeedDrivesBeyondTheEndOfAnOpenRound) {
+  EXPECT_EQ(imageOrder(21, 0, RunShape{kOpen, 0.7}).size(), 30U);
+  for (std::size_t images = 1; images < 60; ++images) {
+    for (int speed = 5; speed < 400; ++speed) {
+      const auto order = imageOrder(images, 0, RunShape{kOpen, 0.01 * speed});
+      ASSERT_TRUE(std::is_sorted(order.begin(), order.end())) << images << " images, speed " << 0.01 * speed;
+      ASSERT_EQ(order.front(), 0U);
+    }
+  }
+}
+
+TEST(ImageOrder, TheKidnappedGoOnAtTheOtherSide) {
+  EXPECT_THAT(imageOrder(6, 1, RunShape{kClosed, 1.0, true}), ElementsAre(1, 2, 3, 1, 2, 3));
+  EXPECT_THAT(imageOrder(1, 0, RunShape{kClosed, 1.0, true}), ElementsAre(0));
+}
+
+TEST(StartImages, AreSpreadEvenlyOverAClosedRound) {
+  EXPECT_THAT(startImages(6, kClosed, 0), ElementsAre(0, 1, 2, 3, 4, 5));
+  EXPECT_THAT(startImages(6, kClosed, 3), ElementsAre(0, 2, 4));
+  EXPECT_THAT(startImages(7, kClosed, 3), ElementsAre(0, 2, 4));
+  EXPECT_THAT(startImages(3, kClosed, 1000000), ElementsAre(0, 1, 2));
+}
+
+TEST(StartImages, LieInTheFirstHalfOfAnOpenRound) {
+  EXPECT_THAT(startImages(7, kOpen, 0), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(startImages(8, kOpen, 2), ElementsAre(0, 2));
+  EXPECT_THAT(startImages(1, kOpen, 5), ElementsAre(0));
+  EXPECT_THAT(startImages(403, kOpen, 8), Each(Lt(202U)));
+}
+
+}  // namespace
+}  // namespace visual_localization
