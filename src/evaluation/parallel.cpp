@@ -6,18 +6,31 @@
 #include <condition_variable>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 namespace visual_localization {
 namespace {
 
+/// As many threads as the system grants, `wanted` at most.
+std::vector<std::thread> startThreads(std::size_t wanted, const std::function<void()>& work) {
+  std::vector<std::thread> pool;
+  pool.reserve(wanted);
+  try {
+    while (pool.size() < wanted) pool.emplace_back(work);
+  } catch (const std::system_error&) {
+    // The threads that did start share the work.
+  }
+  return pool;
+}
+
 /// The tasks that are left, shared by the threads that do them.
 class TaskQueue {
  public:
   TaskQueue(std::size_t count, const std::function<void(std::size_t)>& task) : count_(count), task_(task) {}
 
-  void work() {
+  void work() noexcept {
     for (std::size_t i = next_++; i < count_; i = next_++) {
       try {
         task_(i);
@@ -61,12 +74,12 @@ class TaskQueue {
 void parallelFor(std::size_t count, std::size_t threads, const std::function<void(std::size_t)>& task,
                  const ProgressCallback& progress) {
   TaskQueue queue(count, task);
-  const std::size_t workers = std::max<std::size_t>(1, std::min(threads, count));
-  std::vector<std::thread> pool;
-  for (std::size_t i = 0; i < workers; ++i) pool.emplace_back([&queue] { queue.work(); });
+  const std::size_t wanted = std::max<std::size_t>(1, std::min(threads, count));
+  std::vector<std::thread> pool = startThreads(wanted, [&queue] { queue.work(); });
+  if (pool.empty()) queue.work();
   std::exception_ptr error;
   try {
-    queue.waitFor(workers, progress);
+    queue.waitFor(std::max<std::size_t>(1, pool.size()), progress);
   } catch (...) {
     error = std::current_exception();
   }
