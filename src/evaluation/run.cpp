@@ -44,9 +44,10 @@ float errorOf(const Eigen::Vector2d& position_m, const DriveImage& image, const 
   return static_cast<float>((position_m - map.frame().toEastNorth(*image.truth)).norm());
 }
 
-/// Different for every run, the same whenever it is repeated.
+/// Different for every run, the same whenever it is repeated; a seed of the localizer, which is not negative.
 std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
-  return static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start);
+  constexpr std::uint32_t kLargest = 0x7FFFFFFF;
+  return (static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start)) & kLargest;
 }
 
 }  // namespace
