@@ -1,5 +1,6 @@
 #include "visual_localization/evaluation/unit_result.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <locale>
@@ -91,6 +92,7 @@ class SectionReader {
     if (!std::getline(in_, line)) throw std::runtime_error("is cut off");
     return !line.empty();
   }
+  bool atEnd() { return in_.peek() == std::istringstream::traits_type::eof(); }
 
  private:
   std::istringstream in_;
@@ -103,14 +105,53 @@ class NumberReader {
 
   template <class Number>
   NumberReader& operator>>(Number& number) {
-    if (!(in_ >> number)) throw std::runtime_error("has a line that is no list of numbers");
-    in_.ignore(1, ',');
+    const bool follows = first_ || in_.get() == ',';
+    first_ = false;
+    if (!follows || !(in_ >> number)) refuse();
     return *this;
+  }
+  void finish() {
+    if (in_.get() != std::istringstream::traits_type::eof()) refuse();
   }
 
  private:
+  [[noreturn]] static void refuse() { throw std::runtime_error("has a line that is no list of numbers"); }
+
   std::istringstream in_;
+  bool first_ = true;
 };
+
+void read(const std::string& line, RunFigures& run) {
+  NumberReader numbers(line);
+  numbers >> run.start >> run.images >> run.judged >> run.mean_err_m >> run.within_5m >> run.comparisons_per_image >>
+      run.sift_share >> run.steps_to_localise >> run.steps_to_relocalise >> run.extract_ms >> run.match_ms >>
+      run.update_ms;
+  numbers.finish();
+}
+
+void read(const std::string& line, StepSums& step) {
+  NumberReader numbers(line);
+  numbers >> step.runs >> step.judged >> step.err_m >> step.comparisons >> step.sift;
+  numbers.finish();
+}
+
+std::ptrdiff_t fieldsOf(const std::string& row) { return std::count(row.begin(), row.end(), ',') + 1; }
+
+/// Runs and steps count the same images, each in its own way: where a line is lost, they disagree.
+void requireConsistent(const UnitResult& unit) {
+  if (unit.runs.empty()) throw std::runtime_error("has no run");
+  std::size_t images = 0;
+  std::size_t judged = 0;
+  for (const RunFigures& run : unit.runs) {
+    images += run.images;
+    judged += run.judged;
+  }
+  for (const StepSums& step : unit.steps) {
+    images -= step.runs;
+    judged -= step.judged;
+  }
+  if (images != 0 || judged != 0) throw std::runtime_error("has runs and steps that do not fit together");
+}
 
 }  // namespace
 
@@ -162,24 +203,21 @@ UnitResult parseUnit(const std::string& text) {
   SectionReader sections(text);
   std::string line;
   sections.expect("runs");
-  while (sections.next(line)) {
-    RunFigures run;
-    NumberReader(line) >> run.start >> run.images >> run.judged >> run.mean_err_m >> run.within_5m >>
-        run.comparisons_per_image >> run.sift_share >> run.steps_to_localise >> run.steps_to_relocalise >>
-        run.extract_ms >> run.match_ms >> run.update_ms;
-    unit.runs.push_back(run);
-  }
+  while (sections.next(line)) read(line, unit.runs.emplace_back());
   sections.expect("steps");
-  while (sections.next(line)) {
-    StepSums step;
-    NumberReader(line) >> step.runs >> step.judged >> step.err_m >> step.comparisons >> step.sift;
-    unit.steps.push_back(step);
-  }
+  while (sections.next(line)) read(line, unit.steps.emplace_back());
   sections.expect("trace");
-  while (sections.next(line)) unit.trace.push_back(line);
+  while (sections.next(line)) {
+    if (fieldsOf(line) != fieldsOf(kTraceColumns)) throw std::runtime_error("has a line of a trace that is not whole");
+    unit.trace.push_back(line);
+  }
   sections.expect("all");
-  while (sections.next(line)) NumberReader(line) >> unit.median_err_m >> unit.recall_at_p99;
-  if (unit.runs.empty()) throw std::runtime_error("has no run");
+  sections.next(line);
+  NumberReader all(line);
+  all >> unit.median_err_m >> unit.recall_at_p99;
+  all.finish();
+  if (sections.next(line) || !sections.atEnd()) throw std::runtime_error("goes on behind its end");
+  requireConsistent(unit);
   return unit;
 }
 

@@ -1,0 +1,117 @@
+#include "visual_localization/evaluation/unit_result.h"
+
+#include <limits>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace visual_localization {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+
+RunRecord runWithErrors(std::size_t start, const std::vector<float>& errors_m) {
+  RunRecord run;
+  run.start = start;
+  for (const float error_m : errors_m) run.steps.push_back({error_m, error_m < 5.0F ? 0.9F : 0.1F, 10, true});
+  return run;
+}
+
+/// A run of a tracker with its course, and one whose last image has no true position.
+UnitResult exampleUnit() {
+  RunRecord traced = runWithErrors(3, {1.0F, 9.0F, 2.0F});
+  traced.trace.resize(traced.steps.size());
+  traced.sift_extractions = 3;
+  traced.sift_comparisons = 30;
+  traced.method_ms = 0.3;
+  return summariseRuns({traced, runWithErrors(0, {4.0F, kUnknown})}, {20.0, 2.0, 0.5, 0.01});
+}
+
+std::string refusal(const std::string& text) {
+  try {
+    parseUnit(text);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(UnitResult, SumsUpKnownRuns) {
+  const UnitResult unit = exampleUnit();
+  ASSERT_EQ(unit.runs.size(), 2U);
+  EXPECT_EQ(unit.runs[0].judged, 3U);
+  EXPECT_DOUBLE_EQ(unit.runs[0].mean_err_m, 4.0);
+  EXPECT_DOUBLE_EQ(unit.runs[0].within_5m, 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(unit.runs[0].extract_ms, 20.0);
+  EXPECT_DOUBLE_EQ(unit.runs[0].match_ms, 5.0);
+  EXPECT_DOUBLE_EQ(unit.runs[0].update_ms, 0.1);
+  EXPECT_DOUBLE_EQ(unit.runs[0].comparisons_per_image, 10.0);
+  EXPECT_DOUBLE_EQ(unit.median_err_m, 3.0);
+  EXPECT_DOUBLE_EQ(unit.recall_at_p99, 0.75);
+  ASSERT_EQ(unit.steps.size(), 3U);
+  EXPECT_EQ(unit.steps[0].runs, 2U);
+  EXPECT_DOUBLE_EQ(unit.steps[0].err_m, 5.0);
+  EXPECT_EQ(unit.steps[2].runs, 1U);
+  EXPECT_EQ(unit.trace.size(), 3U);
+}
+
+TEST(UnitResult, AnImageWithoutTruePositionIsNotJudged) {
+  const UnitResult unit = exampleUnit();
+  EXPECT_EQ(unit.runs[1].images, 2U);
+  EXPECT_EQ(unit.runs[1].judged, 1U);
+  EXPECT_DOUBLE_EQ(unit.runs[1].mean_err_m, 4.0);
+  EXPECT_EQ(unit.steps[1].runs, 2U);
+  EXPECT_EQ(unit.steps[1].judged, 1U);
+}
+
+TEST(UnitResult, ReadsBackAsItWasWritten) {
+  const std::string text = serialise(exampleUnit());
+  EXPECT_EQ(serialise(parseUnit(text)), text);
+  EXPECT_EQ(parseUnit(text).trace, exampleUnit().trace);
+}
+
+TEST(UnitResult, RefusesATextThatIsCutOffAnywhere) {
+  const std::string text = serialise(exampleUnit());
+  for (std::size_t length = 0; length < text.size(); ++length) {
+    EXPECT_NE(refusal(text.substr(0, length)), "accepted") << length << " of " << text.size();
+  }
+}
+
+TEST(UnitResult, RefusesATextThatLostALineOrHasOneTwice) {
+  const std::string text = serialise(exampleUnit());
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = text.find('\n', begin) + 1;
+    const std::string line = text.substr(begin, end - begin);
+    const bool is_trace = begin > text.find("trace\n") && begin < text.find("all\n") && line.find(',') != line.npos;
+    if (!is_trace) {
+      EXPECT_NE(refusal(text.substr(0, begin) + text.substr(end)), "accepted") << "without " << line;
+      EXPECT_NE(refusal(text.substr(0, end) + text.substr(begin)), "accepted") << "twice " << line;
+    }
+    begin = end;
+  }
+}
+
+TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
+  const std::string good = "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\nall\n2,1\n\n";
+  ASSERT_EQ(refusal(good), "accepted");
+  const auto with = [&good](const std::string& part, const std::string& replacement) {
+    return std::string(good).replace(good.find(part), part.size(), replacement);
+  };
+  for (const std::string& bad :
+       {with("0,1,1,2", "0,x,1,2"), with("0,1,1,2", "0,1,nan,2"), with("0,1,1,2", "0;1,1,2"), with("0,0,0\n", "0,0\n"),
+        with("0,0,0\n", "0,0,0,0\n"), with("7,1\n", "7,1 \n"), with("2,1\n", "2\n"), with("2,1\n", "2,1,3\n"),
+        with("2,1\n", "1e999,1\n"), with("0,1,1,2", "99999999999999999999999,1,1,2")}) {
+    EXPECT_THAT(refusal(bad), HasSubstr("no list of numbers")) << bad;
+  }
+  EXPECT_THAT(refusal(with("trace\n", "trace\n1,2\n")), HasSubstr("trace that is not whole"));
+  EXPECT_THAT(refusal(good + "more"), HasSubstr("behind its end"));
+  EXPECT_THAT(refusal(with("1,1,2,7,1\n", "2,1,2,7,1\n")), HasSubstr("do not fit together"));
+  EXPECT_THAT(refusal("runs\n\nsteps\n\ntrace\n\nall\n0,0\n\n"), HasSubstr("has no run"));
+  EXPECT_THAT(refusal("something else\n"), HasSubstr("'runs' is missing"));
+}
+
+}  // namespace
+}  // namespace visual_localization
