@@ -13,6 +13,7 @@ using Setting = std::pair<std::string, std::string>;
 
 constexpr double kSlowest = 1.0 / 64.0;
 constexpr double kFastest = 64.0;
+constexpr std::size_t kMostStarts = 1000000;
 
 std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   std::vector<RoundSpec> rounds;
@@ -211,8 +212,8 @@ Experiment parse(YamlMap yaml) {
   experiment.rounds = readRounds(rounds);
   rounds.requireNoMore();
   experiment.pairs = readPairs(yaml, experiment.rounds);
-  if (yaml.text("starts", "all") != "all") experiment.starts = yaml.count("starts", 0, 1);
-  experiment.trace_start = yaml.count("trace_start", 0, 0);
+  if (yaml.text("starts", "all") != "all") experiment.starts = yaml.count("starts", 0, 1, kMostStarts);
+  experiment.trace_start = yaml.count("trace_start", 0, 0, kMostStarts);
   experiment.map = configured<MapBuilderConfig>(yaml, "map_parameters");
   experiment.front_end = configured<LocalizerConfig>(yaml, "parameters");
   experiment.methods = readMethods(yaml, experiment.front_end);
@@ -232,12 +233,10 @@ bool MethodSpec::isTracker() const {
   return std::find(recognisers.begin(), recognisers.end(), tracker) == recognisers.end();
 }
 
-Experiment readExperiment(const std::string& path) {
-  try {
-    return parse(YamlMap::load(path));
-  } catch (const YAML::Exception& error) {
-    throw ParameterError(path + ": not valid: " + error.what());
-  }
+Experiment readExperiment(const std::string& path) { return parse(YamlMap::load(path)); }
+
+Experiment parseExperiment(const std::string& yaml, const std::string& path) {
+  return parse(YamlMap::parse(yaml, path));
 }
 
 }  // namespace visual_localization

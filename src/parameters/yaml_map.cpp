@@ -4,16 +4,26 @@
 #include <cmath>
 #include <utility>
 
+#include "visual_localization/io/partial_file.h"
+#include "visual_localization/io/read_file.h"
+
 namespace visual_localization::parameters {
 namespace {
+
+/// `where`: what a refusal begins with.
+std::string keyOf(const YAML::Node& key, const std::string& where) {
+  if (!key.IsScalar()) throw ParameterError(where + ": has a key that is no text");
+  return key.Scalar();
+}
 
 /// `depth`: how many mappings more are accepted; an alias may refer to the mapping that it is in.
 void flattenInto(const YAML::Node& node, const std::string& prefix, const std::string& path, int depth,
                  ParameterValues& out) {
   if (depth == 0) throw ParameterError(path + ": key '" + prefix + "' is nested too deeply");
   for (const auto& entry : node) {
-    const auto key = entry.first.as<std::string>();
+    const std::string key = keyOf(entry.first, path);
     const std::string name = prefix.empty() ? key : prefix + "/" + key;
+    if (out.count(name) != 0) throw ParameterError(path + ": key '" + name + "' appears twice");
     if (entry.second.IsMap()) {
       flattenInto(entry.second, name, path, depth - 1, out);
     } else if (entry.second.IsScalar()) {
@@ -38,15 +48,28 @@ ParameterValues flatten(const YAML::Node& mapping, const std::string& path) {
 }
 
 YamlMap::YamlMap(YAML::Node node, std::string path, std::string prefix)
-    : node_(std::move(node)), path_(std::move(path)), prefix_(std::move(prefix)) {}
+    : node_(std::move(node)), path_(std::move(path)), prefix_(std::move(prefix)) {
+  std::set<std::string> keys;
+  for (const auto& entry : node_) {
+    const std::string key = keyOf(entry.first, prefix_.empty() ? path_ : path_ + ": " + quoted(prefix_));
+    if (!keys.insert(key).second) refuse(key, "appears twice");
+  }
+}
 
 YamlMap YamlMap::load(const std::string& path) {
   try {
-    const YAML::Node root = YAML::LoadFile(path);
-    if (!root.IsMap()) throw ParameterError(path + ": must be a mapping");
-    return {root, path, ""};
-  } catch (const YAML::BadFile&) {
-    throw ParameterError(path + ": cannot be opened");
+    return parse(readFile(path), path);
+  } catch (const FileError& error) {
+    throw ParameterError(error.what());
+  }
+}
+
+YamlMap YamlMap::parse(const std::string& text, const std::string& path) {
+  try {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1) throw ParameterError(path + ": holds several documents, must be one mapping");
+    if (documents.empty() || !documents.front().IsMap()) throw ParameterError(path + ": must be a mapping");
+    return {documents.front(), path, ""};
   } catch (const YAML::Exception& error) {
     throw ParameterError(path + ": not valid YAML: " + error.what());
   }
@@ -97,7 +120,7 @@ double YamlMap::real(const std::string& key, double otherwise, double min, doubl
   return parsed;
 }
 
-std::size_t YamlMap::count(const std::string& key, std::size_t otherwise, std::size_t min) {
+std::size_t YamlMap::count(const std::string& key, std::size_t otherwise, std::size_t min, std::size_t max) {
   if (!has(key)) {
     known_.insert(key);
     return otherwise;
@@ -105,8 +128,8 @@ std::size_t YamlMap::count(const std::string& key, std::size_t otherwise, std::s
   const std::string value = text(key);
   std::int64_t parsed = -1;
   const bool is_number = YAML::convert<std::int64_t>::decode(YAML::Node(value), parsed);
-  if (!is_number || parsed < static_cast<std::int64_t>(min)) {
-    refuse(key, "= " + value + " must be an integer of at least " + std::to_string(min));
+  if (!is_number || parsed < static_cast<std::int64_t>(min) || parsed > static_cast<std::int64_t>(max)) {
+    refuse(key, "= " + value + " must be an integer in [" + std::to_string(min) + ", " + std::to_string(max) + "]");
   }
   return static_cast<std::size_t>(parsed);
 }
@@ -165,14 +188,17 @@ std::vector<std::pair<std::string, std::vector<std::string>>> YamlMap::sweep(con
       if (!item.IsScalar()) refuse(key, expected);
       values.push_back(item.Scalar());
     }
-    sweep.emplace_back(entry.first.as<std::string>(), std::move(values));
+    const std::string name = keyOf(entry.first, path_ + ": " + quoted(prefix_ + key));
+    const bool twice = std::any_of(sweep.begin(), sweep.end(), [&name](const auto& one) { return one.first == name; });
+    if (twice) refuse(key + "/" + name, "appears twice");
+    sweep.emplace_back(name, std::move(values));
   }
   return sweep;
 }
 
 void YamlMap::requireNoMore() const {
   for (const auto& entry : node_) {
-    const auto key = entry.first.as<std::string>();
+    const std::string key = entry.first.Scalar();
     if (known_.count(key) != 0) continue;
     std::string allowed;
     for (const std::string& name : known_) allowed += (allowed.empty() ? "" : ", ") + name;

@@ -56,5 +56,7 @@ struct Experiment {
 /// Reads an experiment's YAML file. Throws ParameterError, in one line that names the file and the key, for anything
 /// unknown, missing or contradictory.
 Experiment readExperiment(const std::string& path);
+/// The same of the file's text; `path` is for messages.
+Experiment parseExperiment(const std::string& yaml, const std::string& path);
 
 }  // namespace visual_localization

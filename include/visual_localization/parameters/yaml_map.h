@@ -11,12 +11,14 @@
 
 namespace visual_localization::parameters {
 
-/// A mapping of a YAML file of which every key must be asked for: a key nobody knows is a mistake of the writer. All
-/// errors are ParameterErrors of one line that name the file and the key.
+/// A mapping of a YAML file of which every key must be asked for: a key nobody knows is a mistake of the writer, and so
+/// is one that appears twice. All errors are ParameterErrors of one line that name the file and the key.
 class YamlMap {
  public:
   /// The mapping at the top of a file.
   static YamlMap load(const std::string& path);
+  /// The same of a text; `path` is for messages.
+  static YamlMap parse(const std::string& text, const std::string& path);
 
   bool has(const std::string& key) const;
   /// Throws when the key is missing or no text.
@@ -24,7 +26,7 @@ class YamlMap {
   std::string text(const std::string& key, const std::string& otherwise);
   bool flag(const std::string& key, bool otherwise);
   double real(const std::string& key, double otherwise, double min, double max);
-  std::size_t count(const std::string& key, std::size_t otherwise, std::size_t min);
+  std::size_t count(const std::string& key, std::size_t otherwise, std::size_t min, std::size_t max);
   /// Throws when the key is missing or no mapping.
   YamlMap map(const std::string& key);
   /// Throws when the key is missing or no list of mappings.

@@ -1,0 +1,149 @@
+#include "visual_localization/parameters/yaml_map.h"
+
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/support/temporary_folder.h"
+
+namespace visual_localization::parameters {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::Pair;
+using ::testing::StartsWith;
+
+/// What `use` refuses in the mapping `text`, in a file called f.yaml; "accepted" when it does not.
+std::string refusal(const std::string& text, const std::function<void(YamlMap&)>& use) {
+  try {
+    YamlMap map = YamlMap::parse(text, "f.yaml");
+    use(map);
+    map.requireNoMore();
+  } catch (const ParameterError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+std::string refusal(const std::string& text) {
+  return refusal(text, [](YamlMap&) {});
+}
+
+TEST(YamlMap, GivesWhatTheFileSays) {
+  YamlMap map = YamlMap::parse("{name: x, on: yes, share: 0.5, runs: 7, inner: {a: 1}, none: }", "f.yaml");
+  EXPECT_EQ(map.text("name"), "x");
+  EXPECT_TRUE(map.flag("on", false));
+  EXPECT_EQ(map.real("share", 0.0, 0.0, 1.0), 0.5);
+  EXPECT_EQ(map.count("runs", 0, 1, 10), 7U);
+  EXPECT_EQ(map.map("inner").text("a"), "1");
+  EXPECT_FALSE(map.has("none"));
+  EXPECT_EQ(map.text("none", "nothing"), "nothing");
+  EXPECT_NO_THROW(map.requireNoMore());
+}
+
+TEST(YamlMap, GivesTheDefaultsOfWhatTheFileDoesNotSay) {
+  YamlMap map = YamlMap::parse("{}", "f.yaml");
+  EXPECT_EQ(map.text("name", "x"), "x");
+  EXPECT_TRUE(map.flag("on", true));
+  EXPECT_EQ(map.real("share", 2.5, 0.0, 1.0), 2.5);
+  EXPECT_EQ(map.count("runs", 3, 5, 10), 3U);
+  EXPECT_TRUE(map.parameters("parameters").empty());
+  EXPECT_TRUE(map.sweep("sweep").empty());
+}
+
+TEST(YamlMap, GivesListsAndParameters) {
+  YamlMap map = YamlMap::parse("{pairs: [[a, b], [b, a]], p: {a: {b: 2}, c: '3'}, s: {k: [1, two]}}", "f.yaml");
+  EXPECT_THAT(map.textLists("pairs", 2), ElementsAre(ElementsAre("a", "b"), ElementsAre("b", "a")));
+  EXPECT_THAT(map.parameters("p"),
+              ElementsAre(Pair("a/b", ParameterValue(std::int64_t{2})), Pair("c", ParameterValue(std::string("3")))));
+  EXPECT_THAT(map.sweep("s"), ElementsAre(Pair("k", ElementsAre("1", "two"))));
+}
+
+TEST(YamlMap, RefusesAKeyNobodyAskedForWithTheKnownOnes) {
+  const auto use = [](YamlMap& map) {
+    map.text("name", "");
+    map.flag("closed", true);
+  };
+  EXPECT_EQ(refusal("{nmae: x}", use), "f.yaml: 'nmae' is unknown; allowed here: closed, name");
+}
+
+TEST(YamlMap, RefusesAKeyThatAppearsTwice) {
+  EXPECT_EQ(refusal("a: 1\nb: 2\na: 3\n"), "f.yaml: 'a' appears twice");
+  EXPECT_EQ(refusal("m: {a: 1, a: 2}", [](YamlMap& map) { map.map("m"); }), "f.yaml: 'm/a' appears twice");
+  EXPECT_EQ(refusal("l: [{a: 1}, {a: 1, a: 2}]", [](YamlMap& map) { map.maps("l"); }),
+            "f.yaml: 'l[1]/a' appears twice");
+  EXPECT_EQ(refusal("p: {a/b: 1, a: {b: 2}}", [](YamlMap& map) { map.parameters("p"); }),
+            "f.yaml: p: key 'a/b' appears twice");
+  EXPECT_EQ(refusal("s: {a: [1], a: [2]}", [](YamlMap& map) { map.sweep("s"); }), "f.yaml: 's/a' appears twice");
+}
+
+TEST(YamlMap, RefusesAKeyThatIsNoText) {
+  EXPECT_THAT(refusal("? [1, 2]\n: 3\n"), HasSubstr("f.yaml: has a key that is no text"));
+  EXPECT_THAT(refusal("m: {? [1] : 3}", [](YamlMap& map) { map.map("m"); }), HasSubstr("'m/': has a key"));
+  EXPECT_THAT(refusal("p: {? [1] : 3}", [](YamlMap& map) { map.parameters("p"); }), HasSubstr("p: has a key"));
+  EXPECT_THAT(refusal("s: {? [1] : [3]}", [](YamlMap& map) { map.sweep("s"); }), HasSubstr("'s': has a key"));
+}
+
+TEST(YamlMap, RefusesNumbersOutsideTheirRangeWithTheRange) {
+  const auto real = [](YamlMap& map) { map.real("x", 1.0, 0.0, 2.5); };
+  for (const char* value : {"3", "-0.1", ".nan", ".inf", "1e400", "two", "''"}) {
+    EXPECT_THAT(refusal(std::string("x: ") + value, real),
+                AllOf(StartsWith("f.yaml: 'x' = "), HasSubstr("must be a number in [0, 2.5]")))
+        << value;
+  }
+  const auto count = [](YamlMap& map) { map.count("x", 1, 1, 100); };
+  for (const char* value : {"0", "-3", "101", "99999999999999999999", "8.5", "1e2", ".nan", "many", "''"}) {
+    EXPECT_THAT(refusal(std::string("x: ") + value, count),
+                AllOf(StartsWith("f.yaml: 'x' = "), HasSubstr("must be an integer in [1, 100]")))
+        << value;
+  }
+}
+
+TEST(YamlMap, RefusesValuesOfTheWrongKind) {
+  EXPECT_EQ(refusal("{}", [](YamlMap& map) { map.text("x"); }), "f.yaml: 'x' is missing");
+  EXPECT_EQ(refusal("x: [1]", [](YamlMap& map) { map.text("x"); }), "f.yaml: 'x' must be a single value");
+  EXPECT_EQ(refusal("x: 2", [](YamlMap& map) { map.flag("x", true); }), "f.yaml: 'x' = 2 must be true or false");
+  EXPECT_EQ(refusal("x: 2", [](YamlMap& map) { map.map("x"); }), "f.yaml: 'x' must be a mapping");
+  for (const char* text : {"x: 2", "x: []", "x: [1]", "x: {a: 1}"}) {
+    EXPECT_EQ(refusal(text, [](YamlMap& map) { map.maps("x"); }), "f.yaml: 'x' must be a list of mappings") << text;
+  }
+  for (const char* text : {"x: 2", "x: []", "x: [[a]]", "x: [[a, b, c]]", "x: [[a, [b]]]", "x: [a, b]"}) {
+    EXPECT_EQ(refusal(text, [](YamlMap& map) { map.textLists("x", 2); }),
+              "f.yaml: 'x' must be a list of lists of 2 names")
+        << text;
+  }
+  EXPECT_THAT(refusal("x: [1]", [](YamlMap& map) { map.parameters("x"); }), HasSubstr("'x' must be a mapping of par"));
+  EXPECT_THAT(refusal("x: {a: [1]}", [](YamlMap& map) { map.parameters("x"); }), HasSubstr("x: key 'a' must be a si"));
+  for (const char* text : {"x: 2", "x: {a: 1}", "x: {a: []}", "x: {a: [[1]]}"}) {
+    EXPECT_THAT(refusal(text, [](YamlMap& map) { map.sweep("x"); }), HasSubstr("'x' must be a mapping of parameter"));
+  }
+}
+
+TEST(YamlMap, RefusesATextThatIsNoMapping) {
+  for (const char* text : {"", "# nothing\n", "[1, 2]", "words", "42"})
+    EXPECT_EQ(refusal(text), "f.yaml: must be a mapping") << text;
+  EXPECT_THAT(refusal("a: 1\n---\nb: 2\n"), HasSubstr("f.yaml: holds several documents"));
+  for (const std::string& text : {std::string("a: {b: "), std::string("\t- x"), std::string("a: *b"),
+                                  std::string(100000, '['), std::string("\x01\x02\x7f", 3)}) {
+    EXPECT_THAT(refusal(text), AllOf(StartsWith("f.yaml: "), Not(HasSubstr("\n")))) << text.substr(0, 20);
+  }
+}
+
+TEST(YamlMap, NamesAFileThatCannotBeRead) {
+  const test::TemporaryFolder folder;
+  for (const std::string& path : {folder / "absent.yaml", folder.path()}) {
+    try {
+      YamlMap::load(path);
+      ADD_FAILURE() << "accepted: " << path;
+    } catch (const ParameterError& error) {
+      EXPECT_THAT(error.what(), StartsWith(path + ": cannot be read: "));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization::parameters
