@@ -14,6 +14,14 @@ using Setting = std::pair<std::string, std::string>;
 constexpr double kSlowest = 1.0 / 64.0;
 constexpr double kFastest = 64.0;
 constexpr std::size_t kMostStarts = 1000000;
+constexpr std::size_t kMostCombinations = 10000;
+
+/// A name for tables and messages.
+std::string readName(YamlMap& yaml, const std::string& key) {
+  std::string name = yaml.text(key);
+  if (name.empty() || name.find('\n') != std::string::npos) yaml.refuse(key, "must be a name of one line");
+  return name;
+}
 
 std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   std::vector<RoundSpec> rounds;
@@ -75,9 +83,26 @@ std::vector<PairSpec> readPairs(YamlMap& yaml, const std::vector<RoundSpec>& rou
   return pairs;
 }
 
+using Sweep = std::vector<std::pair<std::string, std::vector<std::string>>>;
+
+/// What a method's entry sweeps over; not what it sets as well.
+Sweep readSweep(YamlMap& yaml, const ParameterValues& parameters) {
+  Sweep sweep = yaml.sweep("sweep");
+  std::size_t combinations = 1;
+  for (const auto& [key, values] : sweep) {
+    if (parameters.count(key) != 0 || (key == "speed" && yaml.has(key))) {
+      yaml.refuse("sweep/" + key, "is set for this method already");
+    }
+    combinations *= values.size();
+    if (combinations > kMostCombinations) {
+      yaml.refuse("sweep", "has more than " + std::to_string(kMostCombinations) + " combinations");
+    }
+  }
+  return sweep;
+}
+
 /// All combinations of the sweep's values, the last key changing fastest; one empty combination without a sweep.
-std::vector<std::vector<Setting>> combinationsOf(
-    const std::vector<std::pair<std::string, std::vector<std::string>>>& sweep) {
+std::vector<std::vector<Setting>> combinationsOf(const Sweep& sweep) {
   std::vector<std::vector<Setting>> combinations{{}};
   for (const auto& [key, values] : sweep) {
     std::vector<std::vector<Setting>> longer;
@@ -95,7 +120,7 @@ std::vector<std::vector<Setting>> combinationsOf(
 std::string withValues(std::string name, const std::vector<Setting>& settings) {
   for (const auto& [key, value] : settings) {
     const std::string placeholder = "{" + key + "}";
-    for (auto at = name.find(placeholder); at != std::string::npos; at = name.find(placeholder)) {
+    for (auto at = name.find(placeholder); at != std::string::npos; at = name.find(placeholder, at + value.size())) {
       name.replace(at, placeholder.size(), value);
     }
   }
@@ -153,7 +178,7 @@ MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const
 
 std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
   MethodEntry entry;
-  entry.name = yaml.text("name");
+  entry.name = readName(yaml, "name");
   entry.method.localizer = base;
   entry.method.tracker = yaml.text("tracker", base.tracker);
   const std::vector<std::string>& recognisers = placeRecogniserNames();
@@ -175,7 +200,8 @@ std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
   entry.method.kidnapped = yaml.flag("kidnapped", false);
   entry.parameters = yaml.parameters("parameters");
   std::vector<MethodSpec> methods;
-  for (const auto& swept : combinationsOf(yaml.sweep("sweep"))) methods.push_back(completed(entry, swept, yaml));
+  for (const auto& swept : combinationsOf(readSweep(yaml, entry.parameters)))
+    methods.push_back(completed(entry, swept, yaml));
   yaml.requireNoMore();
   return methods;
 }
@@ -205,7 +231,7 @@ Config configured(YamlMap& yaml, const std::string& key) {
 
 Experiment parse(YamlMap yaml) {
   Experiment experiment;
-  experiment.name = yaml.text("experiment");
+  experiment.name = readName(yaml, "experiment");
   for (const char* for_the_report : {"title", "source", "discussion"}) yaml.text(for_the_report, "");
   YamlMap rounds = yaml.map("rounds");
   experiment.closed = rounds.flag("closed", true);

@@ -1,0 +1,181 @@
+#include "visual_localization/evaluation/experiment.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/evaluation/small_experiment.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::Pair;
+using ::testing::StartsWith;
+
+struct Mistake {
+  std::string part;         ///< of the small experiment
+  std::string replacement;  ///< for it
+  std::string expected;     ///< what the refusal says
+};
+
+std::string refusal(const std::string& yaml) {
+  try {
+    parseExperiment(yaml, "e.yaml");
+  } catch (const ParameterError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+void expectRefused(const std::vector<Mistake>& mistakes) {
+  for (const Mistake& mistake : mistakes) {
+    EXPECT_THAT(refusal(test::smallYamlWith(mistake.part, mistake.replacement)),
+                AllOf(StartsWith("e.yaml: "), HasSubstr(mistake.expected), Not(HasSubstr("\n"))))
+        << mistake.replacement;
+  }
+}
+
+std::vector<std::string> namesOfMethods(const std::string& yaml) {
+  std::vector<std::string> names;
+  for (const MethodSpec& method : parseExperiment(yaml, "e.yaml").methods) names.push_back(method.name);
+  return names;
+}
+
+const std::string kBestMethod = "{name: best, tracker: exhaustive}";
+
+TEST(Experiment, SaysWhatTheFileSays) {
+  const Experiment experiment = test::smallExperiment();
+  EXPECT_EQ(experiment.name, "small");
+  EXPECT_TRUE(experiment.closed);
+  EXPECT_EQ(experiment.starts, 3U);
+  ASSERT_EQ(experiment.rounds.size(), 3U);
+  EXPECT_EQ(experiment.rounds[1].bag, "a2.bag");
+  EXPECT_EQ(experiment.rounds[1].group, "a");
+  EXPECT_EQ(experiment.rounds[1].truth_topic, "/gps/fix");
+  ASSERT_EQ(experiment.methods.size(), 3U);
+  EXPECT_TRUE(experiment.methods[1].kidnapped);
+  EXPECT_FALSE(experiment.methods[2].isTracker());
+  EXPECT_THAT(experiment.methods[0].settings, ::testing::Contains(Pair("dpso/particles", "20")));
+}
+
+TEST(Experiment, AGroupStandsForAllOfItsRounds) {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (const PairSpec& pair : test::smallExperiment().pairs) pairs.emplace_back(pair.map, pair.drive);
+  EXPECT_THAT(pairs, ElementsAre(Pair(0, 2), Pair(1, 2), Pair(2, 0), Pair(2, 1)));
+  const std::string among_itself = test::smallYamlWith("[[a, b], [b, a]]", "[[a, a]]");
+  EXPECT_EQ(parseExperiment(among_itself, "e.yaml").pairs.size(), 2U);
+}
+
+TEST(Experiment, ASweepGivesAMethodForEveryCombination) {
+  const std::string swept =
+      "{name: 'PF {pf/particles} {speed}', tracker: pf_linear, "
+      "sweep: {pf/particles: [10, 20], speed: [1, 2.5]}}";
+  const std::string yaml = test::smallYamlWith(kBestMethod, swept);
+  EXPECT_THAT(namesOfMethods(yaml), ElementsAre("swarm", "filter", "PF 10 1", "PF 10 2.5", "PF 20 1", "PF 20 2.5"));
+  EXPECT_EQ(parseExperiment(yaml, "e.yaml").methods[3].speed, 2.5);
+}
+
+TEST(Experiment, EveryExperimentThatShipsIsValid) {
+  int read = 0;
+  for (const auto& file : std::filesystem::directory_iterator(TEST_DATA_DIR "/../../config/evaluation")) {
+    if (file.path().extension() != ".yaml") continue;
+    EXPECT_NO_THROW(readExperiment(file.path().string())) << file.path();
+    ++read;
+  }
+  EXPECT_GT(read, 5);
+}
+
+TEST(Experiment, RefusesAFileThatIsNoExperiment) {
+  for (const char* text : {"", "# nothing", "[]", "words"}) EXPECT_EQ(refusal(text), "e.yaml: must be a mapping");
+  EXPECT_EQ(refusal("{}"), "e.yaml: 'experiment' is missing");
+  EXPECT_THAT(refusal("experiment: {a: "), StartsWith("e.yaml: not valid YAML"));
+  EXPECT_THROW(readExperiment("/nonexistent.yaml"), ParameterError);
+}
+
+TEST(Experiment, RefusesUnknownMissingAndRepeatedKeys) {
+  expectRefused({{"starts: 3", "start: 3", "'start' is unknown; allowed here: discussion, experiment, map_para"},
+                 {"starts: 3", "starts: 3\nstarts: 4", "'starts' appears twice"},
+                 {"rounds:\n", "rounds:\n  colsed: true\n", "'rounds/colsed' is unknown"},
+                 {"bag: a1.bag", "bug: a1.bag", "'rounds/bags[0]/bag' is missing"},
+                 {"bag: a1.bag", "bag: a1.bag, topic: x", "'rounds/bags[0]/topic' is unknown"},
+                 {"kidnapped: true", "kidnaped: true", "'methods[1]/kidnaped' is unknown"},
+                 {"experiment: small", "", "'experiment' is missing"},
+                 {"experiment: small", "experiment: ''", "'experiment' must be a name"}});
+}
+
+TEST(Experiment, RefusesRoundsThatDoNotMakeAnExperiment) {
+  const std::string& yaml = test::smallYaml();
+  const std::size_t begin = yaml.find("    - {name: a2");
+  const std::string two_more = yaml.substr(begin, yaml.find("pairs:") - begin);
+  expectRefused({{two_more, "", "'rounds/bags' has one round only"},
+                 {"bags:\n", "bugs:\n", "'rounds/bags' is missing"},
+                 {"name: a2", "name: a1", "'rounds/bags[1]/name' = 'a1' appears twice"},
+                 {"name: a2", "name: 'a/2'", "must be a name without slash"},
+                 {"name: a2", "name: ''", "must be a name without slash"},
+                 {"bag: a2.bag", "bag: [a2.bag]", "'rounds/bags[1]/bag' must be a single value"},
+                 {"rounds:\n", "rounds:\n  closed: 3\n", "'rounds/closed' = 3 must be true or false"},
+                 {"rounds:\n", "rounds:\n  closed: false\n", "'filter' is kidnapped, which needs closed rounds"}});
+}
+
+TEST(Experiment, RefusesPairsThatCannotBeRun) {
+  expectRefused({{"[a, b], ", "[a, c], ", "[a, c]: no round or group is called 'c'"},
+                 {"[a, b], ", "[b, b], ", "[b, b] needs two different rounds, but there is one only"},
+                 {"[a, b], ", "[a, b], [a1, b1], ", "the pair of map a1 and drive b1 twice"},
+                 {"[a, b], ", "[a, b, a], ", "must be a list of lists of 2 names"},
+                 {"[[a, b], [b, a]]", "[]", "must be a list of lists of 2 names"},
+                 {"pairs: [[a, b], [b, a]]", "", "'pairs' is missing"}});
+}
+
+TEST(Experiment, RefusesNumbersOutsideTheirRange) {
+  for (const char* value : {"0", "-1", "99999999999999999999", "2.5", ".nan", "every"}) {
+    expectRefused({{"starts: 3", std::string("starts: ") + value, "must be an integer in [1, 1000000]"}});
+  }
+  expectRefused({{"starts: 3", "trace_start: -1", "'trace_start' = -1 must be an integer in [0, 1000000]"},
+                 {kBestMethod, "{name: x, speed: 0}", "'methods[2]/speed' = 0 must be a number in [0.015625, 64]"},
+                 {kBestMethod, "{name: x, speed: .nan}", "must be a number in [0.015625, 64]"},
+                 {kBestMethod, "{name: x, sweep: {speed: [1, 65]}}", "speed = 65 must be a number in [1/64, 64]"},
+                 {"dpso/particles: 20", "dpso/particles: 1", "'dpso/particles' = 1 is not allowed: must be an integer"},
+                 {"dpso/particles: 20", "dpso/particles: many", "'dpso/particles' = many is not allowed"},
+                 {"recovery: paper", "match/ratio_angle: .nan", "e.yaml: 'parameters' parameter 'match/"}});
+}
+
+TEST(Experiment, RefusesMethodsThatCannotBeRun) {
+  expectRefused({{"name: swarm", "name: best", "'methods[2]/name' = 'best' appears twice"},
+                 {"name: swarm", "name: ''", "'methods[0]/name' must be a name of one line"},
+                 {"name: swarm", "name: \"a\\nb\"", "'methods[0]/name' must be a name of one line"},
+                 {"tracker: dpso", "tracker: crystal_ball", "(beside the trackers: exhaustive, sequence, topological)"},
+                 {kBestMethod, "{name: x, tracker: exhaustive, features: hybrid}", "hybrid needs a tracker's cloud"},
+                 {kBestMethod, "{name: x, features: smell}", "one of sift, global, hybrid"},
+                 {kBestMethod, "{name: x, parameters: {prune: false}}", "'prune' holds for all methods"},
+                 {kBestMethod, "{name: x, parameters: {nonsense: 1}}", "'nonsense' = 1 is unknown"},
+                 {kBestMethod, "{name: x, parameters: 3}", "must be a mapping of parameter names to values"},
+                 {"recovery: paper", "nonsense: 1", "'nonsense' = 1 is unknown"},
+                 {"starts: 3", "map_parameters: {nonsense: 1}", "'nonsense' = 1 is unknown"}});
+}
+
+TEST(Experiment, RefusesSweepsThatCannotBeMeant) {
+  std::string many = "{name: x, sweep: {";
+  for (const char* key : {"a", "b", "c"}) {
+    many += std::string(key) + ": [";
+    for (int i = 0; i < 100; ++i) many += std::to_string(i) + ", ";
+    many += "0], ";
+  }
+  expectRefused(
+      {{kBestMethod, "{name: x, sweep: {pf/particles: [10, 20]}}", "'x' appears twice"},
+       {kBestMethod, "{name: x, sweep: {pf/particles: []}}", "to lists of values"},
+       {kBestMethod, "{name: x, sweep: {nonsense: [1]}}", "'nonsense' = 1 is unknown"},
+       {kBestMethod, "{name: x, speed: 2, sweep: {speed: [1]}}", "'methods[2]/sweep/speed' is set for"},
+       {kBestMethod, "{name: x, parameters: {prune: true}, sweep: {prune: [true]}}", "is set for this method"},
+       {kBestMethod, "{name: '{speed}', sweep: {speed: ['{speed}']}}", "speed = {speed} must be a number"},
+       {kBestMethod, many + "}}", "'methods[2]/sweep' has more than 10000 combinations"}});
+}
+
+}  // namespace
+}  // namespace visual_localization
