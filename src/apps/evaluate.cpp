@@ -121,7 +121,7 @@ void mergeFolders(const Experiment& experiment, const ResultFolder& results, con
                   const std::string& yaml, const std::string& provenance) {
   for (const std::string& folder : options.merge) {
     if (!fs::is_directory(folder)) throw UsageError("--merge " + folder + " is not a folder");
-    const std::size_t copied = mergeResults(ResultFolder(folder, yaml, provenance), results, experiment);
+    const std::size_t copied = mergeResults(ResultFolder::open(folder, yaml, provenance), results, experiment);
     std::printf("%s: %zu results\n", folder.c_str(), copied);
   }
 }

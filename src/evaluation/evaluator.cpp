@@ -37,7 +37,7 @@ class Evaluation {
   std::vector<std::size_t> missingMethods(std::size_t pair) const {
     std::vector<std::size_t> missing;
     for (std::size_t method = 0; method < experiment_.methods.size(); ++method) {
-      if (!results_.has(pair, method)) missing.push_back(method);
+      if (!results_.hasWhole(pair, method)) missing.push_back(method);
     }
     return missing;
   }

@@ -1,63 +1,74 @@
 #include "visual_localization/evaluation/result_folder.h"
 
 #include <filesystem>
-#include <fstream>
-#include <sstream>
+#include <system_error>
 #include <utility>
 
 #include <yaml-cpp/yaml.h>
 
 #include "visual_localization/io/partial_file.h"
+#include "visual_localization/io/read_file.h"
 
 namespace visual_localization {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string readFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) throw ResultError(path + ": cannot be read");
-  return text.str();
-}
+const char* const kExperiment = "/experiment.yaml";
+const char* const kProvenance = "/provenance.csv";
 
 /// The part of an experiment's YAML that decides about results: no comments, no words for the report.
-std::string decisivePart(const std::string& yaml) {
-  YAML::Node node = YAML::Load(yaml);
-  for (const char* words : {"title", "source", "discussion"}) node.remove(words);
-  return YAML::Dump(node);
-}
-
-void requireSameConfiguration(const std::string& folder, const std::string& yaml) {
-  const std::string path = folder + "/experiment.yaml";
-  if (fs::exists(path) && decisivePart(readFile(path)) != decisivePart(yaml)) {
-    throw ResultError(folder +
-                      ": holds results of another configuration (experiment.yaml differs); choose another "
-                      "folder");
-  }
-  writeFile(path, yaml);
-}
-
-/// Keeps `text` as the file `name`, or finds the same text there.
-void requireSame(const std::string& folder, const std::string& name, const std::string& text, const std::string& what) {
-  const std::string path = folder + "/" + name;
-  if (!fs::exists(path)) {
-    writeFile(path, text);
-  } else if (readFile(path) != text) {
-    throw ResultError(folder + ": holds results of " + what + " (" + name + " differs); choose another folder");
+std::string decisivePart(const std::string& yaml, const std::string& path) {
+  try {
+    YAML::Node node = YAML::Load(yaml);
+    for (const char* words : {"title", "source", "discussion"}) node.remove(words);
+    return YAML::Dump(node);
+  } catch (const YAML::Exception&) {
+    throw ResultError(path + ": is damaged: not an experiment");
   }
 }
 
 }  // namespace
 
+ResultFolder::ResultFolder(Existing, std::string path, const std::string& yaml, const std::string& provenance)
+    : path_(std::move(path)), yaml_(yaml), provenance_(provenance) {}
+
 ResultFolder::ResultFolder(std::string path, const std::string& yaml, const std::string& provenance)
-    : path_(std::move(path)) {
+    : ResultFolder(Existing{}, std::move(path), yaml, provenance) {
+  if (path_.empty()) throw ResultError("'': is no name of a folder");
   std::error_code error;
   fs::create_directories(path_ + "/units", error);
   if (error) throw ResultError(path_ + ": cannot be created: " + error.message());
-  requireSameConfiguration(path_, yaml);
-  requireSame(path_, "provenance.csv", provenance, "other rounds or another version");
+  if (isUnused()) {  // but for an attempt that failed, perhaps for a mistake that the YAML no longer has
+    writeFile(path_ + kProvenance, provenance_);
+  } else {
+    requireSameOrigin();
+  }
+  writeFile(path_ + kExperiment, yaml_);
+}
+
+ResultFolder ResultFolder::open(std::string path, const std::string& yaml, const std::string& provenance) {
+  ResultFolder folder(Existing{}, std::move(path), yaml, provenance);
+  folder.requireSameOrigin();
+  return folder;
+}
+
+bool ResultFolder::isUnused() const { return fs::is_empty(path_ + "/units"); }
+
+void ResultFolder::requireSameOrigin() const {
+  for (const char* name : {kExperiment, kProvenance}) {
+    if (fs::exists(path_ + name)) continue;
+    throw ResultError(path_ + ": is not a folder of results (" + (name + 1) + " is missing); choose another folder");
+  }
+  const std::string experiment = path_ + kExperiment;
+  if (decisivePart(readFile(experiment), experiment) != decisivePart(yaml_, experiment)) {
+    throw ResultError(path_ +
+                      ": holds results of another configuration (experiment.yaml differs); choose another folder");
+  }
+  if (readFile(path_ + kProvenance) != provenance_) {
+    throw ResultError(
+        path_ + ": holds results of other rounds or another version (provenance.csv differs); choose another folder");
+  }
 }
 
 std::string ResultFolder::unitPath(std::size_t pair, std::size_t method) const {
@@ -66,7 +77,18 @@ std::string ResultFolder::unitPath(std::size_t pair, std::size_t method) const {
 
 bool ResultFolder::has(std::size_t pair, std::size_t method) const { return fs::exists(unitPath(pair, method)); }
 
+bool ResultFolder::hasWhole(std::size_t pair, std::size_t method) const {
+  if (!has(pair, method)) return false;
+  try {
+    load(pair, method);
+    return true;
+  } catch (const ResultError&) {
+    return false;
+  }
+}
+
 void ResultFolder::save(std::size_t pair, std::size_t method, const UnitResult& unit) const {
+  requireSameOrigin();
   writeFile(unitPath(pair, method), serialise(unit));
 }
 
@@ -74,10 +96,10 @@ UnitResult ResultFolder::load(std::size_t pair, std::size_t method) const {
   const std::string path = unitPath(pair, method);
   try {
     return parseUnit(readFile(path));
-  } catch (const ResultError&) {
-    throw;
+  } catch (const FileError& error) {
+    throw ResultError(error.what());
   } catch (const std::runtime_error& error) {
-    throw ResultError(path + ": is damaged: " + error.what() + "; remove it and run again");
+    throw ResultError(path + ": is damaged: " + error.what() + "; it is made anew when its shard is run again");
   }
 }
 
@@ -85,7 +107,7 @@ std::size_t mergeResults(const ResultFolder& from, const ResultFolder& to, const
   std::size_t copied = 0;
   for (std::size_t pair = 0; pair < experiment.pairs.size(); ++pair) {
     for (std::size_t method = 0; method < experiment.methods.size(); ++method) {
-      if (to.has(pair, method) || !from.has(pair, method)) continue;
+      if (to.hasWhole(pair, method) || !from.has(pair, method)) continue;
       to.save(pair, method, from.load(pair, method));
       ++copied;
     }

@@ -27,8 +27,8 @@ struct RoundSource {
 /// Says how far a stage of the work is.
 using StageProgress = std::function<void(const std::string& stage, std::size_t done, std::size_t total)>;
 
-/// Runs the part `shard` of an experiment and stores what is not stored yet. Deterministic but for the times, however
-/// many threads there are. Throws ResultError when rounds do not fit together.
+/// Runs the part `shard` of an experiment and stores what is not stored whole yet. Deterministic but for the times,
+/// however many threads there are. Throws ResultError when rounds do not fit together.
 void evaluate(const Experiment& experiment, const RoundSource& source, const ResultFolder& results, const Shard& shard,
               std::size_t threads, const StageProgress& progress);
 
