@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <locale>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
@@ -50,28 +51,62 @@ double meanOf(const std::vector<RunFigures>& runs, Figure figure) {
   return sum / images;
 }
 
-/// Standard deviation of the runs' mean errors, as the papers' tables give it.
+/// The same for what is known of images with a true position only; NaN without any.
+template <class Figure>
+double meanOfJudged(const std::vector<RunFigures>& runs, Figure figure) {
+  double sum = 0.0;
+  double judged = 0.0;
+  for (const RunFigures& run : runs) {
+    sum += static_cast<double>(run.judged) * figure(run);
+    judged += static_cast<double>(run.judged);
+  }
+  return sum / judged;
+}
+
+/// Standard deviation of the runs' mean errors, as the papers' tables give it; NaN without any.
 double deviationOf(const std::vector<RunFigures>& runs) {
   double sum = 0.0;
   double squares = 0.0;
+  double count = 0.0;
   for (const RunFigures& run : runs) {
+    if (run.judged == 0) continue;
     sum += run.mean_err_m;
     squares += run.mean_err_m * run.mean_err_m;
+    count += 1.0;
   }
-  const auto count = static_cast<double>(runs.size());
-  return std::sqrt(std::max(0.0, squares / count - sum * sum / (count * count)));
+  const double variance = squares / count - sum * sum / (count * count);
+  return variance < 0.0 ? 0.0 : std::sqrt(variance);
+}
+
+std::size_t judgedOf(const UnitResult& unit) {
+  return std::accumulate(unit.runs.begin(), unit.runs.end(), std::size_t{0},
+                         [](std::size_t sum, const RunFigures& run) { return sum + run.judged; });
+}
+
+/// Mean of a figure over the pairs that have a true position; NaN without any.
+double meanOfPairs(const std::vector<UnitResult>& units, double UnitResult::*figure) {
+  double sum = 0.0;
+  double judged = 0.0;
+  for (const UnitResult& unit : units) {
+    if (judgedOf(unit) == 0) continue;
+    sum += unit.*figure;
+    judged += 1.0;
+  }
+  return sum / judged;
+}
+
+/// A field for a number, empty when it is unknown.
+struct Known {
+  double number;
+};
+std::ostream& operator<<(std::ostream& out, Known known) {
+  return std::isnan(known.number) ? out : out << known.number;
 }
 
 /// One method on several pairs.
 std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
   std::vector<RunFigures> runs;
-  double median_m = 0.0;
-  double recall = 0.0;
-  for (const UnitResult& unit : units) {
-    runs.insert(runs.end(), unit.runs.begin(), unit.runs.end());
-    median_m += unit.median_err_m / static_cast<double>(units.size());
-    recall += unit.recall_at_p99 / static_cast<double>(units.size());
-  }
+  for (const UnitResult& unit : units) runs.insert(runs.end(), unit.runs.begin(), unit.runs.end());
   std::vector<double> localised;
   std::vector<double> relocalised;
   for (const RunFigures& run : runs) {
@@ -83,13 +118,16 @@ std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
   const double update_ms = meanOf(runs, [](const RunFigures& run) { return run.update_ms; });
   std::ostringstream out;
   out.imbue(std::locale::classic());
-  out << runs.size() << ',' << meanOf(runs, [](const RunFigures& run) { return run.mean_err_m; }) << ','
-      << deviationOf(runs) << ',' << meanOf(runs, [](const RunFigures& run) { return run.comparisons_per_image; })
-      << ',' << extract_ms + match_ms + update_ms << ','
-      << meanOf(runs, [](const RunFigures& run) { return run.sift_share; }) << ',' << median_m << ','
-      << meanOf(runs, [](const RunFigures& run) { return run.within_5m; }) << ',' << medianOf(localised) << ',';
+  out << runs.size() << ',' << Known{meanOfJudged(runs, [](const RunFigures& run) { return run.mean_err_m; })} << ','
+      << Known{deviationOf(runs)} << ','
+      << meanOf(runs, [](const RunFigures& run) { return run.comparisons_per_image; }) << ','
+      << extract_ms + match_ms + update_ms << ',' << meanOf(runs, [](const RunFigures& run) { return run.sift_share; })
+      << ',' << Known{meanOfPairs(units, &UnitResult::median_err_m)} << ','
+      << Known{meanOfJudged(runs, [](const RunFigures& run) { return run.within_5m; })} << ',' << medianOf(localised)
+      << ',';
   if (kidnapped) out << medianOf(relocalised);
-  out << ',' << recall << ',' << extract_ms << ',' << match_ms << ',' << update_ms;
+  out << ',' << Known{meanOfPairs(units, &UnitResult::recall_at_p99)} << ',' << extract_ms << ',' << match_ms << ','
+      << update_ms;
   return out.str();
 }
 
