@@ -1,12 +1,14 @@
 // Repeats the papers' experiments on recorded rounds: every method on every pair of rounds, from every start image.
 
+#include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
-#include <sstream>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -21,6 +23,7 @@
 #include "visual_localization/evaluation/experiment.h"
 #include "visual_localization/evaluation/result_folder.h"
 #include "visual_localization/evaluation/result_tables.h"
+#include "visual_localization/io/read_file.h"
 #include "visual_localization/ros/round_recorder.h"
 
 extern char** environ;
@@ -34,9 +37,9 @@ struct Options {
   std::string config;
   std::string rounds;
   std::string output;
-  std::string shard;
+  std::optional<std::string> shard;
   std::vector<std::string> merge;
-  std::size_t threads = 0;
+  std::optional<std::string> threads;
   bool no_report = false;
 };
 
@@ -45,30 +48,39 @@ void declareOptions(CLI::App& app, Options& options) {
   app.add_option("--rounds", options.rounds, "Folder of the bags; default: the one of the YAML file");
   app.add_option("--output", options.output, "Folder for results, report and figures; work found there is not repeated")
       ->required();
-  app.add_option("--threads", options.threads, "Threads to use; default: all cores");
+  app.add_option("--threads", options.threads, "Threads to use, from 1 to 1024; default: all cores");
   auto* shard = app.add_option("--shard", options.shard, "I/N: run only part I of N of the pairs, without a report");
   app.add_option("--merge", options.merge, "Take the results of shards from these folders, run nothing, and report")
       ->excludes(shard);
   app.add_flag("--no-report", options.no_report, "Write the tables only: neither report nor figures");
 }
 
-Shard shardOf(const std::string& text) {
-  if (text.empty()) return {};
-  Shard shard;
-  int end = 0;
-  const bool parsed = std::sscanf(text.c_str(), "%zu/%zu%n", &shard.index, &shard.count, &end) == 2 &&
-                      static_cast<std::size_t>(end) == text.size() && text.find('-') == std::string::npos;
-  if (!parsed || shard.count == 0 || shard.index == 0 || shard.index > shard.count) {
-    throw UsageError("--shard " + text + " is not allowed: must be I/N with I from 1 to N");
+/// The number that `text` is made of, no sign or space beside it; 0 for anything else.
+std::size_t numberOf(const std::string& text) {
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() ? number : 0;
+}
+
+Shard shardOf(const Options& options) {
+  if (!options.shard) return {};
+  const std::string& text = *options.shard;
+  const std::size_t slash = std::min(text.find('/'), text.size());
+  const Shard shard{numberOf(text.substr(0, slash)), numberOf(text.substr(std::min(slash + 1, text.size())))};
+  if (shard.index == 0 || shard.count == 0 || shard.index > shard.count) {
+    throw UsageError("--shard '" + text + "' is not allowed: must be I/N with I from 1 to N");
   }
   return shard;
 }
 
-std::string readText(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
+std::size_t threadsOf(const Options& options) {
+  constexpr std::size_t kMost = 1024;
+  if (!options.threads) return std::max<std::size_t>(1, std::thread::hardware_concurrency());
+  const std::size_t threads = numberOf(*options.threads);
+  if (threads == 0 || threads > kMost) {
+    throw UsageError("--threads '" + *options.threads + "' is not allowed: must be an integer in [1, 1024]");
+  }
+  return threads;
 }
 
 std::string bagPath(const Options& options, const RoundSpec& round) {
@@ -109,11 +121,9 @@ void runExperiment(const Experiment& experiment, const ResultFolder& results, co
       [&](const RoundSpec& round) {
         return recordDrive(bagPath(options, round), round, experiment.map, experiment.front_end);
       }};
-  const std::size_t threads =
-      options.threads > 0 ? options.threads : std::max<std::size_t>(1, std::thread::hardware_concurrency());
   cv::setNumThreads(1);  // the threads are spread over rounds and runs
   StageBars bars;
-  evaluate(experiment, source, results, shardOf(options.shard), threads,
+  evaluate(experiment, source, results, shardOf(options), threadsOf(options),
            [&bars](const std::string& stage, std::size_t done, std::size_t total) { bars.show(stage, done, total); });
 }
 
@@ -144,16 +154,18 @@ void writeReport(const std::string& folder) {
 }
 
 void run(const Options& options) {
-  shardOf(options.shard);  // a mistake on the command line before all others
-  const Experiment experiment = readExperiment(options.config);
-  const std::string yaml = readText(options.config);
+  shardOf(options);  // mistakes on the command line before all others
+  threadsOf(options);
+  if (options.output.empty()) throw UsageError("--output must name a folder");
+  const std::string yaml = readFile(options.config);  // once: it may be a pipe
+  const Experiment experiment = parseExperiment(yaml, options.config);
   const std::string provenance = provenanceOf(experiment, options);
   const ResultFolder results(options.output, yaml, provenance);
   mergeFolders(experiment, results, options, yaml, provenance);
   if (options.merge.empty()) runExperiment(experiment, results, options);
-  if (!options.shard.empty()) {
+  if (options.shard) {
     std::printf("shard %s of %s is done; when all are: evaluate --config %s --output %s --merge FOLDER ...\n",
-                options.shard.c_str(), experiment.name.c_str(), options.config.c_str(), options.output.c_str());
+                options.shard->c_str(), experiment.name.c_str(), options.config.c_str(), options.output.c_str());
     return;
   }
   writeResultTables(experiment, results);

@@ -5,20 +5,15 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import unittest
 from pathlib import Path
 
-PROGRAMS, MAP, DRIVE, CONFIG = (Path(argument) for argument in sys.argv[1:5])
+from program_runner import PROGRAMS, ProgramTest, run
+
+MAP, DRIVE, CONFIG = (Path(argument) for argument in sys.argv[2:5])
 HEADER = ('stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,'
           'extract_ms,match_ms,update_ms').split(',')
 TIMES = ('extract_ms', 'match_ms', 'update_ms')
-
-
-def run(program: str, *arguments, **options) -> subprocess.CompletedProcess:
-    """Runs a program to its end."""
-    command = [str(PROGRAMS / program), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, **options)
 
 
 def read_track(path: Path) -> list:
@@ -27,13 +22,8 @@ def read_track(path: Path) -> list:
         return list(csv.DictReader(file))
 
 
-class ProgramsTest(unittest.TestCase):
-    """Each test has a folder of its own."""
-
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
+class ProgramsTest(ProgramTest):
+    """All programs but `evaluate`."""
 
     def localize(self, *arguments) -> list:
         """A run over the drive; its rows."""
@@ -42,13 +32,6 @@ class ProgramsTest(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.output = result.stdout
         return read_track(track)
-
-    def assert_refused(self, result: subprocess.CompletedProcess, code: int, *words: str):
-        """One line on standard error that holds these words, and nothing left in the folder."""
-        self.assertEqual(result.returncode, code, result.stderr)
-        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
-        for word in words:
-            self.assertIn(word, result.stderr)
 
     def test_track_has_a_row_for_every_image_and_follows_the_robot(self):
         rows = self.localize('--seed', 1, '--truth-topic', '/ground_truth/fix')
@@ -141,7 +124,7 @@ class ProgramsTest(unittest.TestCase):
         self.assertIn('FeatureCollection', geojson.read_text(encoding='utf-8'))
 
     def test_help_and_version(self):
-        for program in ('map_builder', 'map_info', 'localize'):
+        for program in ('map_builder', 'map_info', 'localize', 'evaluate'):
             for option in ('--help', '--version'):
                 result = run(program, option)
                 self.assertEqual(result.returncode, 0, result.stderr)

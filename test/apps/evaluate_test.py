@@ -1,0 +1,196 @@
+"""`evaluate` as a user meets it, on the first seconds of the rounds that ship."""
+import csv
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+from program_runner import PROGRAMS, ProgramTest, run
+
+ROUNDS, SAMPLE, SCRIPTS = (Path(argument) for argument in sys.argv[2:5])
+sys.path.insert(0, str(SCRIPTS))
+from cut_round import DEFAULT_TOPICS, cut  # noqa: E402
+
+TABLES = ('methods.csv', 'pairs.csv', 'steps.csv', 'summary.csv', 'traces.csv')
+TIMES = ('ms_per_image', 'extract_ms', 'match_ms', 'update_ms')
+METHODS = ('DPSO-80', 'PF-g-100', 'best single image')
+SECONDS = 20.0
+
+
+def short_sample() -> str:
+    """The sample experiment with few methods and starts."""
+    yaml = SAMPLE.read_text(encoding='utf-8').replace('starts: 8', 'starts: 2')
+    yaml = re.sub(r'bag: \S+/(\w+\.bag)', r'bag: \1', yaml)
+    lines = [line for line in yaml.splitlines()
+             if not line.startswith('  - {name: ') or any(f'name: {name},' in line for name in METHODS)]
+    return '\n'.join(lines) + '\n'
+
+
+def tables(folder: Path) -> dict:
+    """The rows of all tables, without times."""
+    rows = {}
+    for name in TABLES:
+        with open(folder / name, newline='', encoding='utf-8') as file:
+            rows[name] = [{key: row[key] for key in row if key not in TIMES} for row in csv.DictReader(file)]
+    return rows
+
+
+def units(folder: Path) -> dict:
+    """The results that are stored, with their bytes."""
+    return {path.name: path.read_bytes() for path in sorted((folder / 'units').glob('*'))}
+
+
+class EvaluateTest(ProgramTest):
+    """One whole run is shared; the tests arrive at its tables in other ways."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.rounds = Path(folder.name)
+        for bag in ROUNDS.glob('*.bag'):
+            cut(bag, cls.rounds / bag.name, DEFAULT_TOPICS, 0.0, SECONDS, 'none')
+        cls.config = cls.rounds / 'short.yaml'
+        cls.config.write_text(short_sample(), encoding='utf-8')
+        cls.whole = cls.rounds / 'whole'
+        cls.result = run('evaluate', '--config', cls.config, '--output', cls.whole)
+
+    def setUp(self):
+        super().setUp()
+        self.output = self.folder / 'out'
+
+    def evaluate(self, *arguments, config: Path = None, **options) -> subprocess.CompletedProcess:
+        """Runs the short sample, or another experiment on the same rounds, without a report."""
+        return run('evaluate', '--config', config or self.config, '--rounds', self.rounds, '--output', self.output,
+                   '--no-report', *arguments, **options)
+
+    def assert_done(self, result: subprocess.CompletedProcess):
+        """Success, with the tables of the whole run and nothing half-written."""
+        self.assertEqual((result.returncode, result.stderr), (0, ''))
+        self.assertEqual(tables(self.output), tables(self.whole))
+        self.assertEqual(list(self.output.rglob('*.partial')), [])
+
+    def edited(self, part: str, replacement: str) -> Path:
+        """The short sample with one part replaced."""
+        text = short_sample()
+        self.assertIn(part, text)
+        config = self.folder / 'edited.yaml'
+        config.write_text(text.replace(part, replacement), encoding='utf-8')
+        return config
+
+    def test_an_experiment_ends_in_tables_a_report_and_figures(self):
+        self.assertEqual(self.result.returncode, 0, self.result.stderr)
+        summary = tables(self.whole)['summary.csv']
+        self.assertEqual({row['method'] for row in summary}, set(METHODS))
+        self.assertEqual({(row['train_group'], row['test_group']) for row in summary},
+                         {('sunny', 'cloudy'), ('cloudy', 'sunny')})
+        best = [float(row['mean_err_m']) for row in summary if row['method'] == 'best single image']
+        self.assertLess(max(best), 5.0)
+        self.assertIn('DPSO-80', (self.whole / 'report.md').read_text(encoding='utf-8'))
+        self.assertTrue(list((self.whole / 'figures').glob('*.svg')))
+
+    def test_the_report_can_be_drawn_again(self):
+        report = (self.whole / 'report.md').read_text(encoding='utf-8')
+        result = run('report_evaluation.py', self.whole)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual((self.whole / 'report.md').read_text(encoding='utf-8'), report)
+
+    def test_shards_merged_are_the_whole(self):
+        parts = [self.folder / name for name in ('second', 'first')]
+        for part, shard in zip(parts, ('2/2', '1/2')):
+            result = run('evaluate', '--config', self.config, '--output', part, '--shard', shard)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertFalse((part / 'summary.csv').exists())
+        self.assert_refused(self.evaluate('--merge', parts[0]), 1, "map sunny_1 and drive cloudy_1 is missing")
+        self.assert_done(self.evaluate('--merge', *parts))
+        self.assert_done(self.evaluate('--merge', self.output))
+
+    def test_an_interrupted_run_goes_on(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.subTest(signal=number):
+                self.output = self.folder / f'out{number}'
+                command = [str(PROGRAMS / 'evaluate'), '--config', str(self.config), '--output', str(self.output),
+                           '--no-report', '--threads', '1']
+                with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+                    while process.poll() is None and not list(self.output.glob('units/*.csv')):
+                        time.sleep(0.002)
+                    process.send_signal(number)
+                    errors = process.communicate(timeout=20)[1]
+                self.assertEqual((process.returncode, errors), (-number, ''))
+                kept = units(self.output)
+                self.assertLess(len(kept), 2 * len(METHODS))
+                self.assertEqual([name for name in kept if not name.endswith('.csv')], [])
+                self.assert_done(self.evaluate())
+                self.assertEqual({name: units(self.output)[name] for name in kept}, kept)
+
+    def test_a_full_disk_is_one_line_and_the_next_run_goes_on(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+        self.assert_refused(self.evaluate(preexec_fn=limit), 1, 'units/pair0_method', 'cannot be written')
+        self.assertEqual([name for name in units(self.output) if not name.endswith('.csv')], [])
+        self.assert_done(self.evaluate())
+
+    def test_a_damaged_result_is_made_anew(self):
+        self.assert_done(self.evaluate('--merge', self.whole))
+        damaged = self.output / 'units' / 'pair1_method0.csv'
+        damaged.write_bytes(damaged.read_bytes()[:1000])
+        self.assert_refused(self.evaluate('--merge', self.output), 1, 'pair1_method0.csv: is damaged')
+        self.assert_done(self.evaluate())
+
+    def test_results_of_another_configuration_stay_as_they_are(self):
+        before = units(self.whole)
+        self.output = self.whole
+        self.assert_refused(self.evaluate(config=self.edited('starts: 2', 'starts: 3')), 1, 'another configuration')
+        self.assertEqual(units(self.whole), before)
+
+    def test_a_failed_attempt_does_not_bind_the_output(self):
+        wrong = self.edited('truth_topic: /ground_truth/fix', 'truth_topic: /ground_truth/fox')
+        self.assert_refused(self.evaluate(config=wrong), 1, '.bag', '/ground_truth/fox')
+        self.assert_done(self.evaluate())
+
+    def test_an_experiment_may_come_through_a_pipe(self):
+        with subprocess.Popen(['cat', str(self.config)], stdout=subprocess.PIPE) as pipe:
+            self.assert_done(self.evaluate(config=Path('/dev/stdin'), stdin=pipe.stdout))
+        self.assertEqual((self.output / 'experiment.yaml').read_text(encoding='utf-8'), short_sample())
+
+    def test_bad_usage_is_code_2(self):
+        for arguments, word in ((('--shard', '3/2'), 'I from 1 to N'), (('--shard', '0/2'), 'I from 1 to N'),
+                                (('--shard', '1/2x'), 'I from 1 to N'), (('--shard', ''), 'I from 1 to N'),
+                                (('--shard', '9' * 30 + '/' + '9' * 30), 'I from 1 to N'),
+                                (('--threads', '0'), '[1, 1024]'), (('--threads', '-1'), '[1, 1024]'),
+                                (('--threads', '9' * 30), '[1, 1024]'), (('--threads', 'all'), '[1, 1024]'),
+                                (('--merge', self.folder / 'absent'), 'absent'),
+                                (('--shard', '1/2', '--merge', self.whole), '--merge'), (('--nonsense',), 'nonsense')):
+            with self.subTest(arguments=arguments):
+                self.assert_refused(self.evaluate(*arguments), 2, word)
+        self.assert_refused(run('evaluate', '--config', self.config), 2, '--output')
+        self.assert_refused(run('evaluate', '--config', self.config, '--output='), 2, '--output')
+
+    def test_a_mistake_in_the_experiment_is_one_line_and_leaves_nothing(self):
+        for part, replacement, word in (('starts: 2', 'starts: -2', "'starts' = -2"),
+                                        ('starts: 2', 'start: 2', "'start' is unknown"),
+                                        ('campus_sunny_1.bag', 'absent.bag', 'absent.bag'),
+                                        ('[sunny, cloudy]', '[sunny, sunny]', 'needs two different rounds')):
+            with self.subTest(replacement=replacement):
+                self.assert_refused(self.evaluate(config=self.edited(part, replacement)), 1, word)
+        self.assert_refused(self.evaluate(config=self.folder), 1, str(self.folder), 'cannot be read')
+        self.assert_refused(self.evaluate(config=self.folder / 'absent.yaml'), 1, 'absent.yaml: cannot be read')
+        self.assertFalse(self.output.exists())
+
+    def test_a_folder_without_results_is_not_merged_nor_changed(self):
+        photos = self.folder / 'photos'
+        photos.mkdir()
+        self.assert_refused(self.evaluate('--merge', photos), 1, 'photos: is not a folder of results')
+        self.assertEqual(list(photos.iterdir()), [])
+
+
+if __name__ == '__main__':
+    os.environ.pop('ROS_MASTER_URI', None)
+    unittest.main(argv=sys.argv[:1], verbosity=2)
