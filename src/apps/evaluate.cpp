@@ -14,10 +14,9 @@
 
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utility.hpp>
-#include <spawn.h>
-#include <sys/wait.h>
 
 #include "app_support.h"
+#include "evaluation_report.h"
 #include "progress_bar.h"
 #include "visual_localization/evaluation/evaluator.h"
 #include "visual_localization/evaluation/experiment.h"
@@ -25,8 +24,6 @@
 #include "visual_localization/evaluation/result_tables.h"
 #include "visual_localization/io/read_file.h"
 #include "visual_localization/ros/round_recorder.h"
-
-extern char** environ;
 
 namespace visual_localization::apps {
 namespace {
@@ -136,23 +133,6 @@ void mergeFolders(const Experiment& experiment, const ResultFolder& results, con
   }
 }
 
-/// The report and its figures are drawn by a script that is installed beside this program.
-void writeReport(const std::string& folder) {
-  const fs::path script = fs::read_symlink("/proc/self/exe").parent_path() / "report_evaluation.py";
-  const std::string again = "; the tables are written, draw them with: report_evaluation.py " + folder;
-  if (!fs::exists(script)) throw ResultError(script.string() + ": is missing" + again);
-  std::string program = script.string();
-  std::string argument = folder;
-  char* const arguments[] = {program.data(), argument.data(), nullptr};
-  pid_t process = 0;
-  int status = 0;
-  std::fflush(stdout);
-  const bool started = ::posix_spawn(&process, program.c_str(), nullptr, nullptr, arguments, environ) == 0;
-  if (!started || ::waitpid(process, &status, 0) != process || status != 0) {
-    throw ResultError(script.string() + ": failed" + again);
-  }
-}
-
 void run(const Options& options) {
   shardOf(options);  // mistakes on the command line before all others
   threadsOf(options);
@@ -169,7 +149,7 @@ void run(const Options& options) {
     return;
   }
   writeResultTables(experiment, results);
-  if (!options.no_report) writeReport(options.output);
+  if (!options.no_report) drawReport(options.output);
   std::printf("%s: %zu pairs, %zu methods, results in %s\n", experiment.name.c_str(), experiment.pairs.size(),
               experiment.methods.size(), options.output.c_str());
 }

@@ -5,7 +5,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-PROGRAMS = Path(sys.argv[1])
+PROGRAMS = Path(sys.argv[1]).resolve()
 
 
 def run(program: str, *arguments, **options) -> subprocess.CompletedProcess:
