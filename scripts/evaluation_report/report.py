@@ -6,7 +6,7 @@ from .data import Results, read_results
 from .figures import Figures
 from .files import written_whole
 from .papers import Papers
-from .tables import escape, result_tables, tracking_tables
+from .tables import escape, result_tables, tracking_tables, trust_tables
 from .words import in_words
 
 
@@ -45,7 +45,9 @@ def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]]
     if figures:
         text += '\n## Figures\n\n' + '\n\n'.join(f'![{escape(caption)}](figures/{name})' for name, caption in figures)
         text += '\n'
-    return text + '\n## Tracking and cost\n\n' + tracking_tables(results)
+    text += '\n## Tracking and cost\n\n' + tracking_tables(results)
+    trust = trust_tables(results)
+    return text + (f'\n## Trust in the states\n\n{trust}' if trust else '')
 
 
 def write_report(folder: Path, papers_path: Optional[Path], file_format: str) -> int:

@@ -32,6 +32,12 @@ TRACKING = (Measure('runs', 'runs', 0),
             Measure('extract_ms', 'extract [ms]', 2),
             Measure('match_ms', 'match [ms]', 2),
             Measure('update_ms', 'update [ms]', 2))
+TRUST = (Measure('tracking_share', 'TRACKING [%]', 1, 100),
+         Measure('wrong_tracking', 'of these beyond 5 m [%]', 2, 100),
+         Measure('lost_precision', '"lost": precision [%]', 1, 100),
+         Measure('lost_recall', '"lost": recall [%]', 1, 100),
+         Measure('off_map_precision', 'OFF_MAP: precision [%]', 1, 100),
+         Measure('off_map_recall', 'OFF_MAP: recall [%]', 1, 100))
 ERROR = MAIN[0]
 NOTHING = '–'
 
@@ -219,3 +225,10 @@ def result_tables(results: Results, papers: Papers) -> str:
 def tracking_tables(results: Results) -> str:
     """Measures that the papers do not have."""
     return group_tables(results, Papers(None), TRACKING)
+
+
+def trust_tables(results: Results) -> str:
+    """How far the states of trackers can be trusted; empty when nothing has states."""
+    if all(outcome.get('tracking_share') is None for group in results.groups() for outcome in results.of(group)):
+        return ''
+    return group_tables(results, Papers(None), TRUST)

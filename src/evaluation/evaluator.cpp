@@ -79,8 +79,9 @@ class Evaluation {
     }
     const ScoreTable table(drive, *map, experiment_.front_end.match, threads_);
     const StageCosts costs{drive.sift_ms, drive.global_ms, table.siftCompare_ms(), table.globalCompare_ms()};
-    const RunContext context{map, drive, table, experiment_.closed};
     for (const std::size_t method : missingMethods(pair)) {
+      const PartialMap partial = withGap(map, experiment_.methods[method].map_gap);
+      const RunContext context{partial, drive, table, experiment_.closed};
       results_.save(pair, method,
                     summariseRuns(runMethod(context, experiment_.methods[method], startsOf(pair)), costs));
     }

@@ -171,7 +171,9 @@ MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const
   method.settings = {{"tracker", method.tracker},
                      {"features", method.localizer.features},
                      {"speed", parameters::toString(method.speed)},
-                     {"kidnapped", method.kidnapped ? "true" : "false"}};
+                     {"kidnapped", method.kidnapped ? "true" : "false"},
+                     {"map_gap", parameters::toString(method.map_gap)},
+                     {"covered", parameters::toString(method.covered)}};
   applyParameters(entry, yaml);
   return method;
 }
@@ -198,6 +200,8 @@ std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
   }
   entry.method.speed = yaml.real("speed", 1.0, kSlowest, kFastest);
   entry.method.kidnapped = yaml.flag("kidnapped", false);
+  entry.method.map_gap = yaml.real("map_gap", 0.0, 0.0, 0.6);
+  entry.method.covered = yaml.real("covered", 0.0, 0.0, 0.5);
   entry.parameters = yaml.parameters("parameters");
   std::vector<MethodSpec> methods;
   for (const auto& swept : combinationsOf(readSweep(yaml, entry.parameters)))

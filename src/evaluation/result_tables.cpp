@@ -15,7 +15,8 @@ namespace {
 
 const char* const kMeasures =
     "runs,mean_err_m,std_err_m,comparisons_per_image,ms_per_image,sift_share,median_err_m,within_5m,steps_to_localise,"
-    "steps_to_relocalise,recall_at_p99,extract_ms,match_ms,update_ms";
+    "steps_to_relocalise,recall_at_p99,extract_ms,match_ms,update_ms,tracking_share,wrong_tracking,lost_precision,"
+    "lost_recall,off_map_precision,off_map_recall";
 
 /// A field of a CSV file (RFC 4180).
 std::string field(const std::string& text) {
@@ -128,6 +129,12 @@ std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
   if (kidnapped) out << medianOf(relocalised);
   out << ',' << Known{meanOfPairs(units, &UnitResult::recall_at_p99)} << ',' << extract_ms << ',' << match_ms << ','
       << update_ms;
+  Trust trust;
+  for (const UnitResult& unit : units) trust += unit.trust;
+  for (const double share : {trust.trackingShare(), trust.wrongTracking(), trust.lostPrecision(), trust.lostRecall(),
+                             trust.offMapPrecision(), trust.offMapRecall()}) {
+    out << ',' << Known{share};
+  }
   return out.str();
 }
 

@@ -1,8 +1,5 @@
 #include "visual_localization/evaluation/run.h"
 
-#include <cmath>
-#include <limits>
-
 #include "visual_localization/evaluation/cpu_stopwatch.h"
 #include "visual_localization/evaluation/image_order.h"
 
@@ -39,9 +36,12 @@ class ExtractionCounter {
   bool previous_had_sift_ = false;
 };
 
-float errorOf(const Eigen::Vector2d& position_m, const DriveImage& image, const TrainingMap& map) {
-  if (!image.truth) return std::numeric_limits<float>::quiet_NaN();
-  return static_cast<float>((position_m - map.frame().toEastNorth(*image.truth)).norm());
+/// Compares the verdict with the truth, if that is known.
+void judge(const DriveImage& image, const TrainingMap& map, const Verdict& verdict, StepRecord& step) {
+  if (!image.truth) return;
+  const Eigen::Vector2d truth_m = map.frame().toEastNorth(*image.truth);
+  step.error_m = static_cast<float>((verdict.position_m - truth_m).norm());
+  step.off_map = map.nearest(truth_m).distance_m > kOffMap_m;
 }
 
 /// Different for every run, the same whenever it is repeated; a seed of the localizer, which is not negative.
@@ -55,22 +55,32 @@ std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
 RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace) {
   const SiftSimilarity sift(method.localizer.match, method.localizer.similarity);
   const GlobalSimilarity global(method.localizer.similarity);
-  const auto contestant = makeContestant(method, context.map, seedOf(method, start), context.closed);
+  const auto contestant = makeContestant(method, context.map.map, seedOf(method, start), context.closed);
   const std::vector<std::size_t> order =
       imageOrder(context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped});
   RunRecord record;
   record.start = start;
   ExtractionCounter counter;
-  for (std::size_t i : order) {
-    const DriveImage& shown = context.drive.images[i];
-    RecordedImage image(context.table, i, sift, global);
+  const auto covered_from = order.size() / 2;
+  const auto covered_until =
+      covered_from + static_cast<std::size_t>(method.covered * static_cast<double>(order.size()));
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const DriveImage& shown = context.drive.images[order[i]];
+    RecordedImage image(context.table, order[i], sift, global);
+    image.restrictTo(context.map.images);
+    if (i >= covered_from && i < covered_until) image.cover();
     const CpuStopwatch stopwatch;
     const Verdict verdict = contestant->process(shown.stamp_ns, image);
     record.method_ms += stopwatch.elapsed_ms();
     counter.add(image, record);
-    record.steps.push_back({errorOf(verdict.position_m, shown, *context.map), static_cast<float>(verdict.confidence),
-                            static_cast<std::uint32_t>(verdict.comparisons), verdict.features == FeatureKind::kSift});
-    if (trace && verdict.estimate) record.trace.push_back({i, contestant->diversity_m(), *verdict.estimate});
+    StepRecord step;
+    step.confidence = static_cast<float>(verdict.confidence);
+    step.comparisons = static_cast<std::uint32_t>(verdict.comparisons);
+    step.sift = verdict.features == FeatureKind::kSift;
+    if (verdict.estimate) step.state = verdict.estimate->state;
+    judge(shown, *context.map.map, verdict, step);
+    record.steps.push_back(step);
+    if (trace && verdict.estimate) record.trace.push_back({order[i], contestant->diversity_m(), *verdict.estimate});
   }
   const std::size_t half = method.kidnapped ? order.size() / 2 : order.size();
   record.steps_to_localise = stepsUntilRight(record.steps, 0, half);

@@ -47,21 +47,31 @@ ScoreTable::ScoreTable(const Drive& drive, const TrainingMap& map, const MatchCo
   }
 }
 
+std::size_t RecordedImage::trainingImages() const {
+  return training_images_ == nullptr || training_images_->empty() ? table_.trainingImages() : training_images_->size();
+}
+
+const ScoreTable::Entry& RecordedImage::entry(std::size_t training_image) const {
+  static const ScoreTable::Entry kNothing;
+  if (covered_) return kNothing;
+  const bool all = training_images_ == nullptr || training_images_->empty();
+  return table_.at(drive_image_, all ? training_image : (*training_images_)[training_image]);
+}
+
 Score RecordedImage::compare(FeatureKind kind, std::size_t training_image) {
-  const ScoreTable::Entry& entry = table_.at(drive_image_, training_image);
+  const ScoreTable::Entry& known = entry(training_image);
   if (kind == FeatureKind::kSift) {
     ++sift_comparisons_;
-    return sift_.scoreOf(entry.sift, entry.matches);
+    return sift_.scoreOf(known.sift, known.matches);
   }
   ++global_comparisons_;
-  return global_.scoreOf(entry.global);
+  return global_.scoreOf(known.global);
 }
 
 void RecordedImage::row(FeatureKind kind, std::vector<double>& similarities) {
-  similarities.resize(table_.trainingImages());
+  similarities.resize(trainingImages());
   for (std::size_t i = 0; i < similarities.size(); ++i) {
-    const ScoreTable::Entry& entry = table_.at(drive_image_, i);
-    similarities[i] = kind == FeatureKind::kSift ? entry.sift : entry.global;
+    similarities[i] = kind == FeatureKind::kSift ? entry(i).sift : entry(i).global;
   }
   (kind == FeatureKind::kSift ? sift_comparisons_ : global_comparisons_) += similarities.size();
 }

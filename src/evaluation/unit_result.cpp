@@ -169,6 +169,7 @@ UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& c
     for (std::size_t i = 0; i < run.steps.size(); ++i) {
       const StepRecord& step = run.steps[i];
       add(step, unit.steps[i]);
+      unit.trust.add(step);
       if (std::isnan(step.error_m)) continue;
       errors_m.push_back(static_cast<double>(step.error_m));
       decisions.push_back({static_cast<double>(step.confidence), errors_m.back() < kRight_m});
@@ -194,6 +195,10 @@ std::string serialise(const UnitResult& unit) {
   }
   out << "\ntrace\n";
   for (const std::string& row : unit.trace) out << row << '\n';
+  const Trust& trust = unit.trust;
+  out << "\ntrust\n"
+      << trust.tracking_right << ',' << trust.tracking_wrong << ',' << trust.lost_right << ',' << trust.lost_wrong
+      << ',' << trust.off_map_right << ',' << trust.off_map_wrong << ',' << trust.off_map_missed << '\n';
   out << "\nall\n" << unit.median_err_m << ',' << unit.recall_at_p99 << "\n\n";
   return out.str();
 }
@@ -211,6 +216,14 @@ UnitResult parseUnit(const std::string& text) {
     if (fieldsOf(line) != fieldsOf(kTraceColumns)) throw std::runtime_error("has a line of a trace that is not whole");
     unit.trace.push_back(line);
   }
+  sections.expect("trust");
+  sections.next(line);
+  Trust& trust = unit.trust;
+  NumberReader trusted(line);
+  trusted >> trust.tracking_right >> trust.tracking_wrong >> trust.lost_right >> trust.lost_wrong >>
+      trust.off_map_right >> trust.off_map_wrong >> trust.off_map_missed;
+  trusted.finish();
+  if (sections.next(line)) throw std::runtime_error("has more than one line of trust");
   sections.expect("all");
   sections.next(line);
   NumberReader all(line);

@@ -95,7 +95,8 @@ TEST(UnitResult, RefusesATextThatLostALineOrHasOneTwice) {
 }
 
 TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
-  const std::string good = "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\nall\n2,1\n\n";
+  const std::string good =
+      "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\ntrust\n1,2,3,4,5,6,7\n\nall\n2,1\n\n";
   ASSERT_EQ(refusal(good), "accepted");
   const auto with = [&good](const std::string& part, const std::string& replacement) {
     return std::string(good).replace(good.find(part), part.size(), replacement);
@@ -103,13 +104,14 @@ TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
   for (const std::string& bad :
        {with("0,1,1,2", "0,x,1,2"), with("0,1,1,2", "0,1,nan,2"), with("0,1,1,2", "0;1,1,2"), with("0,0,0\n", "0,0\n"),
         with("0,0,0\n", "0,0,0,0\n"), with("7,1\n", "7,1 \n"), with("2,1\n", "2\n"), with("2,1\n", "2,1,3\n"),
-        with("2,1\n", "1e999,1\n"), with("0,1,1,2", "99999999999999999999999,1,1,2")}) {
+        with("2,1\n", "1e999,1\n"), with("1,2,3,4,5,6,7", "1,2,3,4,5,6"),
+        with("0,1,1,2", "99999999999999999999999,1,1,2")}) {
     EXPECT_THAT(refusal(bad), HasSubstr("no list of numbers")) << bad;
   }
   EXPECT_THAT(refusal(with("trace\n", "trace\n1,2\n")), HasSubstr("trace that is not whole"));
   EXPECT_THAT(refusal(good + "more"), HasSubstr("behind its end"));
   EXPECT_THAT(refusal(with("1,1,2,7,1\n", "2,1,2,7,1\n")), HasSubstr("do not fit together"));
-  EXPECT_THAT(refusal("runs\n\nsteps\n\ntrace\n\nall\n0,0\n\n"), HasSubstr("has no run"));
+  EXPECT_THAT(refusal("runs\n\nsteps\n\ntrace\n\ntrust\n0,0,0,0,0,0,0\n\nall\n0,0\n\n"), HasSubstr("has no run"));
   EXPECT_THAT(refusal("something else\n"), HasSubstr("'runs' is missing"));
 }
 

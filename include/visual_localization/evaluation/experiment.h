@@ -35,6 +35,8 @@ struct MethodSpec {
   PlaceRecogniserConfig recogniser;
   double speed = 1.0;      ///< simulated speed: images of the round per step
   bool kidnapped = false;  ///< carried to the other side of the round after half of the run
+  double map_gap = 0.0;    ///< share of the map's images that are left out
+  double covered = 0.0;    ///< share of the run, after its half, during which something covers the camera
   std::vector<std::pair<std::string, std::string>> settings;  ///< all of the above that the experiment sets, as text
 
   bool isTracker() const;

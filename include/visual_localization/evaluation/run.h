@@ -2,21 +2,27 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "visual_localization/evaluation/contestant.h"
+#include "visual_localization/evaluation/partial_map.h"
 
 namespace visual_localization {
 
 /// Estimates nearer to the truth than this are right.
 constexpr double kRight_m = 5.0;
+/// A robot farther than this from all training images is off the map.
+constexpr double kOffMap_m = 10.0;
 
 /// What happened at one step of a run.
 struct StepRecord {
-  float error_m = 0.0F;  ///< NaN when the image has no true position
+  float error_m = std::numeric_limits<float>::quiet_NaN();  ///< NaN when the image has no true position
   float confidence = 0.0F;
   std::uint32_t comparisons = 0;
-  bool sift = false;  ///< compared by SIFT features
+  bool sift = false;                                    ///< compared by SIFT features
+  LocalizationState state = LocalizationState::kNoMap;  ///< what a tracker's localizer says; others say nothing
+  bool off_map = false;                                 ///< the true position is farther than kOffMap_m from the map
 };
 
 /// A closer look at one step, for the course of a single run.
@@ -42,9 +48,9 @@ struct RunRecord {
 
 /// Everything that the runs of one pair of rounds share.
 struct RunContext {
-  std::shared_ptr<const TrainingMap> map;
+  const PartialMap& map;
   const Drive& drive;
-  const ScoreTable& table;
+  const ScoreTable& table;  ///< of the whole map
   bool closed = true;
 };
 

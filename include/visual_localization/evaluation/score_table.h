@@ -48,8 +48,13 @@ class RecordedImage final : public ComparableImage {
                 const GlobalSimilarity& global)
       : table_(table), drive_image_(drive_image), sift_(sift), global_(global) {}
 
+  /// Of the training images only these are in the map, and counted by their place in this list; all when it is empty.
+  void restrictTo(const std::vector<std::size_t>& training_images) { training_images_ = &training_images; }
+  /// Nothing can be seen.
+  void cover() { covered_ = true; }
+
   Score compare(FeatureKind kind, std::size_t training_image) override;
-  std::size_t siftFeatures() override { return table_.siftFeatures(drive_image_); }
+  std::size_t siftFeatures() override { return covered_ ? 0 : table_.siftFeatures(drive_image_); }
   /// Similarities to all training images.
   void row(FeatureKind kind, std::vector<double>& similarities);
   std::size_t siftComparisons() const { return sift_comparisons_; }
@@ -60,6 +65,11 @@ class RecordedImage final : public ComparableImage {
   std::size_t drive_image_;
   const SiftSimilarity& sift_;
   const GlobalSimilarity& global_;
+  std::size_t trainingImages() const;
+  const ScoreTable::Entry& entry(std::size_t training_image) const;
+
+  const std::vector<std::size_t>* training_images_ = nullptr;
+  bool covered_ = false;
   std::size_t sift_comparisons_ = 0;
   std::size_t global_comparisons_ = 0;
 };

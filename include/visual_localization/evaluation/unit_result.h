@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "visual_localization/evaluation/run.h"
+#include "visual_localization/evaluation/trust.h"
 
 namespace visual_localization {
 
@@ -46,6 +47,7 @@ struct StepSums {
 struct UnitResult {
   std::vector<RunFigures> runs;
   std::vector<StepSums> steps;
+  Trust trust;
   std::vector<std::string> trace;  ///< rows of traces.csv from its column `start` on
   double median_err_m = 0.0;       ///< over all images of all runs
   double recall_at_p99 = 0.0;      ///< share of the images answered rightly when 99 % of the answers are right

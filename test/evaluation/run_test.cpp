@@ -1,0 +1,57 @@
+#include "visual_localization/evaluation/run.h"
+
+#include <gtest/gtest.h>
+
+#include "test/evaluation/small_experiment.h"
+
+namespace visual_localization::test {
+namespace {
+
+/// A swarm in the synthetic round, with changes to the method.
+RunRecord runWith(const SyntheticRounds& rounds, double map_gap, double covered) {
+  const ScoreTable table(*rounds.drive(), *rounds.map(), MatchConfig(), 1);
+  MethodSpec method;
+  method.tracker = "dpso";
+  method.localizer.state.place_check = false;  // the rounds have no global features
+  method.localizer.state.min_matches = 1;
+  method.localizer.dpso.guided_start = false;
+  method.map_gap = map_gap;
+  method.covered = covered;
+  const PartialMap partial = withGap(rounds.map(), map_gap);
+  return run({partial, *rounds.drive(), table, true}, method, 0, false);
+}
+
+TEST(PartialMap, LeavesOutOnePieceAndRemembersWhoIsWho) {
+  const SyntheticRounds rounds(100);
+  const PartialMap whole = withGap(rounds.map(), 0.0);
+  EXPECT_EQ(whole.map, rounds.map());
+  EXPECT_TRUE(whole.images.empty());
+  const PartialMap partial = withGap(rounds.map(), 0.2);
+  ASSERT_EQ(partial.map->size(), 80U);
+  ASSERT_EQ(partial.images.size(), 80U);
+  EXPECT_EQ(partial.images[34], 34U);
+  EXPECT_EQ(partial.images[35], 55U);
+  EXPECT_EQ(partial.map->image(35).position_m, rounds.map()->image(55).position_m);
+}
+
+TEST(Run, OffTheMapIsWhereAllImagesAreFar) {
+  const SyntheticRounds rounds(60);  // 75 m around
+  const RunRecord whole = runWith(rounds, 0.0, 0.0);
+  EXPECT_EQ(std::count_if(whole.steps.begin(), whole.steps.end(), [](const StepRecord& s) { return s.off_map; }), 0);
+  const RunRecord record = runWith(rounds, 0.5, 0.0);
+  ASSERT_EQ(record.steps.size(), 60U);
+  EXPECT_FALSE(record.steps[10].off_map);
+  EXPECT_TRUE(record.steps[35].off_map);
+  EXPECT_FALSE(record.steps[55].off_map);
+}
+
+TEST(Run, ACoveredCameraRecognisesNothing) {
+  const SyntheticRounds rounds(60);
+  const RunRecord record = runWith(rounds, 0.0, 0.2);
+  EXPECT_EQ(record.steps[29].state, LocalizationState::kTracking);
+  for (std::size_t i = 32; i < 42; ++i) EXPECT_NE(record.steps[i].state, LocalizationState::kTracking) << i;
+  for (std::size_t i = 32; i < 42; ++i) EXPECT_NE(record.steps[i].state, LocalizationState::kOffMap) << i;
+}
+
+}  // namespace
+}  // namespace visual_localization::test
