@@ -6,18 +6,16 @@ namespace visual_localization {
 
 void ScoreCache::startImage(Compare compare) {
   compare_ = std::move(compare);
-  ++image_count_;
-  comparisons_ = 0;
+  entries_.clear();
 }
 
-const Score& ScoreCache::operator[](std::size_t training_image) {
-  Entry& entry = entries_.at(training_image);
-  if (entry.image_count != image_count_) {
-    entry.score = compare_(training_image);
-    entry.image_count = image_count_;
-    ++comparisons_;
-  }
-  return entry.score;
+Score ScoreCache::operator[](std::size_t training_image) {
+  std::uint32_t& entry = entry_of_.at(training_image);
+  if (entry < entries_.size() && entries_[entry].training_image == training_image) return entries_[entry].score;
+  const Score score = compare_(training_image);
+  entry = static_cast<std::uint32_t>(entries_.size());
+  entries_.push_back({training_image, score});
+  return score;
 }
 
 }  // namespace visual_localization

@@ -15,25 +15,25 @@ class ScoreCache {
  public:
   using Compare = std::function<Score(std::size_t training_image)>;
 
-  explicit ScoreCache(std::size_t training_images) : entries_(training_images) {}
+  explicit ScoreCache(std::size_t training_images) : entry_of_(training_images) {}
 
   /// Forgets everything and takes scores from `compare` from now on.
   void startImage(Compare compare);
   /// The score of one training image; throws std::out_of_range for an index beyond the map.
-  const Score& operator[](std::size_t training_image);
+  Score operator[](std::size_t training_image);
   /// Distinct training images compared since startImage.
-  std::size_t comparisons() const { return comparisons_; }
+  std::size_t comparisons() const { return entries_.size(); }
 
  private:
   struct Entry {
-    std::uint64_t image_count = 0;  ///< number of the current image for which `score` holds
+    std::size_t training_image;
     Score score;
   };
 
-  std::vector<Entry> entries_;
+  // A sparse set (Briggs and Torczon, 1993): nothing of the size of the map is touched for a new image.
+  std::vector<Entry> entries_;           ///< of the current image, in the order of comparison
+  std::vector<std::uint32_t> entry_of_;  ///< of each training image; holds if the entry is there and says so too
   Compare compare_;
-  std::uint64_t image_count_ = 0;
-  std::size_t comparisons_ = 0;
 };
 
 }  // namespace visual_localization
