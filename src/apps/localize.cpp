@@ -37,6 +37,7 @@ struct Options {
   std::string truth_topic;
   std::optional<std::int64_t> particles;
   std::optional<std::int64_t> seed;
+  std::optional<std::int64_t> map_cache_mb;
   std::size_t start_index = 0;
   std::optional<std::size_t> kidnap_at;
   std::optional<std::size_t> kidnap_to;
@@ -51,6 +52,7 @@ void declareOptions(CLI::App& app, Options& options) {
   app.add_option("--features", options.features, "Features (parameter 'features')");
   app.add_option("--particles", options.particles, "Number of particles of the tracker");
   app.add_option("--seed", options.seed, "Seed of the random generator (parameter 'seed')");
+  app.add_option("--map-cache-mb", options.map_cache_mb, "Features of a larger map are read when needed (parameter)");
   app.add_option("--start-index", options.start_index, "First image; the round is closed, indices wrap");
   auto* at = app.add_option("--kidnap-at", options.kidnap_at, "Jump after so many images ...");
   auto* to = app.add_option("--kidnap-to", options.kidnap_to, "... to this image of the round");
@@ -61,22 +63,22 @@ void declareOptions(CLI::App& app, Options& options) {
   app.add_option("--truth-topic", options.truth_topic, "NavSatFix topic with true positions: prints the error");
 }
 
-LocalizerConfig configOf(const Options& options) {
-  // The file is the node's: what only the node needs is checked, but of no use here.
-  NodeParameters from_file;
+NodeParameters configOf(const Options& options) {
+  // The file is the node's: most of what only the node needs is checked, but of no use here.
+  NodeParameters config;
   if (!options.config.empty()) {
     try {
-      assignParameters(from_file, parameters::readYaml(options.config));
+      assignParameters(config, parameters::readYaml(options.config));
     } catch (const ParameterError& error) {
       throw ParameterError(options.config + ": " + error.what());
     }
   }
-  LocalizerConfig config = from_file.localizer;
   ParameterValues given;
   if (!options.tracker.empty()) given["tracker"] = options.tracker;
   if (!options.features.empty()) given["features"] = options.features;
   if (options.seed) given["seed"] = *options.seed;
-  const std::string tracker = options.tracker.empty() ? config.tracker : options.tracker;
+  if (options.map_cache_mb) given["map_cache_mb"] = *options.map_cache_mb;
+  const std::string tracker = options.tracker.empty() ? config.localizer.tracker : options.tracker;
   if (options.particles) given[tracker == "dpso" ? "dpso/particles" : "pf/particles"] = *options.particles;
   try {
     assignParameters(config, given);
@@ -151,10 +153,11 @@ std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index
 }
 
 void run(const Options& options) {
-  const LocalizerConfig config = configOf(options);
+  const NodeParameters config = configOf(options);
   requireNoInput("--output", options.output, {options.map, options.bag, options.config});
   PartialFile output(options.output);  // fails now, not after the run
-  Localizer localizer(loadMap(options.map), config);
+  const auto warn = [](const std::string& reason) { std::cerr << "localize: " << reason << std::endl; };
+  Localizer localizer(loadMap(options.map, config.node.mapLoading(warn)), config.localizer);
   const BagReader bag(options.bag);
   const BagImages images = bag.images(options.image_topic);
   const std::vector<std::size_t> order = orderOf(options, images.size());

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -23,11 +24,11 @@ struct Options {
 /// Metres along the images of one session, in their order.
 double lengthOf(const TrainingMap& map, int session) {
   double length_m = 0.0;
-  const TrainingImage* last = nullptr;
-  for (const TrainingImage& image : map.images()) {
-    if (image.session != session) continue;
-    if (last != nullptr) length_m += (image.position_m - last->position_m).norm();
-    last = &image;
+  std::optional<std::size_t> last;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (map.place(i).session != session) continue;
+    if (last) length_m += (map.position_m(i) - map.position_m(*last)).norm();
+    last = i;
   }
   return length_m;
 }
@@ -35,8 +36,8 @@ double lengthOf(const TrainingMap& map, int session) {
 void printSessions(const TrainingMap& map) {
   for (std::size_t s = 0; s < map.header().sessions.size(); ++s) {
     const auto session = static_cast<int>(s);
-    const auto count = std::count_if(map.images().begin(), map.images().end(),
-                                     [session](const TrainingImage& image) { return image.session == session; });
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < map.size(); ++i) count += map.place(i).session == session ? 1 : 0;
     std::cout << "session:     " << map.header().sessions[s] << ", " << count << " images, " << lengthOf(map, session)
               << " m\n";
   }
@@ -45,21 +46,20 @@ void printSessions(const TrainingMap& map) {
 void printFeatures(const TrainingMap& map) {
   std::vector<std::size_t> counts;
   std::size_t total = 0;
-  for (const TrainingImage& image : map.images()) {
-    counts.push_back(image.sift.size());
-    total += image.sift.size();
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    counts.push_back(map.featureCount(i));
+    total += map.featureCount(i);
   }
   std::sort(counts.begin(), counts.end());
   std::cout << "features:    " << total << ", per image min " << counts.front() << ", median "
             << counts[counts.size() / 2] << ", max " << counts.back() << '\n';
 }
 
-double memoryOf(const TrainingMap& map) {
-  std::size_t bytes = map.size() * sizeof(TrainingImage);
-  for (const TrainingImage& image : map.images()) {
-    bytes += image.sift.size() * (sizeof(SiftKeypoint) + SiftFeatures::kDescriptorSize) + image.preview_jpeg.size();
-  }
-  return static_cast<double>(bytes);
+/// Whether the localizer will have all of it in memory unless told otherwise.
+std::string whereItsFeaturesAre(double file_bytes) {
+  return file_bytes <= static_cast<double>(MapLoading().cache_bytes)
+             ? "features are read at the start"
+             : "features are read when needed (map_cache_mb: " + std::to_string(kDefaultMapCache_mb) + ")";
 }
 
 void printMap(const Options& options, const TrainingMap& map) {
@@ -80,8 +80,8 @@ void printMap(const Options& options, const TrainingMap& map) {
   std::cout << "area:        east " << area.min_m.x() << " to " << area.max_m.x() << " m, north " << area.min_m.y()
             << " to " << area.max_m.y() << " m\n";
   printFeatures(map);
-  std::cout << "size:        " << apps::humanSize(static_cast<double>(std::filesystem::file_size(options.map)))
-            << " on disk, " << apps::humanSize(memoryOf(map)) << " in memory\n";
+  const auto bytes = static_cast<double>(std::filesystem::file_size(options.map));
+  std::cout << "size:        " << apps::humanSize(bytes) << " on disk, " << whereItsFeaturesAre(bytes) << '\n';
 }
 
 /// As text inside JSON or CSV quotes; `quote` is how a quote is written there.
@@ -114,19 +114,20 @@ std::string seconds(std::int64_t stamp_ns) {
 std::string toCsv(const TrainingMap& map) {
   std::ostringstream out;
   out << "stamp,session,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,features\n" << std::setprecision(17);
-  for (const TrainingImage& image : map.images()) {
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const TrainingPlace image = map.place(i);
     const GeodeticPoint place = map.frame().toGeodetic(image.position_m);
     out << seconds(image.stamp_ns) << ','
         << quoted(map.header().sessions[static_cast<std::size_t>(image.session)], "\"\"", false) << ','
         << image.position_m.x() << ',' << image.position_m.y() << ',' << image.yaw_rad << ',' << place.latitude_deg
-        << ',' << place.longitude_deg << ',' << image.sift.size() << '\n';
+        << ',' << place.longitude_deg << ',' << map.featureCount(i) << '\n';
   }
   return out.str();
 }
 
 /// GeoJSON order: longitude first.
-std::string coordinates(const TrainingMap& map, const TrainingImage& image) {
-  const GeodeticPoint place = map.frame().toGeodetic(image.position_m);
+std::string coordinates(const TrainingMap& map, std::size_t i) {
+  const GeodeticPoint place = map.frame().toGeodetic(map.position_m(i));
   std::ostringstream out;
   out << std::setprecision(12) << '[' << place.longitude_deg << ',' << place.latitude_deg << ']';
   return out.str();
@@ -141,9 +142,9 @@ std::string pathFeature(const TrainingMap& map, std::size_t session) {
   std::string where;
   std::size_t count = 0;
   std::string last;
-  for (const TrainingImage& image : map.images()) {
-    if (static_cast<std::size_t>(image.session) != session) continue;
-    last = coordinates(map, image);
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (static_cast<std::size_t>(map.place(i).session) != session) continue;
+    last = coordinates(map, i);
     where += (where.empty() ? "" : ",") + last;
     ++count;
   }
@@ -162,13 +163,13 @@ std::string toGeoJson(const TrainingMap& map) {
     if (!path.empty()) out << path << ",\n";
   }
   for (std::size_t i = 0; i < map.size(); ++i) {
-    const TrainingImage& image = map.image(i);
+    const TrainingPlace image = map.place(i);
     std::ostringstream properties;
     properties << "\"image\":" << i << ",\"session\":"
                << quoted(map.header().sessions[static_cast<std::size_t>(image.session)], "\\\"", true)
                << ",\"stamp\":\"" << seconds(image.stamp_ns) << "\",\"yaw_rad\":" << image.yaw_rad
-               << ",\"features\":" << image.sift.size();
-    out << feature("Point", coordinates(map, image), properties.str()) << (i + 1 < map.size() ? ",\n" : "\n");
+               << ",\"features\":" << map.featureCount(i);
+    out << feature("Point", coordinates(map, i), properties.str()) << (i + 1 < map.size() ? ",\n" : "\n");
   }
   out << "]}\n";
   return out.str();

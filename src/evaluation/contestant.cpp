@@ -64,7 +64,7 @@ class RecogniserContestant final : public Contestant {
   Verdict process(std::int64_t, RecordedImage& image) override {
     image.row(features_, row_);
     const Recognition recognition = recogniser_->update(row_);
-    return {map_->image(recognition.training_image).position_m, recognition.confidence, features_, row_.size(), {}};
+    return {map_->position_m(recognition.training_image), recognition.confidence, features_, row_.size(), {}};
   }
 
  private:

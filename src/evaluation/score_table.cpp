@@ -17,14 +17,13 @@ RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimi
   RowTimes times;
   const CpuStopwatch sift_watch;
   for (std::size_t i = 0; i < map.size(); ++i) {
-    const Score score = sift.compare(image.sift, map.image(i).sift);
+    const Score score = sift.compare(image.sift, *map.sift(i));
     row[i].sift = score.similarity;
     row[i].matches = static_cast<std::uint32_t>(score.matches);
   }
   times.sift_ms = sift_watch.elapsed_ms();
   const CpuStopwatch global_watch;
-  for (std::size_t i = 0; i < map.size(); ++i)
-    row[i].global = global.compare(image.global, map.image(i).global).similarity;
+  for (std::size_t i = 0; i < map.size(); ++i) row[i].global = global.compare(image.global, *map.global(i)).similarity;
   times.global_ms = global_watch.elapsed_ms();
   return times;
 }

@@ -111,7 +111,7 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
   pose.position_m = tracked.position_m;
   pose.covariance_m2 = state == LocalizationState::kTracking ? tracked.mode_covariance_m2 : tracked.cloud_covariance_m2;
   pose.covariance_m2 += floor_m2 * Eigen::Matrix2d::Identity();
-  pose.yaw_rad = map_->image(tracked.training_image).yaw_rad;
+  pose.yaw_rad = map_->yaw_rad(tracked.training_image);
   pose.yaw_variance_rad2 = yawVariance(tracked);
   pose.geodetic = map_->frame().toGeodetic(tracked.position_m);
   return pose;
@@ -123,8 +123,7 @@ double Localizer::yawVariance(const TrackerEstimate& tracked) const {
   const auto neighbours = map_->nearest(tracked.position_m, kNeighbours);
   double squares = 0.0;
   for (const Neighbour& neighbour : neighbours) {
-    const double difference =
-        angleDifference(map_->image(tracked.training_image).yaw_rad, map_->image(neighbour.image).yaw_rad);
+    const double difference = angleDifference(map_->yaw_rad(tracked.training_image), map_->yaw_rad(neighbour.image));
     squares += difference * difference;
   }
   const double floor_rad2 = config_.min_yaw_std_rad * config_.min_yaw_std_rad;

@@ -1,14 +1,12 @@
-#include <array>
-#include <cerrno>
+#include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <fstream>
+#include <functional>
 #include <new>
 #include <string>
 #include <utility>
 
-#include <sys/stat.h>
-
+#include "file_feature_store.h"
+#include "map_file.h"
 #include "visual_localization/map/map_schema.h"
 #include "visual_localization/map/map_store.h"
 #include "visual_localization/map/sqlite.h"
@@ -16,82 +14,10 @@
 namespace visual_localization {
 namespace {
 
+using map_file::imageName;
+using map_file::Refusal;
 using map_schema::ImageRow;
-using sqlite::Bytes;
 using sqlite::Statement;
-
-/// Why a map is refused, without the path.
-class Refusal : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-/// Size of the regular file at `path`.
-std::int64_t fileSize(const std::string& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) throw Refusal(std::strerror(errno));
-  if (S_ISDIR(status.st_mode)) throw Refusal("is a folder, not a map");
-  if (!S_ISREG(status.st_mode)) throw Refusal("is not a regular file");
-  return static_cast<std::int64_t>(status.st_size);
-}
-
-/// The first 100 bytes of a database file, see https://www.sqlite.org/fileformat.html section 1.3.
-class FileHeader {
- public:
-  explicit FileHeader(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw Refusal(std::string("cannot be opened: ") + std::strerror(errno));
-    file.read(reinterpret_cast<char*>(bytes_.data()), static_cast<std::streamsize>(bytes_.size()));
-    complete_ = file.gcount() == static_cast<std::streamsize>(bytes_.size());
-  }
-
-  bool isSqlite() const { return complete_ && std::memcmp(bytes_.data(), "SQLite format 3", 16) == 0; }
-  std::int64_t userVersion() const { return number(60, 4); }
-  std::int64_t applicationId() const { return number(68, 4); }
-  /// Bytes that the file must have.
-  std::int64_t size() const {
-    const std::int64_t page = number(16, 2);
-    return (page == 1 ? 65536 : page) * number(28, 4);
-  }
-
- private:
-  std::int64_t number(std::size_t offset, std::size_t count) const {
-    std::int64_t value = 0;
-    for (std::size_t i = 0; i < count; ++i) value = value * 256 + bytes_[offset + i];
-    return value;
-  }
-
-  std::array<std::uint8_t, 100> bytes_{};
-  bool complete_ = false;
-};
-
-/// Refuses what is not a complete map of our version, before SQLite looks at it.
-void requireMapFile(const std::string& path, std::int64_t size) {
-  if (size == 0) throw Refusal("is empty");
-  const FileHeader header(path);
-  if (!header.isSqlite()) throw Refusal("is not a map");
-  if (header.applicationId() != map_schema::kApplicationId) throw Refusal("is an SQLite file, but not a map");
-  if (header.userVersion() != kMapSchemaVersion) {
-    throw Refusal("has map version " + std::to_string(header.userVersion()) + ", but only version " +
-                  std::to_string(kMapSchemaVersion) + " can be read; build it again");
-  }
-  if (header.size() != size) {
-    throw Refusal("is damaged: has " + std::to_string(size) + " bytes instead of " + std::to_string(header.size()));
-  }
-}
-
-/// Refuses any schema but our own: no view or trigger, no other table, no other definition.
-void requireSchema(const sqlite::Database& database) {
-  Statement found(database, "SELECT type, name, sql FROM sqlite_master ORDER BY name");
-  for (const map_schema::Table& table : map_schema::kTables) {
-    if (!found.step()) throw Refusal(std::string("is damaged: table '") + table.name + "' is missing");
-    if (found.text(0) != "table" || found.text(1) != table.name || found.text(2) != table.sql) {
-      throw Refusal("is not a map: its schema has an unexpected " + found.text(0) + " '" + found.text(1) + "'");
-    }
-  }
-  if (found.step())
-    throw Refusal("is not a map: its schema has an unexpected " + found.text(0) + " '" + found.text(1) + "'");
-}
 
 ParameterValue metaValue(const Statement& row) {
   switch (row.type(1)) {
@@ -129,13 +55,8 @@ ImageRow imageRow(const Statement& row) {
   image.north_m = row.real(4);
   image.yaw_rad = row.real(5);
   image.feature_count = row.integer(6);
-  image.global = {map_schema::unpackHistogram(row.blob(7)), map_schema::unpackHistogram(row.blob(8))};
-  image.features_crc32 = row.integer(9);
-  image.preview_crc32 = row.integer(10);
   return image;
 }
-
-std::string imageName(std::int64_t id) { return "image " + std::to_string(id); }
 
 void requirePlausible(const ImageRow& row, std::size_t expected_id, std::size_t session_count) {
   if (row.id != static_cast<std::int64_t>(expected_id) || row.id >= map_schema::kMaxImages) {
@@ -154,111 +75,102 @@ void requirePlausible(const ImageRow& row, std::size_t expected_id, std::size_t 
   }
 }
 
-SiftFeatures decodeFeatures(const ImageRow& image, Bytes keypoints, Bytes descriptors) {
-  const auto count = static_cast<std::size_t>(image.feature_count);
-  if (keypoints.size != count * map_schema::kKeypointBytes ||
-      descriptors.size != count * SiftFeatures::kDescriptorSize ||
-      map_schema::crc32Of(descriptors, map_schema::crc32Of(keypoints)) != image.features_crc32) {
-    throw Refusal("is damaged: features of " + imageName(image.id) + " do not agree with their checksum");
-  }
-  // An address of null plus nothing is not a range, so the empty case goes its own way.
-  if (count == 0) return {};
-  return SiftFeatures(map_schema::unpackKeypoints(keypoints), {descriptors.data, descriptors.data + descriptors.size});
+/// Room for what the file says it has, as long as the file can have it.
+std::size_t expectedImages(const sqlite::Database& database, std::int64_t file_size) {
+  constexpr std::int64_t kSmallestRow_bytes = 32;
+  Statement last(database, "SELECT id FROM images ORDER BY id DESC LIMIT 1");
+  if (!last.step()) return 0;
+  return static_cast<std::size_t>(std::clamp<std::int64_t>(last.integer(0), 0, file_size / kSmallestRow_bytes)) + 1;
 }
 
-std::vector<std::uint8_t> decodePreview(const ImageRow& image, Bytes jpeg) {
-  if (map_schema::crc32Of(jpeg) != image.preview_crc32) {
-    throw Refusal("is damaged: preview of " + imageName(image.id) + " does not agree with its checksum");
+/// Where the images were taken, verified row by row.
+TrainingPlaces readPlaces(const sqlite::Database& database, std::int64_t file_size, std::size_t session_count,
+                          map_schema::Checksum& checksum) {
+  TrainingPlaces places;
+  places.reserve(expectedImages(database, file_size));
+  Statement row(database,
+                "SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count FROM images ORDER BY id");
+  while (row.step()) {
+    const ImageRow image = imageRow(row);
+    requirePlausible(image, places.size(), session_count);
+    image.addTo(checksum);
+    places.add({image.stamp_ns, static_cast<int>(image.session), {image.east_m, image.north_m}, image.yaw_rad},
+               static_cast<std::size_t>(image.feature_count));
   }
-  if (jpeg.size == 0) return {};
-  return {jpeg.data, jpeg.data + jpeg.size};
+  return places;
 }
 
-/// The features and the preview of one image at a time, each verified when it is read.
-class ContentReader {
- public:
-  explicit ContentReader(const sqlite::Database& database)
-      : features_(database, "SELECT image, keypoints, descriptors FROM features ORDER BY image"),
-        previews_(database, "SELECT image, jpeg FROM previews ORDER BY image") {
-    preview_left_ = previews_.step();
-  }
-
-  /// To be called in order of the images.
-  void read(const ImageRow& row, TrainingImage& image) {
-    if (!features_.step() || features_.integer(0) != row.id) {
-      throw Refusal("is damaged: features of " + imageName(row.id) + " are missing");
-    }
-    image.sift = decodeFeatures(row, features_.blob(1), features_.blob(2));
-    const bool has_preview = preview_left_ && previews_.integer(0) == row.id;
-    image.preview_jpeg = decodePreview(row, has_preview ? previews_.blob(1) : Bytes{});
-    if (has_preview) preview_left_ = previews_.step();
-  }
-
-  void requireEnd() {
-    if (preview_left_ || features_.step()) throw Refusal("is damaged: it has features or previews without an image");
-  }
-
- private:
-  Statement features_;
-  Statement previews_;
-  bool preview_left_ = false;
+/// What is read of every map when it is opened.
+struct Opened {
+  MapHeader header;
+  TrainingPlaces places;
 };
 
-/// Reads and verifies everything small: the images come back without features and previews.
-std::vector<ImageRow> readRows(const sqlite::Database& database, std::size_t session_count,
-                               map_schema::Checksum& checksum) {
-  std::vector<ImageRow> rows;
-  Statement row(database,
-                "SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count, wgoh, wgii, features_crc32, "
-                "preview_crc32 FROM images ORDER BY id");
-  while (row.step()) {
-    ImageRow image = imageRow(row);
-    requirePlausible(image, rows.size(), session_count);
-    image.addTo(checksum);
-    rows.push_back(image);
-  }
-  return rows;
-}
-
-TrainingImage withoutFeatures(const ImageRow& row) {
-  TrainingImage image;
-  image.stamp_ns = row.stamp_ns;
-  image.session = static_cast<int>(row.session);
-  image.position_m = {row.east_m, row.north_m};
-  image.yaw_rad = row.yaw_rad;
-  image.global = row.global;
-  return image;
-}
-
-std::shared_ptr<const TrainingMap> readMap(const sqlite::Database& database) {
-  requireSchema(database);
+Opened readPlacesAndHeader(const sqlite::Database& database, std::int64_t file_size) {
   ParameterValues meta = readMeta(database);
   const std::int64_t expected = takeChecksum(meta);
   map_schema::Checksum checksum;
+  Opened opened{map_schema::toHeader(meta), {}};
+  opened.places = readPlaces(database, file_size, opened.header.sessions.size(), checksum);
   checksum.add(meta);
-  MapHeader header = map_schema::toHeader(std::move(meta));
-  const std::vector<ImageRow> rows = readRows(database, header.sessions.size(), checksum);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
+  return opened;
+}
 
-  std::vector<TrainingImage> images;
-  images.reserve(rows.size());
-  ContentReader content(database);
-  for (const ImageRow& row : rows) {
-    images.push_back(withoutFeatures(row));
-    content.read(row, images.back());
+/// Goes to the row of the image that is next.
+void stepTo(std::size_t image, Statement& row, const char* what) {
+  const auto id = static_cast<std::int64_t>(image);
+  if (!row.step() || row.integer(0) != id) {
+    throw Refusal(std::string("is damaged: ") + what + " of " + imageName(id) + " are missing");
   }
-  content.requireEnd();
-  return std::make_shared<const TrainingMap>(std::move(header), std::move(images));
+}
+
+/// Reads and verifies what all images looked like, one after the other.
+void forEachImage(const sqlite::Database& database, const TrainingPlaces& places,
+                  const std::function<void(TrainingImage&&)>& use) {
+  const std::string in_order = " ORDER BY image";
+  Statement sift(database, map_file::kSelectSift + in_order);
+  Statement global(database, map_file::kSelectGlobal + in_order);
+  Statement preview(database, map_file::kSelectPreview + in_order);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    stepTo(i, sift, "features");
+    stepTo(i, global, "global features");
+    stepTo(i, preview, "bytes of the preview");
+    TrainingImage image{{places.stamps_ns[i], places.sessions[i], places.positions_m[i], places.yaws_rad[i]},
+                        map_file::siftOf(sift),
+                        map_file::globalOf(global),
+                        map_file::previewOf(preview)};
+    if (image.sift.size() != places.feature_counts[i]) {
+      throw Refusal("is damaged: " + imageName(static_cast<std::int64_t>(i)) + " has " +
+                    std::to_string(image.sift.size()) + " features instead of " +
+                    std::to_string(places.feature_counts[i]));
+    }
+    use(std::move(image));
+  }
+  if (sift.step() || global.step() || preview.step()) {
+    throw Refusal("is damaged: it has features or previews without an image");
+  }
+}
+
+std::shared_ptr<const TrainingMap> readWhole(const sqlite::Database& database, Opened opened) {
+  std::vector<TrainingImage> images;
+  images.reserve(opened.places.size());
+  forEachImage(database, opened.places, [&images](TrainingImage&& image) { images.push_back(std::move(image)); });
+  return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(images));
+}
+
+void requireIntegrity(const sqlite::Database& database) {
+  Statement check(database, "PRAGMA integrity_check(1)");
+  if (!check.step()) throw Refusal("is damaged: its structure cannot be checked");
+  if (const std::string answer = check.text(0); answer != "ok") throw Refusal("is damaged: " + answer);
 }
 
 /// Runs `read` on the opened file and puts the path in front of whatever it throws.
 template <class Read>
 auto withMapFile(const std::string& path, Read read) {
   try {
-    const std::int64_t size = fileSize(path);
-    requireMapFile(path, size);
-    const sqlite::Database database = sqlite::Database::openUntrusted(path, size);
-    return read(database);
+    const std::int64_t size = map_file::fileSize(path);
+    return read(map_file::open(path, size), size);
   } catch (const Refusal& refusal) {
     throw MapStoreError(path + ": " + refusal.what());
   } catch (const std::bad_alloc&) {
@@ -268,26 +180,31 @@ auto withMapFile(const std::string& path, Read read) {
   }
 }
 
-void requireIntegrity(const sqlite::Database& database) {
-  Statement check(database, "PRAGMA integrity_check(1)");
-  if (!check.step()) throw Refusal("is damaged: its structure cannot be checked");
-  if (const std::string answer = check.text(0); answer != "ok") throw Refusal("is damaged: " + answer);
-}
-
 }  // namespace
 
-std::shared_ptr<const TrainingMap> loadMap(const std::string& path) { return withMapFile(path, readMap); }
+std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoading& loading) {
+  return withMapFile(path, [&](sqlite::Database&& database, std::int64_t size) {
+    Opened opened = readPlacesAndHeader(database, size);
+    if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(database, std::move(opened));
+    return std::make_shared<const TrainingMap>(
+        std::move(opened.header), std::move(opened.places),
+        std::make_unique<FileFeatureStore>(std::move(database), path, loading.cache_bytes, loading.warn));
+  });
+}
 
 void checkMap(const std::string& path) {
-  withMapFile(path, [](const sqlite::Database& database) {
-    readMap(database);
+  withMapFile(path, [](const sqlite::Database& database, std::int64_t size) {
+    Opened opened = readPlacesAndHeader(database, size);
+    forEachImage(database, opened.places, [](TrainingImage&&) {});
     requireIntegrity(database);
+    // What a map may not be besides.
+    const TrainingMap map(std::move(opened.header), std::move(opened.places),
+                          std::make_unique<MemoryFeatureStore>(std::vector<TrainingImage>()));
   });
 }
 
 std::string packageVersionOf(const std::string& path) {
-  return withMapFile(path, [](const sqlite::Database& database) {
-    requireSchema(database);
+  return withMapFile(path, [](const sqlite::Database& database, std::int64_t) {
     const ParameterValues meta = readMeta(database);
     const auto found = meta.find("package_version");
     if (found == meta.end()) throw Refusal("is damaged: it has no package version");

@@ -65,6 +65,14 @@ float getFloat(const std::uint8_t* from) {
   return value;
 }
 
+std::uint64_t bitsOf(double value) {
+  // SQLite does not keep the sign of zero.
+  const double normal = value == 0.0 ? 0.0 : value;
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &normal, sizeof(bits));
+  return bits;
+}
+
 void putFloat(float value, std::uint8_t* to) {
   std::uint32_t bits = 0;
   std::memcpy(&bits, &value, sizeof(bits));
@@ -73,21 +81,31 @@ void putFloat(float value, std::uint8_t* to) {
 
 }  // namespace
 
-const std::array<Table, 4> kTables{{
+const std::array<Table, 5> kTables{{
     {"features",
-     "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL)"},
+     "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL, "
+     "crc32 INTEGER NOT NULL)"},
+    {"globals",
+     "CREATE TABLE globals(image INTEGER PRIMARY KEY, wgoh BLOB NOT NULL, wgii BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
     {"images",
      "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
-     "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL, "
-     "wgoh BLOB NOT NULL, wgii BLOB NOT NULL, features_crc32 INTEGER NOT NULL, preview_crc32 INTEGER NOT NULL)"},
+     "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL)"},
     {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
-    {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL)"},
+    {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
 }};
 
 std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous) {
   // SQLite's own limit of 2 GiB a value keeps every size within zlib's 32 bits.
   if (bytes.size == 0) return previous;
   return static_cast<std::int64_t>(::crc32(static_cast<uLong>(previous), bytes.data, static_cast<uInt>(bytes.size)));
+}
+
+std::int64_t rowChecksum(std::int64_t image, std::initializer_list<sqlite::Bytes> blobs) {
+  std::array<std::uint8_t, 8> number{};
+  putLittleEndian(static_cast<std::uint64_t>(image), number.data());
+  std::int64_t checksum = crc32Of({number.data(), number.size()});
+  for (const sqlite::Bytes& blob : blobs) checksum = crc32Of(blob, checksum);
+  return checksum;
 }
 
 void Checksum::addRaw(const std::uint8_t* data, std::size_t size) {
@@ -100,22 +118,11 @@ void Checksum::add(std::int64_t value) {
   addRaw(bytes.data(), bytes.size());
 }
 
-void Checksum::add(double value) {
-  // SQLite does not keep the sign of zero.
-  const double normal = value == 0.0 ? 0.0 : value;
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &normal, sizeof(bits));
-  add(static_cast<std::int64_t>(bits));
-}
+void Checksum::add(double value) { add(static_cast<std::int64_t>(bitsOf(value))); }
 
 void Checksum::add(const std::string& value) {
   add(static_cast<std::int64_t>(value.size()));
   addRaw(reinterpret_cast<const std::uint8_t*>(value.data()), value.size());
-}
-
-void Checksum::add(const std::vector<std::uint8_t>& value) {
-  add(static_cast<std::int64_t>(value.size()));
-  addRaw(value.data(), value.size());
 }
 
 void Checksum::add(const ParameterValues& values) {
@@ -132,12 +139,18 @@ void Checksum::add(const ParameterValues& values) {
 }
 
 void ImageRow::addTo(Checksum& checksum) const {
-  for (const std::int64_t value : {id, session, stamp_ns, feature_count, features_crc32, preview_crc32}) {
-    checksum.add(value);
+  // At once: the checksum of a few bytes costs more than that of many.
+  std::array<std::uint8_t, 56> bytes{};
+  std::uint8_t* to = bytes.data();
+  for (const std::int64_t value : {id, session, stamp_ns, feature_count}) {
+    putLittleEndian(static_cast<std::uint64_t>(value), to);
+    to += sizeof(value);
   }
-  for (const double value : {east_m, north_m, yaw_rad}) checksum.add(value);
-  checksum.add(packHistogram(global.wgoh));
-  checksum.add(packHistogram(global.wgii));
+  for (const double value : {east_m, north_m, yaw_rad}) {
+    putLittleEndian(bitsOf(value), to);
+    to += sizeof(value);
+  }
+  checksum.addRaw(bytes.data(), bytes.size());
 }
 
 ParameterValues toMeta(const MapHeader& header) {

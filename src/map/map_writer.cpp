@@ -1,4 +1,8 @@
-#include <string>
+#include "visual_localization/map/map_writer.h"
+
+#include <cstdint>
+#include <initializer_list>
+#include <vector>
 
 #include "visual_localization/io/partial_file.h"
 #include "visual_localization/map/map_schema.h"
@@ -12,133 +16,156 @@ using map_schema::ImageRow;
 using sqlite::Bytes;
 using sqlite::Statement;
 
-void createTables(sqlite::Database& database) {
+Bytes bytesOf(const std::vector<std::uint8_t>& bytes) { return {bytes.data(), bytes.size()}; }
+
+sqlite::Database createTables(const std::string& path) {
+  sqlite::Database database = sqlite::Database::create(path);
+  database.execute("BEGIN");
   database.execute("PRAGMA application_id = " + std::to_string(map_schema::kApplicationId));
   database.execute("PRAGMA user_version = " + std::to_string(kMapSchemaVersion));
   for (const map_schema::Table& table : map_schema::kTables) database.execute(table.sql);
+  return database;
 }
 
-/// Fills the tables image by image.
-class Writer {
- public:
-  explicit Writer(sqlite::Database& database)
-      : meta_(database, "INSERT INTO meta VALUES(?,?)"),
-        images_(database, "INSERT INTO images VALUES(?,?,?,?,?,?,?,?,?,?,?)"),
-        features_(database, "INSERT INTO features VALUES(?,?,?)"),
-        previews_(database, "INSERT INTO previews VALUES(?,?)") {}
-
-  void writeMeta(const ParameterValues& values) {
-    checksum_.add(values);
-    for (const auto& [key, value] : values) {
-      meta_.bind(0, key);
-      if (const auto* integer = std::get_if<std::int64_t>(&value)) meta_.bind(1, *integer);
-      if (const auto* real = std::get_if<double>(&value)) meta_.bind(1, *real);
-      if (const auto* text = std::get_if<std::string>(&value)) meta_.bind(1, *text);
-      meta_.run();
-    }
-  }
-
-  void writeImage(std::size_t index, const TrainingImage& image) {
-    const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(image.sift.keypoints());
-    const Bytes keypoint_bytes{keypoints.data(), keypoints.size()};
-    const Bytes descriptor_bytes{image.sift.descriptors().data(), image.sift.descriptors().size()};
-    const Bytes preview_bytes{image.preview_jpeg.data(), image.preview_jpeg.size()};
-
-    ImageRow row;
-    row.id = static_cast<std::int64_t>(index);
-    row.session = image.session;
-    row.stamp_ns = image.stamp_ns;
-    row.east_m = image.position_m.x();
-    row.north_m = image.position_m.y();
-    row.yaw_rad = image.yaw_rad;
-    row.feature_count = static_cast<std::int64_t>(image.sift.size());
-    row.global = image.global;
-    row.features_crc32 = map_schema::crc32Of(descriptor_bytes, map_schema::crc32Of(keypoint_bytes));
-    row.preview_crc32 = map_schema::crc32Of(preview_bytes);
-    writeRow(row);
-    writeFeatures(row.id, keypoint_bytes, descriptor_bytes);
-    if (preview_bytes.size > 0) writePreview(row.id, preview_bytes);
-  }
-
-  /// To be called last: it covers everything written before.
-  void writeChecksum() {
-    meta_.bind(0, std::string("checksum"));
-    meta_.bind(1, checksum_.value());
-    meta_.run();
-  }
-
- private:
-  void writeRow(const ImageRow& row) {
-    row.addTo(checksum_);
-    images_.bind(0, row.id);
-    images_.bind(1, row.session);
-    images_.bind(2, row.stamp_ns);
-    images_.bind(3, row.east_m);
-    images_.bind(4, row.north_m);
-    images_.bind(5, row.yaw_rad);
-    images_.bind(6, row.feature_count);
-    const std::vector<std::uint8_t> wgoh = map_schema::packHistogram(row.global.wgoh);
-    const std::vector<std::uint8_t> wgii = map_schema::packHistogram(row.global.wgii);
-    images_.bind(7, Bytes{wgoh.data(), wgoh.size()});
-    images_.bind(8, Bytes{wgii.data(), wgii.size()});
-    images_.bind(9, row.features_crc32);
-    images_.bind(10, row.preview_crc32);
-    images_.run();
-  }
-
-  void writeFeatures(std::int64_t image, Bytes keypoints, Bytes descriptors) {
-    features_.bind(0, image);
-    features_.bind(1, keypoints);
-    features_.bind(2, descriptors);
-    features_.run();
-  }
-
-  void writePreview(std::int64_t image, Bytes jpeg) {
-    previews_.bind(0, image);
-    previews_.bind(1, jpeg);
-    previews_.run();
-  }
-
-  Statement meta_;
-  Statement images_;
-  Statement features_;
-  Statement previews_;
-  map_schema::Checksum checksum_;
-};
-
-void fill(sqlite::Database& database, const TrainingMap& map) {
-  createTables(database);
-  Writer writer(database);
-  writer.writeMeta(map_schema::toMeta(map.header()));
-  for (std::size_t i = 0; i < map.size(); ++i) writer.writeImage(i, map.image(i));
-  writer.writeChecksum();
-}
-
-void requireStorable(const TrainingMap& map) {
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    if (map.image(i).sift.size() <= static_cast<std::size_t>(map_schema::kMaxFeaturesPerImage)) continue;
-    throw sqlite::Error("image " + std::to_string(i) + " has " + std::to_string(map.image(i).sift.size()) +
-                        " features, the limit is " + std::to_string(map_schema::kMaxFeaturesPerImage));
-  }
-}
-
-}  // namespace
-
-void saveMap(const TrainingMap& map, const std::string& path) {
+/// Runs `write` and puts the path in front of whatever it throws.
+template <class Write>
+auto withPath(const std::string& path, Write write) {
   try {
-    requireStorable(map);
-    PartialFile file(path);
-    sqlite::Database database = sqlite::Database::create(file.path());
-    database.execute("BEGIN");
-    fill(database, map);
-    database.execute("COMMIT");
-    database.close();
-    file.commit();
+    return write();
   } catch (const sqlite::Error& error) {
     throw MapStoreError(path + ": cannot be written: " + error.what());
   } catch (const FileError& error) {
     throw MapStoreError(error.what());
   }
+}
+
+}  // namespace
+
+/// The open file and what has been written to it.
+class MapWriter::Tables {
+ public:
+  explicit Tables(const std::string& path)
+      : file_(path), database_(createTables(file_.path())), looks_(std::make_unique<Looks>(database_)) {}
+
+  void append(const TrainingImage& image) {
+    requireStorable(image);
+    looks_->write(static_cast<std::int64_t>(places_.size()), image);
+    places_.add(image, image.sift.size());
+  }
+
+  void finish(const MapHeader& header) {
+    // Behind each other in the file, because they are read together when the map is opened.
+    for (std::size_t i = 0; i < places_.size(); ++i) writePlace(i);
+    writeMeta(map_schema::toMeta(header));
+    looks_.reset();
+    place_row_.reset();
+    database_.execute("COMMIT");
+    database_.close();
+    file_.commit();
+  }
+
+  std::size_t size() const { return places_.size(); }
+
+ private:
+  /// Writes what an image looked like.
+  class Looks {
+   public:
+    explicit Looks(const sqlite::Database& database)
+        : features_(database, "INSERT INTO features VALUES(?,?,?,?)"),
+          globals_(database, "INSERT INTO globals VALUES(?,?,?,?)"),
+          previews_(database, "INSERT INTO previews VALUES(?,?,?)") {}
+
+    void write(std::int64_t id, const TrainingImage& image) {
+      const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(image.sift.keypoints());
+      const std::vector<std::uint8_t> wgoh = map_schema::packHistogram(image.global.wgoh);
+      const std::vector<std::uint8_t> wgii = map_schema::packHistogram(image.global.wgii);
+      writeRow(features_, id, {bytesOf(keypoints), bytesOf(image.sift.descriptors())});
+      writeRow(globals_, id, {bytesOf(wgoh), bytesOf(wgii)});
+      writeRow(previews_, id, {bytesOf(image.preview_jpeg)});
+    }
+
+   private:
+    static void writeRow(Statement& row, std::int64_t id, std::initializer_list<Bytes> blobs) {
+      int column = 0;
+      row.bind(column++, id);
+      for (const Bytes& blob : blobs) row.bind(column++, blob);
+      row.bind(column, map_schema::rowChecksum(id, blobs));
+      row.run();
+    }
+
+    Statement features_;
+    Statement globals_;
+    Statement previews_;
+  };
+
+  void requireStorable(const TrainingImage& image) const {
+    if (image.sift.size() <= static_cast<std::size_t>(map_schema::kMaxFeaturesPerImage)) return;
+    throw sqlite::Error("image " + std::to_string(size()) + " has " + std::to_string(image.sift.size()) +
+                        " features, the limit is " + std::to_string(map_schema::kMaxFeaturesPerImage));
+  }
+
+  void writePlace(std::size_t i) {
+    if (!place_row_) place_row_ = std::make_unique<Statement>(database_, "INSERT INTO images VALUES(?,?,?,?,?,?,?)");
+    ImageRow row;
+    row.id = static_cast<std::int64_t>(i);
+    row.session = places_.sessions[i];
+    row.stamp_ns = places_.stamps_ns[i];
+    row.east_m = places_.positions_m[i].x();
+    row.north_m = places_.positions_m[i].y();
+    row.yaw_rad = places_.yaws_rad[i];
+    row.feature_count = places_.feature_counts[i];
+    row.addTo(checksum_);
+    place_row_->bind(0, row.id);
+    place_row_->bind(1, row.session);
+    place_row_->bind(2, row.stamp_ns);
+    place_row_->bind(3, row.east_m);
+    place_row_->bind(4, row.north_m);
+    place_row_->bind(5, row.yaw_rad);
+    place_row_->bind(6, row.feature_count);
+    place_row_->run();
+  }
+
+  /// To be called last: the checksum among its values covers the places as well.
+  void writeMeta(ParameterValues meta) {
+    checksum_.add(meta);
+    meta["checksum"] = checksum_.value();
+    Statement row(database_, "INSERT INTO meta VALUES(?,?)");
+    for (const auto& [key, value] : meta) {
+      row.bind(0, key);
+      if (const auto* integer = std::get_if<std::int64_t>(&value)) row.bind(1, *integer);
+      if (const auto* real = std::get_if<double>(&value)) row.bind(1, *real);
+      if (const auto* text = std::get_if<std::string>(&value)) row.bind(1, *text);
+      row.run();
+    }
+  }
+
+  PartialFile file_;
+  sqlite::Database database_;
+  std::unique_ptr<Looks> looks_;
+  std::unique_ptr<Statement> place_row_;
+  TrainingPlaces places_;
+  map_schema::Checksum checksum_;
+};
+
+MapWriter::MapWriter(const std::string& path)
+    : path_(path), tables_(withPath(path, [&path] { return std::make_unique<Tables>(path); })) {}
+
+MapWriter::~MapWriter() = default;
+
+void MapWriter::append(const TrainingImage& image) {
+  withPath(path_, [&] { tables_->append(image); });
+}
+
+std::size_t MapWriter::size() const { return tables_->size(); }
+
+void MapWriter::finish(const MapHeader& header) {
+  withPath(path_, [&] { tables_->finish(header); });
+}
+
+void saveMap(const TrainingMap& map, const std::string& path) {
+  MapWriter writer(path);
+  for (std::size_t i = 0; i < map.size(); ++i) writer.append(map.image(i));
+  writer.finish(map.header());
 }
 
 }  // namespace visual_localization

@@ -137,6 +137,8 @@ void Statement::run() {
   check(sqlite3_reset(statement_), database_);
 }
 
+void Statement::reset() { sqlite3_reset(statement_); }
+
 Statement::Type Statement::type(int column) const {
   switch (sqlite3_column_type(statement_, column)) {
     case SQLITE_INTEGER:

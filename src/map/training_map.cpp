@@ -12,43 +12,36 @@ namespace {
   throw std::invalid_argument("training map: image " + std::to_string(image) + ": " + reason);
 }
 
-/// The images, if a map can be made of them.
-std::vector<TrainingImage> checked(const MapHeader& header, std::vector<TrainingImage> images) {
-  if (images.empty()) throw std::invalid_argument("training map: there is no image");
+/// The places, if a map can be made of them.
+TrainingPlaces checked(const MapHeader& header, TrainingPlaces places) {
+  if (places.size() == 0) throw std::invalid_argument("training map: there is no image");
   if (header.image_size.width <= 0 || header.image_size.height <= 0) {
     throw std::invalid_argument("training map: image size " + std::to_string(header.image_size.width) + "x" +
                                 std::to_string(header.image_size.height) + " is not positive");
   }
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const TrainingImage& image = images[i];
-    if (!image.position_m.allFinite()) refuse(i, "position is not finite");
-    if (image.position_m.cwiseAbs().maxCoeff() > kLargestCoordinate_m) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Eigen::Vector2d& position_m = places.positions_m[i];
+    const int session = places.sessions[i];
+    if (!position_m.allFinite()) refuse(i, "position is not finite");
+    if (position_m.cwiseAbs().maxCoeff() > kLargestCoordinate_m) {
       refuse(i, "position is farther than " + std::to_string(static_cast<int>(kLargestCoordinate_m)) +
                     " m from the datum");
     }
-    if (!std::isfinite(image.yaw_rad)) refuse(i, "heading is not finite");
-    if (image.session < 0 || static_cast<std::size_t>(image.session) >= header.sessions.size()) {
-      refuse(i,
-             "session " + std::to_string(image.session) + " is not one of " + std::to_string(header.sessions.size()));
+    if (!std::isfinite(places.yaws_rad[i])) refuse(i, "heading is not finite");
+    if (session < 0 || static_cast<std::size_t>(session) >= header.sessions.size()) {
+      refuse(i, "session " + std::to_string(session) + " is not one of " + std::to_string(header.sessions.size()));
     }
   }
-  return images;
+  return places;
 }
 
-Area boundingBox(const std::vector<TrainingImage>& images) {
-  Area area{images.front().position_m, images.front().position_m};
-  for (const TrainingImage& image : images) {
-    area.min_m = area.min_m.cwiseMin(image.position_m);
-    area.max_m = area.max_m.cwiseMax(image.position_m);
+Area boundingBox(const std::vector<Eigen::Vector2d>& positions_m) {
+  Area area{positions_m.front(), positions_m.front()};
+  for (const Eigen::Vector2d& position : positions_m) {
+    area.min_m = area.min_m.cwiseMin(position);
+    area.max_m = area.max_m.cwiseMax(position);
   }
   return area;
-}
-
-std::vector<Eigen::Vector2d> positionsOf(const std::vector<TrainingImage>& images) {
-  std::vector<Eigen::Vector2d> positions;
-  positions.reserve(images.size());
-  for (const TrainingImage& image : images) positions.push_back(image.position_m);
-  return positions;
 }
 
 }  // namespace
@@ -56,9 +49,26 @@ std::vector<Eigen::Vector2d> positionsOf(const std::vector<TrainingImage>& image
 TrainingMap::TrainingMap(MapHeader header, std::vector<TrainingImage> images)
     : header_(std::move(header)),
       frame_(header_.datum),
-      images_(checked(header_, std::move(images))),
-      area_(boundingBox(images_)),
-      index_(positionsOf(images_)) {}
+      places_(checked(header_, placesOf(images))),
+      store_(std::make_unique<MemoryFeatureStore>(std::move(images))),
+      area_(boundingBox(places_.positions_m)),
+      index_(places_.positions_m) {}
+
+TrainingMap::TrainingMap(MapHeader header, TrainingPlaces places, std::unique_ptr<const FeatureStore> store)
+    : header_(std::move(header)),
+      frame_(header_.datum),
+      places_(checked(header_, std::move(places))),
+      store_(std::move(store)),
+      area_(boundingBox(places_.positions_m)),
+      index_(places_.positions_m) {}
+
+TrainingPlace TrainingMap::place(std::size_t i) const {
+  return {places_.stamps_ns[i], places_.sessions[i], places_.positions_m[i], places_.yaws_rad[i]};
+}
+
+TrainingImage TrainingMap::image(std::size_t i) const {
+  return {place(i), *store_->sift(i), *store_->global(i), store_->preview(i)};
+}
 
 Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const { return index_.nearest(position_m); }
 

@@ -152,7 +152,9 @@ void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {
 }
 
 std::size_t LocalizerNodelet::useMap(const std::string& path) {
-  const auto map = loadMap(path);
+  const auto map = loadMap(path, parameters_.node.mapLoading([name = getName()](const std::string& reason) {
+    ROS_WARN_STREAM_NAMED(name, "Map " << reason);  // the map may outlive the nodelet
+  }));
   localizer_->setMap(map);
   publisher_->publishMap(*map);
   diagnostics_->mapLoaded(path, map->size());

@@ -1,5 +1,6 @@
 #include "visual_localization/ros/map_messages.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -12,6 +13,10 @@ namespace {
 constexpr double kPlaceDiameter_m = 0.6;
 constexpr double kHeadingLength_m = 1.5;
 constexpr double kHeadingWidth_m = 0.12;
+/// Of a larger map only every so many-th image is shown: a message of a million poses would stop rviz.
+constexpr std::size_t kMostShown = 20000;
+
+std::size_t strideThrough(const TrainingMap& map) { return (map.size() + kMostShown - 1) / kMostShown; }
 
 struct Colour {
   float r, g, b;
@@ -49,24 +54,15 @@ visualization_msgs::Marker emptyMarker(const std::string& frame_id, const std::s
   return marker;
 }
 
-visualization_msgs::Marker placesOf(const TrainingMap& map, int session, const std::string& frame_id) {
+visualization_msgs::Marker emptyPlaces(int session, const std::string& frame_id) {
   auto marker = emptyMarker(frame_id, "places", session, visualization_msgs::Marker::SPHERE_LIST);
   marker.scale.x = marker.scale.y = marker.scale.z = kPlaceDiameter_m;
-  for (const TrainingImage& image : map.images()) {
-    if (image.session == session) marker.points.push_back(pointAt(image.position_m));
-  }
   return marker;
 }
 
-visualization_msgs::Marker headingsOf(const TrainingMap& map, int session, const std::string& frame_id) {
+visualization_msgs::Marker emptyHeadings(int session, const std::string& frame_id) {
   auto marker = emptyMarker(frame_id, "headings", session, visualization_msgs::Marker::LINE_LIST);
   marker.scale.x = kHeadingWidth_m;
-  for (const TrainingImage& image : map.images()) {
-    if (image.session != session) continue;
-    const Eigen::Vector2d direction(std::cos(image.yaw_rad), std::sin(image.yaw_rad));
-    marker.points.push_back(pointAt(image.position_m));
-    marker.points.push_back(pointAt(image.position_m + kHeadingLength_m * direction));
-  }
   return marker;
 }
 
@@ -75,12 +71,12 @@ visualization_msgs::Marker headingsOf(const TrainingMap& map, int session, const
 nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id) {
   nav_msgs::Path path;
   path.header.frame_id = frame_id;
-  path.poses.reserve(map.size());
-  for (const TrainingImage& image : map.images()) {
+  path.poses.reserve(std::min(map.size(), kMostShown));
+  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
     geometry_msgs::PoseStamped pose;
     pose.header.frame_id = frame_id;
-    pose.pose.position = pointAt(image.position_m);
-    pose.pose.orientation = quaternionFromYaw(image.yaw_rad);
+    pose.pose.position = pointAt(map.position_m(i));
+    pose.pose.orientation = quaternionFromYaw(map.yaw_rad(i));
     path.poses.push_back(pose);
   }
   return path;
@@ -92,8 +88,17 @@ visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::str
   markers.markers.back().action = visualization_msgs::Marker::DELETEALL;
   const auto sessions = static_cast<int>(map.header().sessions.size());
   for (int session = 0; session < sessions; ++session) {
-    markers.markers.push_back(placesOf(map, session, frame_id));
-    markers.markers.push_back(headingsOf(map, session, frame_id));
+    markers.markers.push_back(emptyPlaces(session, frame_id));
+    markers.markers.push_back(emptyHeadings(session, frame_id));
+  }
+  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
+    const TrainingPlace place = map.place(i);
+    const auto session = static_cast<std::size_t>(place.session);
+    const Eigen::Vector2d direction(std::cos(place.yaw_rad), std::sin(place.yaw_rad));
+    markers.markers[2 * session + 1].points.push_back(pointAt(place.position_m));
+    auto& heading = markers.markers[2 * session + 2].points;
+    heading.push_back(pointAt(place.position_m));
+    heading.push_back(pointAt(place.position_m + kHeadingLength_m * direction));
   }
   return markers;
 }

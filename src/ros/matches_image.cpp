@@ -1,6 +1,9 @@
 #include "visual_localization/ros/matches_image.h"
 
 #include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -26,9 +29,9 @@ cv::Mat inColour(const cv::Mat& grey, const cv::Size& size) {
   return colour;
 }
 
-cv::Mat previewOf(const TrainingImage& image, const cv::Size& size) {
+cv::Mat previewOf(const std::vector<std::uint8_t>& jpeg, const cv::Size& size) {
   cv::Mat preview;
-  if (!image.preview_jpeg.empty()) preview = cv::imdecode(image.preview_jpeg, cv::IMREAD_GRAYSCALE);
+  if (!jpeg.empty()) preview = cv::imdecode(jpeg, cv::IMREAD_GRAYSCALE);
   return preview.empty() ? cv::Mat(size, CV_8UC3, cv::Scalar::all(48)) : inColour(preview, size);
 }
 
@@ -47,15 +50,15 @@ cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const Trainin
   const double scale =
       map_size.width < kSmallestWidth_px ? static_cast<double>(kSmallestWidth_px) / map_size.width : 1.0;
   const cv::Size half(cvRound(map_size.width * scale), cvRound(map_size.height * scale));
-  const TrainingImage& image = map.image(training);
+  const std::shared_ptr<const SiftFeatures> training_sift = map.sift(training);
 
   cv::Mat canvas;
-  cv::hconcat(inColour(grey, half), previewOf(image, half), canvas);
+  cv::hconcat(inColour(grey, half), previewOf(map.preview(training), half), canvas);
   std::size_t line = 0;
-  for (const FeatureMatch& match : matchSymmetric(sift, image.sift, max_angle_ratio)) {
+  for (const FeatureMatch& match : matchSymmetric(sift, *training_sift, max_angle_ratio)) {
     const cv::Scalar& colour = kLineColours[line++ % kLineColours.size()];
     const cv::Point from = shifted(sift.keypoints()[match.a], scale, 0.0);
-    const cv::Point to = shifted(image.sift.keypoints()[match.b], scale, half.width);
+    const cv::Point to = shifted(training_sift->keypoints()[match.b], scale, half.width);
     cv::line(canvas, from, to, colour, 1, cv::LINE_AA, kShiftBits);
     cv::circle(canvas, from, 4 << kShiftBits, colour, 1, cv::LINE_AA, kShiftBits);
     cv::circle(canvas, to, 4 << kShiftBits, colour, 1, cv::LINE_AA, kShiftBits);

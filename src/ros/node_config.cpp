@@ -1,9 +1,13 @@
 #include "visual_localization/ros/node_config.h"
 
+#include <utility>
+
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
+
+constexpr int kLargestMapCache_mb = 1 << 20;  ///< a tebibyte
 
 /// tf2 knows no leading slash, and an empty name is no frame.
 void checkFrame(const std::string& name, const std::string& frame, std::vector<std::string>& wrong) {
@@ -16,6 +20,8 @@ void checkFrame(const std::string& name, const std::string& frame, std::vector<s
 
 void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.text({"map", "", "path of the map file; empty: none until ~load_map is called"}, map);
+  visitor.integer({"map_cache_mb", "MiB", "features of a larger map are read when needed and kept up to this"},
+                  map_cache_mb, 0, kLargestMapCache_mb);
   visitor.text({"image_transport", "", "raw, compressed (decoded here) or another installed image transport"},
                image_transport);
   visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf"}, tf_mode,
@@ -38,6 +44,10 @@ std::vector<std::string> NodeConfig::violations() const {
                     "' is not allowed: must differ from odom_frame_id and base_frame_id");
   }
   return wrong;
+}
+
+MapLoading NodeConfig::mapLoading(std::function<void(const std::string&)> warn) const {
+  return {static_cast<std::size_t>(map_cache_mb) << 20U, std::move(warn)};
 }
 
 void NodeParameters::declare(ParameterVisitor& visitor) {

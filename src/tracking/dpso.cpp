@@ -71,7 +71,7 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   for (Particle& particle : particles_) {
     if (particle.kind == ParticleKind::kQuantum && isGuided()) {
       particle.velocity_m.setZero();
-      particle.position_m = map_.image(input.places.draw(random_)).position_m;
+      particle.position_m = map_.position_m(input.places.draw(random_));
     } else if (seen_an_image_) {
       particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
     }
@@ -158,7 +158,7 @@ TrackerEstimate Dpso::estimate() const {
     result.best = fitness.score;
     result.best_image = fitness.training_image;
   }
-  result.best_distance_m = (map_.image(result.best_image).position_m - result.position_m).norm();
+  result.best_distance_m = (map_.position_m(result.best_image) - result.position_m).norm();
   return result;
 }
 

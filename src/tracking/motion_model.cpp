@@ -26,7 +26,7 @@ void LinearMotion::move(Particle& particle, const Travel&, Random& random) const
 }
 
 void PullToMap::move(Particle& particle, const Travel&, Random&) const {
-  const Eigen::Vector2d target_m = map_.image(map_.nearest(particle.position_m).image).position_m;
+  const Eigen::Vector2d target_m = map_.position_m(map_.nearest(particle.position_m).image);
   particle.position_m += share_ * (target_m - particle.position_m);
 }
 

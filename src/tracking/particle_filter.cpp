@@ -110,7 +110,7 @@ TrackerEstimate ParticleFilter::estimate() const {
   result.training_image = map_.nearest(result.position_m).image;
   result.best = best_.score;
   result.best_image = best_.score.similarity > 0.0 ? best_.training_image : result.training_image;
-  result.best_distance_m = (map_.image(result.best_image).position_m - result.position_m).norm();
+  result.best_distance_m = (map_.position_m(result.best_image) - result.position_m).norm();
   return result;
 }
 

@@ -42,9 +42,9 @@ TEST(MapBuilder, ImagesGetThePositionOfTheirStamp) {
   const auto map = builder.build();
   ASSERT_EQ(map->size(), 7U);
   for (std::size_t i = 0; i < map->size(); ++i) {
-    EXPECT_NEAR((map->image(i).position_m - map->image(0).position_m).norm(), 0.7 * static_cast<double>(i), 0.1);
-    EXPECT_NEAR(map->image(i).yaw_rad, 0.0, 0.1);
-    EXPECT_FALSE(map->image(i).preview_jpeg.empty());
+    EXPECT_NEAR((map->position_m(i) - map->position_m(0)).norm(), 0.7 * static_cast<double>(i), 0.1);
+    EXPECT_NEAR(map->yaw_rad(i), 0.0, 0.1);
+    EXPECT_FALSE(map->preview(i).empty());
   }
   EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
   EXPECT_THAT(map->header().sessions, testing::ElementsAre("round"));
@@ -81,8 +81,8 @@ TEST(MapBuilder, PruningDropsWhatOnlyOneImageShows) {
   const auto map = builder.build();
   EXPECT_LT(builder.report().features_kept, builder.report().features_extracted);
   // The odd one out shares almost nothing with its neighbours.
-  EXPECT_LT(4 * map->image(3).sift.size(), map->image(1).sift.size());
-  EXPECT_GT(map->image(1).sift.size(), 20U);
+  EXPECT_LT(4 * map->featureCount(3), map->featureCount(1));
+  EXPECT_GT(map->featureCount(1), 20U);
 }
 
 TEST(MapBuilder, OneImageKeepsAllItsFeatures) {
@@ -102,7 +102,7 @@ TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   builder.addImage(2 * kSecond_ns, large);
   const auto map = builder.build();
   EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
-  for (const SiftKeypoint& keypoint : map->image(1).sift.keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
+  for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
 
 TEST(MapBuilder, GlobalFeaturesAreThoseOfTheImageInTheMapsSize) {
@@ -132,8 +132,8 @@ TEST(MapBuilder, RoundsBecomeSessionsOfOneMap) {
   }
   const auto map = builder.build();
   EXPECT_EQ(map->size(), 6U);
-  EXPECT_EQ(map->image(2).session, 0);
-  EXPECT_EQ(map->image(3).session, 1);
+  EXPECT_EQ(map->place(2).session, 0);
+  EXPECT_EQ(map->place(3).session, 1);
 }
 
 TEST(MapBuilder, DatumIsNotAnOutlier) {

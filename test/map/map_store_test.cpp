@@ -135,7 +135,7 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 
 TEST_F(MapStore, NamesBothVersions) {
   tamper("PRAGMA user_version = 7");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("version 2")));
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("version 3")));
 }
 
 TEST_F(MapStore, RefusesEveryTruncation) {
@@ -201,10 +201,10 @@ TEST_F(MapStore, RefusesChangedContent) {
                           "DELETE FROM features WHERE image = 3",
                           "UPDATE features SET keypoints = zeroblob(320) WHERE image = 3",
                           "UPDATE features SET descriptors = zeroblob(10000000) WHERE image = 3",
-                          "INSERT INTO features VALUES(99, x'', x'')",
+                          "INSERT INTO features VALUES(99, x'', x'', 0)",
                           "DELETE FROM previews WHERE image = 3",
-                          "INSERT INTO previews VALUES(99, x'00')",
-                          "UPDATE images SET wgoh = x'00' WHERE id = 3"}) {
+                          "INSERT INTO previews VALUES(99, x'00', 0)",
+                          "UPDATE globals SET wgoh = x'00' WHERE image = 3"}) {
     test::writeAll(path_, whole);
     tamper(sql);
     EXPECT_NE(refusal(path_), "") << sql;
@@ -229,11 +229,11 @@ TEST_F(MapStore, RefusesWhatIsNoHistogram) {
                {histogramBlob(128, "0000807F"), "global descriptor is not finite"},              // infinity
                {histogramBlob(128, "000080BF"), "global descriptor is not finite or negative"},  // -1.0F
                {histogramBlob(128, "01000080"), "global descriptor is not finite or negative"},  // the smallest below 0
-               {histogramBlob(128, one), "does not agree with its checksum"}};  // a good one, but not that image's
+               {histogramBlob(128, one), "do not agree with their checksum"}};  // a good one, but not that image's
   for (const char* column : {"wgoh", "wgii"}) {
     for (const auto& [blob, reason] : cases) {
       test::writeAll(path_, whole);
-      tamper(std::string("UPDATE images SET ") + column + " = " + blob + " WHERE id = 3");
+      tamper(std::string("UPDATE globals SET ") + column + " = " + blob + " WHERE image = 3");
       EXPECT_THAT(refusal(path_), HasSubstr(reason)) << column << " " << blob;
     }
   }

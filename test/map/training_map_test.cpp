@@ -80,7 +80,7 @@ TEST(TrainingMap, OrderOfImagesDoesNotMatterForTheNearest) {
   for (double x = -60.0; x < 60.0; x += 3.7) {
     const Neighbour a = map.nearest({x, 0.3 * x});
     const Neighbour b = shuffled.nearest({x, 0.3 * x});
-    EXPECT_EQ(map.image(a.image).stamp_ns, shuffled.image(b.image).stamp_ns);
+    EXPECT_EQ(map.place(a.image).stamp_ns, shuffled.place(b.image).stamp_ns);
     EXPECT_DOUBLE_EQ(a.distance_m, b.distance_m);
   }
 }

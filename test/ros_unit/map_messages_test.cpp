@@ -14,8 +14,8 @@ TEST(MapMessages, ThePathVisitsEveryImage) {
   const auto path = toPath(*map, "map");
   ASSERT_EQ(path.poses.size(), map->size());
   EXPECT_EQ(path.header.frame_id, "map");
-  EXPECT_EQ(path.poses[7].pose.position.x, map->image(7).position_m.x());
-  EXPECT_EQ(path.poses[7].pose.position.y, map->image(7).position_m.y());
+  EXPECT_EQ(path.poses[7].pose.position.x, map->position_m(7).x());
+  EXPECT_EQ(path.poses[7].pose.position.y, map->position_m(7).y());
 }
 
 TEST(MapMessages, MarkersDeleteTheOldOnesAndShowEverySession) {

@@ -26,7 +26,7 @@ TEST(MatchesImage, ShowsBothImagesSideBySide) {
 TEST(MatchesImage, JoinsMatchedFeatures) {
   const auto map = test::smallMap();
   const cv::Mat grey(480, 640, CV_8UC1, cv::Scalar(100));
-  EXPECT_GT(colouredPixels(drawMatches(grey, map->image(3).sift, *map, 3, 0.6)), 1000);
+  EXPECT_GT(colouredPixels(drawMatches(grey, *map->sift(3), *map, 3, 0.6)), 1000);
   EXPECT_EQ(colouredPixels(drawMatches(grey, test::randomFeatures(99, 40), *map, 3, 0.6)), 0);
 }
 

@@ -39,7 +39,7 @@ class World {
 
  private:
   double bell(std::size_t image, const Eigen::Vector2d& robot_m, double width_m) const {
-    const double distance = (map_->image(image).position_m - robot_m).norm() / width_m;
+    const double distance = (map_->position_m(image) - robot_m).norm() / width_m;
     return std::exp(-0.5 * distance * distance);
   }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ constexpr std::int64_t kMinImageSide_px = 16;  ///< smaller ones have no feature
 constexpr std::int64_t kMaxImageSide_px = 32768;
 constexpr std::size_t kHistogramBytes = GlobalFeatures::kSize * sizeof(float);
 constexpr std::size_t kKeypointBytes = 16;
+/// Of the largest row that may be read: the features of one image.
+constexpr std::int64_t kMaxRowBytes =
+    kMaxFeaturesPerImage * static_cast<std::int64_t>(kKeypointBytes + SiftFeatures::kDescriptorSize) + 4096;
 
 struct Table {
   const char* name;
@@ -29,7 +33,7 @@ struct Table {
 };
 
 /// All that may be in a map's schema, in order of name.
-extern const std::array<Table, 4> kTables;
+extern const std::array<Table, 5> kTables;
 
 /// CRC-32 over a sequence of values, each in one byte order on every machine.
 class Checksum {
@@ -37,19 +41,22 @@ class Checksum {
   void add(std::int64_t value);
   void add(double value);
   void add(const std::string& value);
-  void add(const std::vector<std::uint8_t>& value);
   void add(const ParameterValues& values);
+  void addRaw(const std::uint8_t* data, std::size_t size);
   std::int64_t value() const { return value_; }
 
  private:
-  void addRaw(const std::uint8_t* data, std::size_t size);
   std::uint32_t value_ = 0;
 };
 
 /// CRC-32 of some bytes, continuing from `previous`.
 std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous = 0);
 
-/// One row of the table `images`: everything about an image that is small.
+/// CRC-32 of a row of a wide table: the number of its image, so that exchanged rows are found, and then its blobs.
+std::int64_t rowChecksum(std::int64_t image, std::initializer_list<sqlite::Bytes> blobs);
+
+/// One row of the table `images`: where an image was taken. All of them are read when a map is opened, so they are
+/// small and hold nothing that only a comparison needs.
 struct ImageRow {
   std::int64_t id = 0;
   std::int64_t session = 0;
@@ -58,9 +65,6 @@ struct ImageRow {
   double north_m = 0.0;
   double yaw_rad = 0.0;
   std::int64_t feature_count = 0;
-  GlobalFeatures global;
-  std::int64_t features_crc32 = 0;  ///< of the keypoints followed by the descriptors
-  std::int64_t preview_crc32 = 0;   ///< of the preview; 0 without one
 
   void addTo(Checksum& checksum) const;
 };

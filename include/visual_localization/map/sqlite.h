@@ -66,6 +66,8 @@ class Statement {
   bool step();
   /// Executes a statement that has no rows and makes it ready for the next values.
   void run();
+  /// Ready to be executed anew; whatever went wrong before is forgotten.
+  void reset();
 
   enum class Type { kInteger, kReal, kText, kBlob, kNull };
   Type type(int column) const;

@@ -9,7 +9,8 @@
 
 namespace visual_localization {
 
-/// The recorded path, image by image; the sessions follow each other.
+/// The recorded path, image by image; the sessions follow each other. Of a map with more than 20000 images every
+/// second one, or every third, and so on: here and in the markers.
 nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id);
 
 /// Per session the places of the training images and the direction each one looks at. Begins with a marker
