@@ -8,13 +8,13 @@
 #include <iostream>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "app_support.h"
 #include "progress_bar.h"
 #include "trajectory_plot.h"
 #include "visual_localization/io/partial_file.h"
-#include "visual_localization/map/map_store.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
@@ -30,6 +30,7 @@ struct Options {
   std::string config;
   std::string plot;
   std::optional<double> min_spacing_m;
+  std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
 };
 
 void declareOptions(CLI::App& app, Options& options) {
@@ -44,6 +45,9 @@ void declareOptions(CLI::App& app, Options& options) {
   app.add_option("--output", options.output, "the map file to write")->required();
   app.add_option("--config", options.config, "YAML file of parameters");
   app.add_option("--min-spacing", options.min_spacing_m, "metres between kept images; overrides the configuration");
+  app.add_option("--threads", options.threads, "for extraction; the map does not depend on it")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1024}))
+      ->capture_default_str();
   app.add_option("--plot", options.plot, "draw fixes and cleaned path into this SVG file");
 }
 
@@ -178,16 +182,14 @@ void buildMap(const Options& options) {
   if (!options.plot.empty()) apps::requireNoInput("--plot", options.plot, inputs);
   requireWritable(options.output);
   if (!options.plot.empty()) requireWritable(options.plot);
-  MapBuilder builder(config);
+  MapBuilder builder(config, {options.threads, options.output});
   std::vector<apps::PlottedRound> rounds;
   for (const std::string& bag : options.bags) addRound(builder, bag, options, rounds);
-  std::shared_ptr<const TrainingMap> map;
   {
     apps::ProgressBar bar("pruning features");
-    map = builder.build([&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
+    builder.save(options.output, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
   }
-  saveMap(*map, options.output);
-  if (!options.plot.empty()) writeFile(options.plot, apps::plotTrajectories(rounds, map->frame()));
+  if (!options.plot.empty()) writeFile(options.plot, apps::plotTrajectories(rounds, builder.frame()));
   printReport(builder.report(), rounds);
   printSummary(options, builder.report(),
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());

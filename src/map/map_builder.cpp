@@ -5,10 +5,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "visual_localization/features/pruning.h"
+#include "visual_localization/map/map_writer.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kNeighbours = 2;  ///< Weiss et al., section III
 constexpr int kSmallestSide_px = 16;
-constexpr int kPreviewQuality = 70;
+constexpr std::size_t kWaitingPerThread = 4;  ///< images: so that no thread waits long for the slowest
 
 GeodeticPoint datumAt(const GeodeticPoint& position) {
   GeodeticPoint datum = position;
@@ -60,28 +60,25 @@ cv::Mat resized(const cv::Mat& grey, cv::Size size) {
   return result;
 }
 
-std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
-  if (width_px <= 0) return {};
-  const int height_px = std::max(1, static_cast<int>(std::lround(1.0 * grey.rows * width_px / grey.cols)));
-  std::vector<std::uint8_t> jpeg;
-  cv::imencode(".jpg", resized(grey, {width_px, height_px}), jpeg, {cv::IMWRITE_JPEG_QUALITY, kPreviewQuality});
-  return jpeg;
-}
-
 /// The unpruned features of the images nearest to image `i`.
-std::vector<const SiftFeatures*> neighboursOf(std::size_t i, const PositionIndex& index,
-                                              const std::vector<TrainingImage>& images) {
-  std::vector<const SiftFeatures*> neighbours;
-  for (const Neighbour& neighbour : index.nearest(images[i].position_m, kNeighbours + 1)) {
-    if (neighbour.image != i && neighbours.size() < kNeighbours) neighbours.push_back(&images[neighbour.image].sift);
+std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, const TrainingMap& unpruned) {
+  std::vector<std::shared_ptr<const SiftFeatures>> neighbours;
+  for (const Neighbour& neighbour : unpruned.nearest(unpruned.position_m(i), kNeighbours + 1)) {
+    if (neighbour.image != i && neighbours.size() < kNeighbours) neighbours.push_back(unpruned.sift(neighbour.image));
   }
   return neighbours;
 }
 
-PositionIndex indexOf(const std::vector<TrainingImage>& images) {
-  std::vector<Eigen::Vector2d> positions;
-  for (const TrainingImage& image : images) positions.push_back(image.position_m);
-  return PositionIndex(std::move(positions));
+std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<const SiftFeatures>>& owned) {
+  std::vector<const SiftFeatures*> pointers;
+  for (const auto& features : owned) pointers.push_back(features.get());
+  return pointers;
+}
+
+MapBuilderConfig validated(const MapBuilderConfig& config) {
+  const std::vector<std::string> wrong = config.violations();
+  if (!wrong.empty()) throw ParameterError(wrong.front());
+  return config;
 }
 
 }  // namespace
@@ -105,10 +102,11 @@ std::vector<std::string> MapBuilderConfig::violations() const {
   return wrong;
 }
 
-MapBuilder::MapBuilder(const MapBuilderConfig& config) : config_(config) {
-  const std::vector<std::string> wrong = config_.violations();
-  if (!wrong.empty()) throw ParameterError(wrong.front());
-  sift_extractor_ = makeSiftExtractor(config_.sift);
+MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources)
+    : config_(validated(config)),
+      extraction_(config_.sift, config_.preview_width_px, resources.threads),
+      most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
+      spool_(resources.spool_beside) {
   header_.sift = config_.sift;
 }
 
@@ -153,38 +151,53 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
     ++(place ? report_.images_unusable : report_.images_without_position);
     return;
   }
-  if (images_.empty()) header_.image_size = grey.size();
-  const cv::Mat image_of_map_size = resized(grey, header_.image_size);
-
-  TrainingImage image;
-  image.stamp_ns = stamp_ns;
-  image.session = static_cast<int>(header_.sessions.size()) - 1;
-  image.position_m = place->position_m;
-  image.yaw_rad = place->yaw_rad;
-  image.sift = sift_extractor_->extract(image_of_map_size);
-  image.global = global_extractor_.extract(image_of_map_size);
-  image.preview_jpeg = previewOf(image_of_map_size, config_.preview_width_px);
-  report_.features_extracted += image.sift.size();
+  if (report_.images_kept == 0) header_.image_size = grey.size();
+  RawImage image;
+  image.place = {stamp_ns, static_cast<int>(header_.sessions.size()) - 1, place->position_m, place->yaw_rad};
+  // A camera's or a decoder's buffer does not stay.
+  image.grey = grey.size() == header_.image_size ? grey.clone() : resized(grey, header_.image_size);
+  waiting_.push_back(std::move(image));
+  last_kept_m_ = place->position_m;
   ++report_.images_kept;
-  last_kept_m_ = image.position_m;
-  images_.push_back(std::move(image));
+  if (waiting_.size() >= most_waiting_) extractWaiting();
+}
+
+void MapBuilder::extractWaiting() {
+  for (const TrainingImage& image : extraction_.extract(waiting_)) {
+    report_.features_extracted += image.sift.size();
+    spool_.append(image);
+  }
+  waiting_.clear();
+}
+
+void MapBuilder::prune(const Sink& sink, const BuildProgress& progress) {
+  if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
+  extractWaiting();
+  const std::shared_ptr<const TrainingMap> unpruned = spool_.finish(header_);
+  report_.features_kept = 0;
+  for (std::size_t i = 0; i < unpruned->size(); ++i) {
+    TrainingImage image = unpruned->image(i);
+    const auto neighbours = neighboursOf(i, *unpruned);
+    // A map of one image has nothing to compare with: it keeps all its features.
+    if (config_.prune && !neighbours.empty()) {
+      image.sift = keepSeenIn(image.sift, pointersTo(neighbours), config_.match.max_angle_ratio);
+    }
+    report_.features_kept += image.sift.size();
+    sink(image);
+    if (progress) progress(i + 1, unpruned->size());
+  }
 }
 
 std::shared_ptr<const TrainingMap> MapBuilder::build(const BuildProgress& progress) {
-  if (images_.empty()) throw std::runtime_error("no image was kept, so there is no map");
-  std::vector<TrainingImage> images = images_;
-  const PositionIndex index = indexOf(images_);
-  report_.features_kept = 0;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const std::vector<const SiftFeatures*> neighbours = neighboursOf(i, index, images_);
-    // A map of one image has nothing to compare with: it keeps all its features.
-    if (config_.prune && !neighbours.empty()) {
-      images[i].sift = keepSeenIn(images_[i].sift, neighbours, config_.match.max_angle_ratio);
-    }
-    report_.features_kept += images[i].sift.size();
-    if (progress) progress(i + 1, images.size());
-  }
+  std::vector<TrainingImage> images;
+  prune([&images](const TrainingImage& image) { images.push_back(image); }, progress);
   return std::make_shared<const TrainingMap>(header_, std::move(images));
+}
+
+void MapBuilder::save(const std::string& path, const BuildProgress& progress) {
+  MapWriter writer(path);
+  prune([&writer](const TrainingImage& image) { writer.append(image); }, progress);
+  writer.finish(header_);
 }
 
 }  // namespace visual_localization

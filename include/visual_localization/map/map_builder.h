@@ -10,10 +10,11 @@
 
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/global_extractor.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
+#include "visual_localization/map/extraction_pool.h"
+#include "visual_localization/map/image_spool.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -43,13 +44,20 @@ struct MapBuildReport {
   std::vector<CleanedTrajectory> sessions;  ///< one per recorded round
 };
 
+/// What a builder may use.
+struct MapBuilderResources {
+  std::size_t threads = 1;  ///< for extraction; the map does not depend on it
+  /// Images wait in a temporary file beside this one until all are known; empty: in memory.
+  std::string spool_beside;
+};
+
 /// Called while a map is made: so many of so many images are done.
 using BuildProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Collects rounds and makes the map: first all fixes of a session, then its images in order of time.
 class MapBuilder {
  public:
-  explicit MapBuilder(const MapBuilderConfig& config);
+  explicit MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources = {});
   ~MapBuilder();
 
   /// Starts a round: cleans its fixes. The first believable fix ever given becomes the datum. Throws
@@ -60,19 +68,30 @@ class MapBuilder {
   bool wants(std::int64_t stamp_ns);
   /// `grey`: 8-bit, one channel; resized to the size of the first image. An empty one counts as unusable.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
-  /// Prunes and indexes; the builder can go on afterwards. Throws std::runtime_error when no image was kept.
+  /// Prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
   std::shared_ptr<const TrainingMap> build(const BuildProgress& progress = {});
+  /// The same map as a file, written image by image: what is in memory does not grow with the map, but for the places.
+  /// Throws MapStoreError besides.
+  void save(const std::string& path, const BuildProgress& progress = {});
 
+  /// Its features are complete when the map is built.
   const MapBuildReport& report() const { return report_; }
+  /// The frame of the map; a session must have begun.
+  const LocalFrame& frame() const { return frame_.value(); }
 
  private:
+  using Sink = std::function<void(const TrainingImage& image)>;
+  void extractWaiting();
+  void prune(const Sink& sink, const BuildProgress& progress);
+
   MapBuilderConfig config_;
   MapBuildReport report_;
   std::optional<LocalFrame> frame_;
   MapHeader header_;
-  std::vector<TrainingImage> images_;  ///< not pruned yet
-  std::unique_ptr<SiftExtractor> sift_extractor_;
-  GlobalExtractor global_extractor_;
+  ExtractionPool extraction_;
+  std::vector<RawImage> waiting_;  ///< for extraction
+  std::size_t most_waiting_;
+  ImageSpool spool_;  ///< not pruned yet
   std::optional<std::int64_t> last_stamp_ns_;
   std::optional<Eigen::Vector2d> last_kept_m_;
 };

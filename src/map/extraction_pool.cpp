@@ -1,0 +1,58 @@
+#include "visual_localization/map/extraction_pool.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <future>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace visual_localization {
+namespace {
+
+constexpr int kPreviewQuality = 70;
+
+std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
+  if (width_px <= 0) return {};
+  const int height_px = std::max(1, static_cast<int>(std::lround(1.0 * grey.rows * width_px / grey.cols)));
+  cv::Mat small = grey;
+  if (grey.size() != cv::Size(width_px, height_px)) {
+    cv::resize(grey, small, {width_px, height_px}, 0.0, 0.0, cv::INTER_AREA);
+  }
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, kPreviewQuality});
+  return jpeg;
+}
+
+}  // namespace
+
+ExtractionPool::ExtractionPool(const SiftConfig& sift, int preview_width_px, std::size_t threads)
+    : preview_width_px_(preview_width_px), workers_(std::max<std::size_t>(1, threads)) {
+  for (Worker& worker : workers_) worker.sift = makeSiftExtractor(sift);
+}
+
+ExtractionPool::~ExtractionPool() = default;
+
+TrainingImage ExtractionPool::extract(const RawImage& image, Worker& worker) const {
+  return {image.place, worker.sift->extract(image.grey), worker.global.extract(image.grey),
+          previewOf(image.grey, preview_width_px_)};
+}
+
+std::vector<TrainingImage> ExtractionPool::extract(const std::vector<RawImage>& images) {
+  std::vector<TrainingImage> extracted(images.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&](Worker& worker) {
+    for (std::size_t i = next++; i < images.size(); i = next++) extracted[i] = extract(images[i], worker);
+  };
+  // A future waits for its thread when it goes, and hands on what was thrown there.
+  std::vector<std::future<void>> others;
+  for (std::size_t i = 1; i < std::min(workers_.size(), images.size()); ++i) {
+    others.push_back(std::async(std::launch::async, work, std::ref(workers_[i])));
+  }
+  work(workers_.front());
+  for (std::future<void>& other : others) other.get();
+  return extracted;
+}
+
+}  // namespace visual_localization
