@@ -34,7 +34,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       sift_similarity_(config_.match, config_.similarity),
       global_similarity_(config_.similarity),
       scores_(map_->size()),
-      places_(map_->size(), static_cast<std::size_t>(config_.max_proposal_images)),
+      places_(map_->size(), static_cast<std::size_t>(config_.max_proposal_images), map_->globalsKept()),
       tracker_(makeTracker(*map_, config_)),
       choice_(config_.features, config_.hybrid),
       place_check_(*map_, static_cast<std::size_t>(config_.state.place_check_images), config_.state.max_distance_m),

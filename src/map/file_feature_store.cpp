@@ -21,6 +21,7 @@ std::size_t bytesOf(const GlobalFeatures&) { return sizeof(GlobalFeatures); }
 
 FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, std::size_t cache_bytes, Warn warn)
     : path_(std::move(path)),
+      cache_bytes_(cache_bytes),
       warn_(std::move(warn)),
       database_(std::move(database)),
       sift_rows_(database_, std::string(map_file::kSelectSift) + kOfOneImage),
@@ -40,6 +41,10 @@ std::shared_ptr<const GlobalFeatures> FileFeatureStore::global(std::size_t image
 std::vector<std::uint8_t> FileFeatureStore::preview(std::size_t image) const {
   const std::lock_guard<std::mutex> lock(reading_);
   return read(image, preview_rows_, "preview", map_file::previewOf);
+}
+
+std::size_t FileFeatureStore::globalsKept() const {
+  return cache_bytes_ / 2 / (sizeof(GlobalFeatures) + FeatureCache<void>::kBookkeeping_bytes);
 }
 
 template <class T, class Read>

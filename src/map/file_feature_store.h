@@ -28,6 +28,7 @@ class FileFeatureStore final : public FeatureStore {
   std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
   std::vector<std::uint8_t> preview(std::size_t image) const override;
+  std::size_t globalsKept() const override;
 
  private:
   template <class T, class Read>
@@ -38,6 +39,7 @@ class FileFeatureStore final : public FeatureStore {
   void warnOnce(std::size_t image, const char* what, const std::string& reason) const;
 
   const std::string path_;
+  const std::size_t cache_bytes_;
   const Warn warn_;
   mutable std::mutex reading_;  ///< held while the file is read
   sqlite::Database database_;

@@ -5,8 +5,10 @@
 
 namespace visual_localization {
 
-PlaceProposal::PlaceProposal(std::size_t training_images, std::size_t max_images)
-    : training_images_(training_images), stride_((training_images + max_images - 1) / max_images) {}
+PlaceProposal::PlaceProposal(std::size_t training_images, std::size_t max_images, std::size_t max_kept)
+    : training_images_(training_images),
+      stride_(training_images / max_images + (training_images % max_images == 0 ? 0 : 1)),
+      rounds_(std::clamp<std::size_t>(max_kept / ((training_images + stride_ - 1) / stride_), 1, stride_)) {}
 
 void PlaceProposal::startImage(Weigh weigh) {
   weigh_ = std::move(weigh);
@@ -22,7 +24,8 @@ std::size_t PlaceProposal::draw(Random& random) {
 }
 
 void PlaceProposal::weighMap() {
-  first_ = (first_ + 1) % stride_;
+  round_ = (round_ + 1) % rounds_;
+  first_ = round_ * stride_ / rounds_;
   double total = 0.0;
   for (std::size_t i = first_; i < training_images_; i += stride_) {
     total += weigh_(i);

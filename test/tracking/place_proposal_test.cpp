@@ -66,6 +66,35 @@ TEST(PlaceProposal, WeighsOnceAnImageAndOnlyWhenAsked) {
   EXPECT_EQ(weighed, std::vector<int>(10, 2));
 }
 
+/// The training images that `images` images weigh.
+std::set<std::size_t> weighedBy(PlaceProposal& proposal, int images) {
+  std::set<std::size_t> weighed;
+  Random random(1);
+  for (int image = 0; image < images; ++image) {
+    proposal.startImage([&weighed](std::size_t i) {
+      weighed.insert(i);
+      return 1.0;
+    });
+    proposal.draw(random);
+  }
+  return weighed;
+}
+
+TEST(PlaceProposal, SeesAllOfAMapInMemoryWithTime) {
+  PlaceProposal proposal(1003, 10);
+  EXPECT_EQ(weighedBy(proposal, 101).size(), 1003U);
+}
+
+TEST(PlaceProposal, SeesNoMoreThanCanBeKept) {
+  PlaceProposal proposal(1000, 10, 45);
+  const std::set<std::size_t> weighed = weighedBy(proposal, 300);
+  EXPECT_EQ(weighed.size(), 40U);
+  EXPECT_LT(*weighed.begin(), 26U) << "spread over the map";
+  EXPECT_GE(*weighed.rbegin(), 974U);
+  PlaceProposal nothing_kept(1000, 10, 0);
+  EXPECT_EQ(weighedBy(nothing_kept, 300).size(), 10U);
+}
+
 TEST(PlaceProposal, ANewImageForgetsTheOldWeights) {
   PlaceProposal proposal(10, 100);
   Random random(6);

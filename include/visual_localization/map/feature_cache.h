@@ -13,6 +13,8 @@ template <class T>
 class FeatureCache {
  public:
   using Pointer = std::shared_ptr<const T>;
+  /// What a value costs besides: nodes of two containers, and the heap's own bookkeeping.
+  static constexpr std::size_t kBookkeeping_bytes = 256;
 
   explicit FeatureCache(std::size_t limit_bytes) : limit_bytes_(limit_bytes) {}
 
@@ -48,9 +50,6 @@ class FeatureCache {
     Pointer value;
     std::size_t bytes;
   };
-  /// Of the two containers and the allocations behind a value, measured.
-  static constexpr std::size_t kBookkeeping_bytes = 256;
-
   std::size_t limit_bytes_;
   std::size_t used_bytes_ = 0;
   std::list<Entry> entries_;  ///< the one used last first

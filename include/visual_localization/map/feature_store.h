@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -22,6 +23,9 @@ class FeatureStore {
   virtual std::shared_ptr<const GlobalFeatures> global(std::size_t image) const = 0;
   /// Small grey JPEG for people; may be empty.
   virtual std::vector<std::uint8_t> preview(std::size_t image) const = 0;
+  /// How many images' global features can be in memory at a time, with room for SIFT features beside them; more than
+  /// any map has when all of them are.
+  virtual std::size_t globalsKept() const = 0;
 };
 
 /// Everything in memory: nothing is locked, counted or copied.
@@ -33,6 +37,7 @@ class MemoryFeatureStore final : public FeatureStore {
   std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
   std::vector<std::uint8_t> preview(std::size_t image) const override { return previews_[image]; }
+  std::size_t globalsKept() const override { return std::numeric_limits<std::size_t>::max(); }
 
  private:
   std::vector<SiftFeatures> sift_;

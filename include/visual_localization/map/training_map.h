@@ -62,6 +62,8 @@ class TrainingMap {
   std::shared_ptr<const SiftFeatures> sift(std::size_t i) const { return store_->sift(i); }
   std::shared_ptr<const GlobalFeatures> global(std::size_t i) const { return store_->global(i); }
   std::vector<std::uint8_t> preview(std::size_t i) const { return store_->preview(i); }
+  /// How many images' global features can be in memory at a time; see FeatureStore.
+  std::size_t globalsKept() const { return store_->globalsKept(); }
   /// Everything about it, copied.
   TrainingImage image(std::size_t i) const;
 
