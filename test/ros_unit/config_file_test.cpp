@@ -32,5 +32,17 @@ TEST(ConfigFile, MapBuilderListsEveryParameterWithItsDefault) {
   expectListsEveryParameter<MapBuilderConfig>(CONFIG_DIR "/map_builder.yaml");
 }
 
+TEST(NodeConfig, MapCacheIsASizeInItsRange) {
+  NodeParameters config;
+  for (const ParameterValue& value : {ParameterValue(std::int64_t{-1}), ParameterValue(std::int64_t{1} << 40U),
+                                      ParameterValue(1.5), ParameterValue(std::string("256 MB"))}) {
+    EXPECT_THROW(assignParameters(config, {{"map_cache_mb", value}}), ParameterError);
+  }
+  assignParameters(config, {{"map_cache_mb", std::int64_t{1} << 20U}});
+  EXPECT_EQ(config.node.mapLoading({}).cache_bytes, std::size_t{1} << 40U);
+  assignParameters(config, {{"map_cache_mb", std::int64_t{0}}});
+  EXPECT_EQ(config.node.mapLoading({}).cache_bytes, 0U);
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -33,5 +33,20 @@ TEST(MapMessages, MarkersDeleteTheOldOnesAndShowEverySession) {
   EXPECT_EQ(places, 10U);
 }
 
+TEST(MapMessages, OfACityOnlySoManyPlacesAreShown) {
+  std::vector<TrainingImage> images(50001);
+  for (std::size_t i = 0; i < images.size(); ++i) images[i].position_m.x() = static_cast<double>(i);
+  MapHeader header = test::smallMap()->header();
+  header.sessions = {"one"};
+  const TrainingMap city(header, std::move(images));
+  const auto path = toPath(city, "map");
+  EXPECT_LE(path.poses.size(), 20000U);
+  EXPECT_GT(path.poses.size(), 10000U);
+  EXPECT_EQ(path.poses.back().pose.position.x, 49998.0);
+  const auto markers = toMarkers(city, "map").markers;
+  EXPECT_EQ(markers[1].points.size(), path.poses.size());
+  EXPECT_EQ(markers[2].points.size(), 2 * path.poses.size());
+}
+
 }  // namespace
 }  // namespace visual_localization

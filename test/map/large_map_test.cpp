@@ -1,0 +1,234 @@
+// A map that is larger than its cache: the same features, whatever is kept and whatever becomes of the file.
+
+#include <atomic>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <random>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include "test/support/example_map.h"
+#include "test/support/temporary_folder.h"
+#include "visual_localization/map/map_store.h"
+#include "visual_localization/map/map_writer.h"
+
+namespace visual_localization {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr std::size_t kImages = 60;
+constexpr std::size_t kKilobyte = 1024;
+
+bool same(const TrainingImage& a, const TrainingImage& b) {
+  const std::size_t keypoint_bytes = a.sift.size() * sizeof(SiftKeypoint);
+  return a.stamp_ns == b.stamp_ns && a.session == b.session && a.position_m == b.position_m && a.yaw_rad == b.yaw_rad &&
+         a.sift.descriptors() == b.sift.descriptors() && a.sift.size() == b.sift.size() &&
+         (keypoint_bytes == 0 ||
+          std::memcmp(a.sift.keypoints().data(), b.sift.keypoints().data(), keypoint_bytes) == 0) &&
+         a.global.wgoh == b.global.wgoh && a.global.wgii == b.global.wgii && a.preview_jpeg == b.preview_jpeg;
+}
+
+class LargeMap : public testing::Test {
+ protected:
+  void SetUp() override {
+    images_ = test::exampleImages(kImages, 50);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> value(0.0F, 1.0F);
+    for (TrainingImage& image : images_) {
+      for (float& bin : image.global.wgoh) bin = value(random);
+      for (float& bin : image.global.wgii) bin = value(random);
+    }
+    saveMap(TrainingMap(test::exampleHeader(), images_), path_);
+  }
+
+  std::shared_ptr<const TrainingMap> open(std::size_t cache_bytes = 40 * kKilobyte) {
+    return loadMap(path_, {cache_bytes, [this](const std::string& reason) { warnings_.push_back(reason); }});
+  }
+
+  void expectAllSame(const TrainingMap& map) const {
+    ASSERT_EQ(map.size(), images_.size());
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      EXPECT_TRUE(same(map.image(i), images_[i])) << i;
+      EXPECT_EQ(map.featureCount(i), images_[i].sift.size());
+    }
+  }
+
+  void tamper(const std::string& sql) const {
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+    sqlite3_close(database);
+  }
+
+  /// Uses everything in the map; what comes out is either right or nothing.
+  void expectRightOrNothing(const TrainingMap& map) const {
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      const auto sift = map.sift(i);
+      const auto global = map.global(i);
+      EXPECT_TRUE(sift->empty() || sift->descriptors() == images_[i].sift.descriptors()) << i;
+      EXPECT_TRUE(global->wgoh == GlobalFeatures().wgoh || global->wgoh == images_[i].global.wgoh) << i;
+      map.preview(i);
+    }
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_ / "large.map";
+  std::vector<TrainingImage> images_;
+  std::vector<std::string> warnings_;
+};
+
+TEST_F(LargeMap, EveryCacheGivesTheSameFeaturesAgainAndAgain) {
+  for (const std::size_t cache : {std::size_t{0}, std::size_t{1}, 10 * kKilobyte, 40 * kKilobyte, 300 * kKilobyte,
+                                  std::numeric_limits<std::size_t>::max()}) {
+    const auto map = open(cache);
+    for (int round = 0; round < 3; ++round) expectAllSame(*map);
+  }
+  EXPECT_THAT(warnings_, ElementsAre());
+}
+
+TEST_F(LargeMap, WhatIsInUseOutlivesTheCache) {
+  const auto map = open(20 * kKilobyte);
+  const auto used = map->sift(7);
+  expectAllSame(*map);
+  EXPECT_EQ(used->descriptors(), images_[7].sift.descriptors());
+}
+
+TEST_F(LargeMap, ServesEightThreads) {
+  const auto map = open(60 * kKilobyte);
+  std::atomic<int> wrong{0};
+  std::vector<std::thread> threads;
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    threads.emplace_back([&, seed] {
+      std::mt19937 random(seed);
+      std::uniform_int_distribution<std::size_t> any(0, kImages - 1);
+      for (int round = 0; round < 300; ++round) {
+        const std::size_t i = any(random);
+        if (map->sift(i)->descriptors() != images_[i].sift.descriptors()) ++wrong;
+        if (map->global(i)->wgii != images_[i].global.wgii) ++wrong;
+        if (round % 16 == 0 && map->preview(i) != images_[i].preview_jpeg) ++wrong;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST_F(LargeMap, DamagedFeaturesCountAsNoneAndAreNamedOnce) {
+  tamper("UPDATE features SET descriptors = zeroblob(6400) WHERE image = 3");
+  tamper("UPDATE features SET crc32 = 'text' WHERE image = 4");
+  tamper("DELETE FROM features WHERE image = 5");
+  tamper("UPDATE globals SET wgoh = x'00' WHERE image = 6");
+  tamper("UPDATE previews SET jpeg = x'00' WHERE image = 7");
+  const auto map = open();
+  for (int round = 0; round < 2; ++round) {
+    for (const std::size_t i : {3U, 4U, 5U}) EXPECT_TRUE(map->sift(i)->empty()) << i;
+    EXPECT_EQ(map->global(6)->wgoh, GlobalFeatures().wgoh);
+    EXPECT_TRUE(map->preview(7).empty());
+    EXPECT_TRUE(same(map->image(8), images_[8]));
+  }
+  ASSERT_EQ(warnings_.size(), 1U);
+  EXPECT_THAT(warnings_.front(), AllOf(StartsWith(path_), HasSubstr("features of image 3"), HasSubstr("checksum")));
+  EXPECT_THROW(checkMap(path_), MapStoreError);
+  EXPECT_THROW(open(std::numeric_limits<std::size_t>::max()), MapStoreError) << "read as a whole it is refused";
+}
+
+TEST_F(LargeMap, ExchangedImagesAreNotTakenForEachOther) {
+  tamper(
+      "UPDATE features SET image = -1 WHERE image = 3; UPDATE features SET image = 3 WHERE image = 4; "
+      "UPDATE features SET image = 4 WHERE image = -1");
+  const auto map = open();
+  EXPECT_TRUE(map->sift(3)->empty());
+  EXPECT_TRUE(map->sift(4)->empty());
+}
+
+TEST_F(LargeMap, SurvivesItsFileBeingDeletedOrReplaced) {
+  const auto map = open();
+  std::filesystem::remove(path_);
+  expectAllSame(*map);
+  saveMap(TrainingMap(test::exampleHeader(), test::exampleImages(5, 3, 9)), path_);
+  expectAllSame(*map);
+  EXPECT_THAT(warnings_, ElementsAre());
+}
+
+TEST_F(LargeMap, SurvivesItsFileBeingCutAtAnyLength) {
+  const std::string whole = test::readAll(path_);
+  for (std::size_t length = 0; length < whole.size(); length += 1 + whole.size() / 60) {
+    test::writeAll(path_, whole);
+    warnings_.clear();
+    const auto map = open();
+    map->sift(7);
+    std::filesystem::resize_file(path_, length);
+    expectRightOrNothing(*map);
+    EXPECT_EQ(warnings_.size(), 1U) << length;
+  }
+}
+
+TEST_F(LargeMap, SurvivesItsFileBeingOverwritten) {
+  const std::string whole = test::readAll(path_);
+  std::mt19937 random(3);
+  std::uniform_int_distribution<std::size_t> place(0, whole.size() - 1);
+  for (int round = 0; round < 60; ++round) {
+    test::writeAll(path_, whole);
+    const auto map = open(0);
+    std::string damaged = whole;
+    for (int flip = 0; flip < 200; ++flip) damaged[place(random)] = static_cast<char>(random());
+    // In place, so that the open file sees it.
+    std::ofstream(path_, std::ios::binary | std::ios::in) << damaged;
+    expectRightOrNothing(*map);
+  }
+}
+
+TEST_F(LargeMap, OpensWithoutReadingFeatures) {
+  std::string damaged = test::readAll(path_);
+  const std::vector<std::uint8_t>& bytes = images_[20].sift.descriptors();
+  const std::size_t at = damaged.find(std::string(bytes.begin(), bytes.begin() + 64));
+  ASSERT_NE(at, std::string::npos);
+  damaged[at + 32] ^= 1;
+  test::writeAll(path_, damaged);
+  const auto map = open();
+  EXPECT_THAT(warnings_, ElementsAre());
+  EXPECT_TRUE(map->sift(20)->empty());
+  EXPECT_THAT(warnings_, ElementsAre(HasSubstr("image 20")));
+}
+
+TEST_F(LargeMap, RefusesDamagedPlacesAtOnce) {
+  const std::string whole = test::readAll(path_);
+  for (const char* sql : {"UPDATE images SET east_m = east_m + 1 WHERE id = 3", "DELETE FROM images WHERE id = 3",
+                          "UPDATE images SET feature_count = feature_count + 1 WHERE id = 3",
+                          "UPDATE images SET id = 9223372036854775807 WHERE id = 59", "DELETE FROM images",
+                          "UPDATE images SET stamp_ns = 1.5 WHERE id = 3"}) {
+    test::writeAll(path_, whole);
+    tamper(sql);
+    EXPECT_THROW(open(), MapStoreError) << sql;
+  }
+}
+
+TEST_F(LargeMap, AWriterWithoutFinishLeavesNothing) {
+  {
+    MapWriter writer(folder_ / "other.map");
+    for (const TrainingImage& image : images_) writer.append(image);
+    EXPECT_EQ(writer.size(), kImages);
+  }
+  EXPECT_EQ(folder_.names().size(), 1U);
+}
+
+TEST_F(LargeMap, AWriterWritesWhatSaveMapWrites) {
+  MapWriter writer(folder_ / "other.map");
+  for (const TrainingImage& image : images_) writer.append(image);
+  writer.finish(test::exampleHeader());
+  EXPECT_EQ(test::readAll(folder_ / "other.map"), test::readAll(path_));
+  const auto map = open();
+  saveMap(*map, folder_ / "copy.map");
+  EXPECT_EQ(test::readAll(folder_ / "copy.map"), test::readAll(path_));
+}
+
+}  // namespace
+}  // namespace visual_localization
