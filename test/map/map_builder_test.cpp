@@ -7,6 +7,9 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "test/support/temporary_folder.h"
+#include "visual_localization/map/map_store.h"
+
 namespace visual_localization {
 namespace {
 
@@ -134,6 +137,58 @@ TEST(MapBuilder, RoundsBecomeSessionsOfOneMap) {
   EXPECT_EQ(map->size(), 6U);
   EXPECT_EQ(map->place(2).session, 0);
   EXPECT_EQ(map->place(3).session, 1);
+}
+
+/// Two rounds along the same street, made with these resources.
+std::string mapFile(const MapBuilderResources& resources, const std::string& path, MapBuildReport* report = nullptr) {
+  MapBuilder builder({}, resources);
+  for (const char* name : {"first", "second"}) {
+    builder.beginSession(name, straightRound());
+    for (int i = 0; i < 7; ++i) {
+      EXPECT_TRUE(builder.wants(i * kSecond_ns));
+      builder.addImage(i * kSecond_ns, scene(1, 3 * i));
+    }
+  }
+  builder.save(path);
+  if (report != nullptr) *report = builder.report();
+  return test::readAll(path);
+}
+
+TEST(MapBuilder, TheFileDependsNeitherOnThreadsNorOnWhereImagesWait) {
+  const test::TemporaryFolder folder;
+  MapBuildReport one;
+  MapBuildReport many;
+  const std::string in_memory = mapFile({1, ""}, folder / "a.map", &one);
+  EXPECT_EQ(in_memory, mapFile({5, ""}, folder / "b.map"));
+  EXPECT_EQ(in_memory, mapFile({1, folder / "c.map"}, folder / "c.map"));
+  EXPECT_EQ(in_memory, mapFile({3, folder / "d.map"}, folder / "d.map", &many));
+  EXPECT_EQ(one.features_extracted, many.features_extracted);
+  EXPECT_EQ(one.features_kept, many.features_kept);
+  EXPECT_EQ(folder.names().size(), 4U) << "nothing is left behind";
+}
+
+TEST(MapBuilder, BuildsInMemoryWhatItSaves) {
+  const test::TemporaryFolder folder;
+  const std::string saved = mapFile({2, folder / "a.map"}, folder / "a.map");
+  MapBuilder builder({});
+  for (const char* name : {"first", "second"}) {
+    builder.beginSession(name, straightRound());
+    for (int i = 0; i < 7; ++i) builder.addImage(i * kSecond_ns, scene(1, 3 * i));
+  }
+  saveMap(*builder.build(), folder / "b.map");
+  EXPECT_EQ(test::readAll(folder / "b.map"), saved);
+}
+
+TEST(MapBuilder, AFailedBuildLeavesNothing) {
+  const test::TemporaryFolder folder;
+  {
+    MapBuilder builder({}, {2, folder / "a.map"});
+    builder.beginSession("round", straightRound());
+    EXPECT_THROW(builder.save(folder / "a.map"), std::runtime_error);
+    builder.addImage(kSecond_ns, scene(1, 0));
+    EXPECT_THROW(builder.save(folder / "absent/a.map"), MapStoreError);
+  }
+  EXPECT_EQ(folder.names().size(), 0U);
 }
 
 TEST(MapBuilder, DatumIsNotAnOutlier) {
