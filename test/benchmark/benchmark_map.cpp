@@ -1,0 +1,173 @@
+// Opens a map of make_street_map and drives through it: one line of CSV with times and memory. One process a map,
+// because memory that was used once is not given back.
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "test/benchmark/street_map.h"
+#include "visual_localization/localizer/localizer.h"
+#include "visual_localization/localizer/stopwatch.h"
+#include "visual_localization/map/map_store.h"
+#include "visual_localization/tracking/prior.h"
+
+namespace visual_localization::benchmark {
+namespace {
+
+struct Options {
+  std::string map;
+  std::size_t cache_mb = kDefaultMapCache_mb;
+  std::size_t steps = 200;
+  std::size_t features = 100;
+  std::uint64_t seed = 1;
+  double swarm_range_m = 0.0;
+  bool header = false;
+};
+
+double resident_mib() {
+  std::ifstream status("/proc/self/statm");
+  double total = 0.0;
+  double resident = 0.0;
+  status >> total >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
+}
+
+/// Takes the file out of the system's cache.
+void forget(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY);
+  ::fdatasync(file);
+  ::posix_fadvise(file, 0, 0, POSIX_FADV_DONTNEED);
+  ::close(file);
+}
+
+/// A view that is compared with the map like a camera's image, but was never extracted.
+class StreetImage final : public ComparableImage {
+ public:
+  StreetImage(const StreetMap& streets, std::size_t at, const TrainingMap& map)
+      : sift_(streets.view(at, 1)), global_(streets.global(at)), map_(map) {}
+
+  Score compare(FeatureKind kind, std::size_t i) override {
+    return kind == FeatureKind::kSift ? by_sift_.compare(sift_, *map_.sift(i))
+                                      : by_global_.compare(global_, *map_.global(i));
+  }
+
+ private:
+  SiftFeatures sift_;
+  GlobalFeatures global_;
+  const TrainingMap& map_;
+  SiftSimilarity by_sift_{MatchConfig(), SimilarityConfig()};
+  GlobalSimilarity by_global_{SimilarityConfig()};
+};
+
+struct Drive {
+  std::vector<double> steps_ms;
+  double comparisons = 0.0;
+  double tracking = 0.0;  ///< share of the images
+
+  double quantile_ms(double share) {
+    std::sort(steps_ms.begin(), steps_ms.end());
+    return steps_ms[static_cast<std::size_t>(share * static_cast<double>(steps_ms.size() - 1))];
+  }
+};
+
+/// Along the images from `begin` on, one a step; places beyond the map look like nothing in it.
+Drive drive(const StreetMap& streets, Localizer& localizer, std::size_t begin, std::size_t steps) {
+  Drive result;
+  for (std::size_t i = begin; i < begin + steps; ++i) {
+    StreetImage image(streets, i, localizer.map());
+    const Stopwatch stopwatch;
+    const Estimate estimate = localizer.process(static_cast<std::int64_t>(i) * 1'000'000'000, image);
+    result.steps_ms.push_back(stopwatch.elapsed_ms());
+    result.comparisons += static_cast<double>(estimate.comparisons) / static_cast<double>(steps);
+    result.tracking += (estimate.state == LocalizationState::kTracking ? 1.0 : 0.0) / static_cast<double>(steps);
+  }
+  return result;
+}
+
+/// The swarm's speeds and the reach of its quantum particles are shares of the map's range. For a swarm that moves as
+/// in a map of `range_m` they are scaled; 0: left as they are.
+LocalizerConfig configFor(const TrainingMap& map, double range_m) {
+  LocalizerConfig config;
+  if (range_m <= 0.0) return config;
+  const double scale = range_m / map.area().range().maxCoeff();
+  for (double* share : {&config.dpso.v0, &config.dpso.v0_min, &config.dpso.v0_max, &config.dpso.quantum_std}) {
+    *share *= scale;
+  }
+  return config;
+}
+
+Drive driveTracked(const StreetMap& streets, const std::shared_ptr<const TrainingMap>& map, const Options& options) {
+  const std::size_t begin = map->size() / 2;
+  Localizer localizer(map, configFor(*map, options.swarm_range_m));
+  localizer.relocalize(around(map->position_m(begin), 5.0));
+  return drive(streets, localizer, begin, std::min(options.steps, map->size() - begin));
+}
+
+double open_s(const Options& options, std::shared_ptr<const TrainingMap>& map) {
+  map.reset();
+  const Stopwatch stopwatch;
+  map = loadMap(options.map, {options.cache_mb << 20U, {}});
+  return 1e-3 * stopwatch.elapsed_ms();
+}
+
+void measure(const Options& options) {
+  const double before_mib = resident_mib();
+  std::shared_ptr<const TrainingMap> map;
+  forget(options.map);
+  const double cold_open_s = open_s(options, map);
+  const double opened_mib = resident_mib() - before_mib;
+  const StreetMap streets(map->size(), options.features, options.seed);
+  Drive cold = driveTracked(streets, map, options);
+  const double driven_mib = resident_mib() - before_mib;
+  const double open_again_s = open_s(options, map);
+  Drive from_file = driveTracked(streets, map, options);
+  Drive warm = driveTracked(streets, map, options);
+
+  Localizer lost_robot(map, LocalizerConfig());
+  Drive lost = drive(streets, lost_robot, 2 * map->size(), 30);
+  const double lost_mib = resident_mib() - before_mib;
+
+  if (options.header) {
+    std::printf(
+        "images,file_mib,open_cold_s,open_s,rss_opened_mib,rss_driven_mib,rss_lost_mib,cold_median_ms,cold_95_ms,"
+        "file_median_ms,file_95_ms,warm_median_ms,warm_95_ms,comparisons,tracking,lost_median_ms,lost_95_ms\n");
+  }
+  std::printf("%zu,%.1f,%.3f,%.3f,%.0f,%.0f,%.0f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.1f,%.2f,%.3f,%.3f\n", map->size(),
+              static_cast<double>(std::filesystem::file_size(options.map)) / (1 << 20), cold_open_s, open_again_s,
+              opened_mib, driven_mib, lost_mib, cold.quantile_ms(0.5), cold.quantile_ms(0.95),
+              from_file.quantile_ms(0.5), from_file.quantile_ms(0.95), warm.quantile_ms(0.5), warm.quantile_ms(0.95),
+              warm.comparisons, warm.tracking, lost.quantile_ms(0.5), lost.quantile_ms(0.95));
+}
+
+}  // namespace
+}  // namespace visual_localization::benchmark
+
+int main(int argc, char** argv) {
+  using namespace visual_localization::benchmark;
+  CLI::App app("Measures how a map of make_street_map opens and how fast it is driven through.", "benchmark_map");
+  Options options;
+  app.add_option("--map", options.map, "Map file")->required();
+  app.add_option("--cache-mb", options.cache_mb, "As map_cache_mb of the localizer")->capture_default_str();
+  app.add_option("--steps", options.steps, "Images to drive")->capture_default_str();
+  app.add_option("--features", options.features, "Of an image, as the map was made with")->capture_default_str();
+  app.add_option("--seed", options.seed, "As the map was made with")->capture_default_str();
+  app.add_option("--swarm-range", options.swarm_range_m, "The swarm moves as in a map of so many metres");
+  app.add_flag("--header", options.header, "Print the names of the columns");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    measure(options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "benchmark_map: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

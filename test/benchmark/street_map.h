@@ -1,0 +1,127 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "visual_localization/features/subimage_grid.h"
+#include "visual_localization/geo/angles.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization::benchmark {
+
+/// A city that exists only as numbers: a grid of streets 100 m apart with an image every metre. Each image shows the
+/// landmarks around it, an eighth of them new, so that images eight metres apart share none. What an image looks like
+/// depends on its number and the seed alone.
+class StreetMap {
+ public:
+  /// `images`, `features` (of an image): at least 1.
+  StreetMap(std::size_t images, std::size_t features, std::uint64_t seed)
+      : features_(features), new_features_(features / 8 + 1), seed_(seed) {
+    while (2 * streets_ * (streets_ - 1) * kBlock_m < images) ++streets_;
+    // Bytes as they are in descriptors: many small ones, a norm of some 512.
+    for (std::size_t i = 0; i < bytes_.size(); ++i) {
+      const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(bytes_.size());
+      bytes_[i] = static_cast<std::uint8_t>(std::min(255.0, -32.0 * std::log(1.0 - share)));
+    }
+  }
+
+  static MapHeader header() {
+    MapHeader header;
+    header.datum = {48.5, 9.05, 400.0};
+    header.image_size = {320, 240};
+    header.sessions = {"streets"};
+    return header;
+  }
+
+  /// Training image `i`.
+  TrainingImage image(std::size_t i) const {
+    TrainingImage image;
+    static_cast<TrainingPlace&>(image) = place(i);
+    image.sift = view(i, 0);
+    image.global = global(i);
+    return image;
+  }
+
+  /// East-west streets first, up and down like a plough, then those from south to north.
+  TrainingPlace place(std::size_t i) const {
+    const std::size_t length_m = (streets_ - 1) * kBlock_m;
+    const std::size_t street = i / length_m;
+    const bool back = street % 2 == 1;
+    const auto along_m = static_cast<double>(back ? length_m - i % length_m : i % length_m);
+    const auto across_m = static_cast<double>(street % streets_ * kBlock_m);
+    const bool northwards = street >= streets_;
+    TrainingPlace place;
+    place.stamp_ns = static_cast<std::int64_t>(i) * 1'000'000'000;
+    place.position_m = northwards ? Eigen::Vector2d(across_m, along_m) : Eigen::Vector2d(along_m, across_m);
+    place.yaw_rad = (northwards ? 0.5 * kPi : 0.0) + (back ? kPi : 0.0);
+    return place;
+  }
+
+  /// What a camera sees at the place of image `i`: the noise differs from visit to visit.
+  SiftFeatures view(std::size_t i, std::uint64_t visit) const {
+    std::vector<SiftKeypoint> keypoints(features_);
+    std::vector<std::uint8_t> descriptors(features_ * SiftFeatures::kDescriptorSize);
+    for (std::size_t f = 0; f < features_; ++f) {
+      const std::uint64_t landmark = i * new_features_ + f;
+      const std::uint64_t place = mix(landmark ^ seed_);
+      keypoints[f] = {static_cast<float>(place % 320), static_cast<float>(place / 320 % 240), 4.0F,
+                      static_cast<float>(place >> 32U) * (360.0F / 4294967296.0F)};
+      describe(landmark, mix(i + (visit << 40U)), &descriptors[f * SiftFeatures::kDescriptorSize]);
+    }
+    return SiftFeatures(std::move(keypoints), std::move(descriptors));
+  }
+
+  /// Changes slowly along a street.
+  GlobalFeatures global(std::size_t i) const {
+    GlobalFeatures global;
+    const auto share = static_cast<float>(i % 8) / 8.0F;
+    for (std::size_t b = 0; b < GlobalFeatures::kSize; ++b) {
+      global.wgoh[b] = (1.0F - share) * bin(i / 8, b) + share * bin(i / 8 + 1, b);
+      global.wgii[b] = (1.0F - share) * bin(i / 8, b + 1000) + share * bin(i / 8 + 1, b + 1000);
+    }
+    normalise(global.wgoh);
+    normalise(global.wgii);
+    return global;
+  }
+
+ private:
+  static constexpr std::size_t kBlock_m = 100;
+
+  /// Steele, Lea and Flood, Fast splittable pseudorandom number generators (2014).
+  static std::uint64_t mix(std::uint64_t z) {
+    z += 0x9E3779B97F4A7C15U;
+    z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9U;
+    z = (z ^ (z >> 27U)) * 0x94D049BB133111EBU;
+    return z ^ (z >> 31U);
+  }
+
+  void describe(std::uint64_t landmark, std::uint64_t visit, std::uint8_t* descriptor) const {
+    std::uint64_t bits = 0;
+    std::uint64_t noise = 0;
+    for (std::size_t b = 0; b < SiftFeatures::kDescriptorSize; ++b) {
+      if (b % 8 == 0) {
+        bits = mix(16 * landmark + b / 8 + seed_);
+        noise = mix(bits ^ visit);
+      }
+      const int value = bytes_[bits & 255U] + static_cast<int>(noise & 15U);
+      descriptor[b] = static_cast<std::uint8_t>(std::min(value, 255));
+      bits >>= 8U;
+      noise >>= 8U;
+    }
+  }
+
+  float bin(std::size_t knot, std::size_t b) const { return bytes_[mix(knot * 4096 + b + seed_) & 255U]; }
+
+  std::size_t features_;
+  std::size_t new_features_;  ///< of an image against the one before
+  std::uint64_t seed_;
+  std::size_t streets_ = 2;  ///< in each direction
+  std::array<std::uint8_t, 256> bytes_{};
+};
+
+}  // namespace visual_localization::benchmark
