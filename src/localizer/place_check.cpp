@@ -5,7 +5,10 @@
 namespace visual_localization {
 
 PlaceCheck::PlaceCheck(const TrainingMap& map, std::size_t max_images, double near_m)
-    : map_(map), near_m_(near_m), stride_((map.size() + max_images - 1) / max_images) {}
+    : map_(map),
+      near_m_(near_m),
+      stride_((map.size() + max_images - 1) / max_images),
+      rounds_(std::clamp<std::size_t>(map.globalsKept() / ((map.size() + stride_ - 1) / stride_), 1, stride_)) {}
 
 double PlaceCheck::ratio(ComparableImage& image, const Eigen::Vector2d& position_m) {
   constexpr std::size_t kNeighbours = 32;  // in a denser map the nearest ones speak for the others
@@ -15,8 +18,9 @@ double PlaceCheck::ratio(ComparableImage& image, const Eigen::Vector2d& position
     if (neighbour.distance_m <= near_m_) here = std::max(here, similarity(neighbour.image));
   }
   double anywhere = here;
-  first_ = (first_ + 1) % stride_;
-  for (std::size_t i = first_; i < map_.size(); i += stride_) anywhere = std::max(anywhere, similarity(i));
+  round_ = (round_ + 1) % rounds_;
+  for (std::size_t i = round_ * stride_ / rounds_; i < map_.size(); i += stride_)
+    anywhere = std::max(anywhere, similarity(i));
   return anywhere > 0.0 ? here / anywhere : 1.0;
 }
 

@@ -14,7 +14,8 @@ namespace visual_localization {
 /// compares only what is there, and never sees that another place fits better.
 class PlaceCheck {
  public:
-  /// Of a map with more than `max_images` every k-th image is looked at, beginning with another one each time.
+  /// Of a map with more than `max_images` every k-th image is looked at, beginning with another one each time, but not
+  /// with more of them than can be kept in memory.
   PlaceCheck(const TrainingMap& map, std::size_t max_images, double near_m);
 
   /// Best global similarity within `near_m` of `position_m`, as a share of the best in the whole map, in [0, 1]. One
@@ -25,7 +26,8 @@ class PlaceCheck {
   const TrainingMap& map_;
   double near_m_;
   std::size_t stride_;
-  std::size_t first_ = 0;  ///< of the training images that are looked at
+  std::size_t rounds_;  ///< after so many times it begins with the same training image again
+  std::size_t round_ = 0;
 };
 
 }  // namespace visual_localization
