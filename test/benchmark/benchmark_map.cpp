@@ -59,6 +59,7 @@ class StreetImage final : public ComparableImage {
     return kind == FeatureKind::kSift ? by_sift_.compare(sift_, *map_.sift(i))
                                       : by_global_.compare(global_, *map_.global(i));
   }
+  std::size_t siftFeatures() override { return sift_.size(); }
 
  private:
   SiftFeatures sift_;
