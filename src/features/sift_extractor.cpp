@@ -6,6 +6,10 @@
 #include <opencv2/core/version.hpp>
 #include <opencv2/features2d.hpp>
 
+#ifdef VISUAL_LOCALIZATION_HIGHWAY
+#include "visual_localization/features/native_sift_extractor.h"
+#endif
+
 namespace visual_localization {
 namespace {
 
@@ -14,6 +18,8 @@ class OpenCvSiftExtractor : public SiftExtractor {
   explicit OpenCvSiftExtractor(const SiftConfig& config)
       : sift_(cv::SIFT::create(config.max_features, config.octave_layers, config.contrast_threshold,
                                config.edge_threshold, config.sigma_px, CV_8U)) {}
+
+  const char* backend() const override { return kOpenCvSift; }
 
   SiftFeatures extract(const cv::Mat& grey) override {
     requireExtractable(grey);
@@ -54,8 +60,19 @@ void SiftConfig::declare(ParameterVisitor& visitor) {
                   100000);
 }
 
-std::unique_ptr<SiftExtractor> makeSiftExtractor(const SiftConfig& config) {
+const std::vector<std::string>& siftBackends() {
+  static const std::vector<std::string> backends{kNativeSift, kOpenCvSift};
+  return backends;
+}
+
+std::unique_ptr<SiftExtractor> makeSiftExtractor(const SiftConfig& config, const std::string& backend) {
+  if (backend == kOpenCvSift) return std::make_unique<OpenCvSiftExtractor>(config);
+  if (backend != kNativeSift) throw std::invalid_argument("there is no SIFT backend '" + backend + "'");
+#ifdef VISUAL_LOCALIZATION_HIGHWAY
+  return std::make_unique<NativeSiftExtractor>(config);
+#else
   return std::make_unique<OpenCvSiftExtractor>(config);
+#endif
 }
 
 }  // namespace visual_localization

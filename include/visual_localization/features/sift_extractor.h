@@ -24,6 +24,12 @@ struct SiftConfig {
   std::vector<std::string> violations() const { return {}; }
 };
 
+/// Names of the extractors: our own, and OpenCV's. Their features can be matched with each other, so a map does not
+/// store which one it was built with.
+constexpr const char* kNativeSift = "native";
+constexpr const char* kOpenCvSift = "opencv";
+const std::vector<std::string>& siftBackends();
+
 /// Throws std::invalid_argument, naming what is wrong, unless the image is 8-bit with one channel and at least
 /// 16 x 16 pixels.
 void requireExtractable(const cv::Mat& grey);
@@ -34,8 +40,12 @@ class SiftExtractor {
   virtual ~SiftExtractor() = default;
   /// Throws like requireExtractable.
   virtual SiftFeatures extract(const cv::Mat& grey) = 0;
+  /// Which of siftBackends() this is.
+  virtual const char* backend() const = 0;
 };
 
-std::unique_ptr<SiftExtractor> makeSiftExtractor(const SiftConfig& config);
+/// Throws std::invalid_argument when there is no such backend. Where the package was built without Highway, "native"
+/// gives OpenCV's extractor, and its backend() says so.
+std::unique_ptr<SiftExtractor> makeSiftExtractor(const SiftConfig& config, const std::string& backend = kNativeSift);
 
 }  // namespace visual_localization

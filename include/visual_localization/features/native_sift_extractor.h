@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "visual_localization/features/sift_descriptor.h"
+#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_extrema.h"
+#include "visual_localization/features/sift_orientation.h"
+#include "visual_localization/features/sift_point.h"
+#include "visual_localization/features/sift_scale_space.h"
+
+namespace visual_localization {
+
+/// Our own SIFT, for one core and small images: the scale space, detector and descriptor of Lowe 2004 with the
+/// conventions of OpenCV 4.6, so that features of either can be matched with each other. Whole vectors of pixels at
+/// a time, and memory that is kept from image to image.
+class NativeSiftExtractor : public SiftExtractor {
+ public:
+  explicit NativeSiftExtractor(const SiftConfig& config);
+
+  SiftFeatures extract(const cv::Mat& grey) override;
+  const char* backend() const override { return kNativeSift; }
+
+ private:
+  void detect();
+  void detectIn(std::size_t octave);
+  void keepStrongest();
+
+  SiftConfig config_;
+  SiftScaleSpace scale_space_;
+  SiftExtremaSearch search_;
+  SiftOrientations orientations_;
+  SiftDescriber describer_;
+  std::vector<SiftExtremum> extrema_;
+  std::vector<SiftPoint> points_;
+  std::vector<float> responses_;
+};
+
+}  // namespace visual_localization
