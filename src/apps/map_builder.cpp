@@ -31,6 +31,7 @@ struct Options {
   std::string plot;
   std::optional<double> min_spacing_m;
   std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
+  std::optional<std::string> sift_backend;
 };
 
 void declareOptions(CLI::App& app, Options& options) {
@@ -48,7 +49,16 @@ void declareOptions(CLI::App& app, Options& options) {
   app.add_option("--threads", options.threads, "for extraction; the map does not depend on it")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1024}))
       ->capture_default_str();
+  app.add_option("--sift-backend", options.sift_backend, "native or opencv; overrides the configuration");
   app.add_option("--plot", options.plot, "draw fixes and cleaned path into this SVG file");
+}
+
+void overrideWith(MapBuilderConfig& config, const char* option, const char* parameter, const ParameterValue& value) {
+  try {
+    assignParameters(config, {{parameter, value}});
+  } catch (const ParameterError& error) {
+    throw apps::UsageError(std::string(option) + ": " + error.what());
+  }
 }
 
 MapBuilderConfig readConfig(const Options& options) {
@@ -61,13 +71,8 @@ MapBuilderConfig readConfig(const Options& options) {
       throw ParameterError(options.config + ": " + error.what());
     }
   }
-  if (options.min_spacing_m) {
-    try {
-      assignParameters(config, {{"map/min_spacing", *options.min_spacing_m}});
-    } catch (const ParameterError& error) {
-      throw apps::UsageError(std::string("--min-spacing: ") + error.what());
-    }
-  }
+  if (options.min_spacing_m) overrideWith(config, "--min-spacing", "map/min_spacing", *options.min_spacing_m);
+  if (options.sift_backend) overrideWith(config, "--sift-backend", "map/sift_backend", *options.sift_backend);
   return config;
 }
 

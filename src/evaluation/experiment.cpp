@@ -128,7 +128,8 @@ std::string withValues(std::string name, const std::vector<Setting>& settings) {
 }
 
 bool concernsFrontEnd(const std::string& parameter) {
-  return parameter.rfind("match/", 0) == 0 || parameter == "prune" || parameter == "max_image_gap";
+  return parameter.rfind("match/", 0) == 0 || parameter == "prune" || parameter == "max_image_gap" ||
+         parameter == "sift_backend";
 }
 
 /// What the entry of one method says before the sweep's values are filled in.

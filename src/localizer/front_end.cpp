@@ -11,12 +11,12 @@
 namespace visual_localization {
 
 FrontEnd::FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune,
-                   double max_image_gap_s)
+                   double max_image_gap_s, const std::string& sift_backend)
     : match_(match),
       image_size_(image_size),
       prune_(prune),
       max_image_gap_s_(max_image_gap_s),
-      sift_extractor_(makeSiftExtractor(sift)) {}
+      sift_extractor_(makeSiftExtractor(sift, sift_backend)) {}
 
 void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;

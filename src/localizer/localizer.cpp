@@ -30,7 +30,8 @@ std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const LocalizerConf
 Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
     : map_(std::move(map)),
       config_(validated(config)),
-      front_end_(map_->header().sift, config_.match, map_->header().image_size, config_.prune, config_.max_image_gap_s),
+      front_end_(map_->header().sift, config_.match, map_->header().image_size, config_.prune, config_.max_image_gap_s,
+                 config_.sift_backend),
       sift_similarity_(config_.match, config_.similarity),
       global_similarity_(config_.similarity),
       scores_(map_->size()),

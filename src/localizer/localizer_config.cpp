@@ -11,6 +11,8 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
                  {"dpso", "pf_gaussian", "pf_linear"});
   visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
                  features, {"sift", "global", "hybrid"});
+  visitor.choice({"sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any map"},
+                 sift_backend, siftBackends());
   visitor.integer({"seed", "1", "of the random generator; the same seed, map and images give the same track"}, seed, 0,
                   std::numeric_limits<int>::max());
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);

@@ -27,9 +27,10 @@ std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
 
 }  // namespace
 
-ExtractionPool::ExtractionPool(const SiftConfig& sift, int preview_width_px, std::size_t threads)
+ExtractionPool::ExtractionPool(const SiftConfig& sift, const std::string& sift_backend, int preview_width_px,
+                               std::size_t threads)
     : preview_width_px_(preview_width_px), workers_(std::max<std::size_t>(1, threads)) {
-  for (Worker& worker : workers_) worker.sift = makeSiftExtractor(sift);
+  for (Worker& worker : workers_) worker.sift = makeSiftExtractor(sift, sift_backend);
 }
 
 ExtractionPool::~ExtractionPool() = default;

@@ -89,6 +89,9 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   visitor.flag({"map/prune", "", "keep only features that one of the two nearest training images shows as well"},
                prune);
   visitor.integer({"map/preview_width", "px", "width of the stored previews; 0 stores none"}, preview_width_px, 0, 640);
+  visitor.choice(
+      {"map/sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any localizer"},
+      sift_backend, siftBackends());
   sift.declare(visitor);
   match.declare(visitor);
   trajectory.declare(visitor);
@@ -104,7 +107,7 @@ std::vector<std::string> MapBuilderConfig::violations() const {
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources)
     : config_(validated(config)),
-      extraction_(config_.sift, config_.preview_width_px, resources.threads),
+      extraction_(config_.sift, config_.sift_backend, config_.preview_width_px, resources.threads),
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
       spool_(resources.spool_beside) {
   header_.sift = config_.sift;

@@ -57,7 +57,8 @@ class DriveRecorder {
   void add(std::int64_t stamp_ns, const cv::Mat& grey, const std::optional<GeodeticPoint>& truth) {
     if (!front_end_) {
       drive_.image_size = grey.size();
-      front_end_.emplace(sift_, config_.match, grey.size(), config_.prune, config_.max_image_gap_s);
+      front_end_.emplace(sift_, config_.match, grey.size(), config_.prune, config_.max_image_gap_s,
+                         config_.sift_backend);
     }
     front_end_->setImage(stamp_ns, grey);
     const CpuStopwatch sift_watch;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include <opencv2/core.hpp>
 
@@ -19,7 +20,8 @@ namespace visual_localization {
 /// features, is not pruned.
 class FrontEnd {
  public:
-  FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s);
+  FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s,
+           const std::string& sift_backend = kNativeSift);
 
   /// The next image. `grey`: 8-bit, one channel, any size of at least 16 x 16; throws std::invalid_argument otherwise,
   /// and then nothing has changed.

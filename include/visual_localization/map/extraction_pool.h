@@ -22,7 +22,7 @@ struct RawImage {
 class ExtractionPool {
  public:
   /// `preview_width_px`: of the stored previews; 0 = none. `threads`: at least 1.
-  ExtractionPool(const SiftConfig& sift, int preview_width_px, std::size_t threads);
+  ExtractionPool(const SiftConfig& sift, const std::string& sift_backend, int preview_width_px, std::size_t threads);
   ~ExtractionPool();
 
   /// In the order of `images`, features not pruned. Throws like requireExtractable.

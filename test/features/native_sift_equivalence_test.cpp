@@ -1,0 +1,152 @@
+// Our SIFT features are OpenCV's, and the same on every CPU.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+#include <opencv2/imgproc.hpp>
+
+#include "test/support/synthetic.h"
+#include "visual_localization/features/sift_extractor.h"
+
+namespace visual_localization {
+namespace {
+
+/// Blocks of all sizes, softened as by a lens.
+cv::Mat textured(int width, int height, std::uint32_t seed) {
+  cv::RNG random(seed);
+  cv::Mat image(height, width, CV_8UC1, cv::Scalar(128));
+  for (int i = 0; i < width * height / 300; ++i) {
+    const int size = 2 + static_cast<int>(std::exp(random.uniform(0.0, 3.5)));
+    const cv::Rect block(random.uniform(-10, width), random.uniform(-10, height), size, random.uniform(2, 2 * size));
+    cv::rectangle(image, block, cv::Scalar(random.uniform(0, 256)), cv::FILLED);
+  }
+  cv::GaussianBlur(image, image, {}, 0.8);
+  return image;
+}
+
+/// How well the features of one extractor are found among those of another.
+struct Agreement {
+  double same_keypoint = 0.0;    ///< share within 0.5 px, 1.1 x size and 5 degrees
+  double same_descriptor = 0.0;  ///< share of those whose descriptors, of length 512, are less than 10 apart
+};
+
+Agreement agreement(const SiftFeatures& of, const SiftFeatures& with) {
+  std::size_t keypoints = 0;
+  std::size_t descriptors = 0;
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    const SiftKeypoint& a = of.keypoints()[i];
+    double nearest = HUGE_VAL;
+    for (std::size_t j = 0; j < with.size(); ++j) {
+      const SiftKeypoint& b = with.keypoints()[j];
+      if (std::hypot(a.x_px - b.x_px, a.y_px - b.y_px) > 0.5F) continue;
+      if (std::abs(std::log(a.size_px / b.size_px)) > std::log(1.1F)) continue;
+      if (std::abs(std::remainder(a.angle_deg - b.angle_deg, 360.0F)) > 5.0F) continue;
+      double squared = 0.0;
+      for (std::size_t k = 0; k < SiftFeatures::kDescriptorSize; ++k) {
+        const double difference = of.descriptor(i)[k] - with.descriptor(j)[k];
+        squared += difference * difference;
+      }
+      nearest = std::min(nearest, std::sqrt(squared));
+    }
+    keypoints += static_cast<std::size_t>(nearest < HUGE_VAL);
+    descriptors += static_cast<std::size_t>(nearest < 10.0);
+  }
+  const auto share = [](std::size_t part, std::size_t whole) {
+    return whole == 0 ? 1.0 : static_cast<double>(part) / static_cast<double>(whole);
+  };
+  return {share(keypoints, of.size()), share(descriptors, keypoints)};
+}
+
+void expectAgreement(const SiftFeatures& a, const SiftFeatures& b, double least) {
+  const double count = static_cast<double>(a.size());
+  EXPECT_NEAR(static_cast<double>(b.size()), count, 2.0 + (1.0 - least) * count);
+  const double slack = count < 50.0 ? 2.0 / std::max(count, 2.0) : 0.0;
+  EXPECT_GE(agreement(a, b).same_keypoint, least - slack);
+  EXPECT_GE(agreement(b, a).same_keypoint, least - slack);
+  EXPECT_GE(agreement(a, b).same_descriptor, least - slack);
+}
+
+void expectLikeOpenCv(const cv::Mat& image, const SiftConfig& config, double least = 0.97) {
+  expectAgreement(makeSiftExtractor(config, kNativeSift)->extract(image),
+                  makeSiftExtractor(config, kOpenCvSift)->extract(image), least);
+}
+
+TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsForEverySize) {
+  for (const cv::Size size :
+       {cv::Size(320, 240), cv::Size(16, 16), cv::Size(17, 19), cv::Size(33, 47), cv::Size(100, 75), cv::Size(127, 129),
+        cv::Size(333, 201), cv::Size(1241, 376), cv::Size(16, 2000), cv::Size(2000, 16), cv::Size(512, 512)}) {
+    SCOPED_TRACE(std::to_string(size.width) + "x" + std::to_string(size.height));
+    expectLikeOpenCv(textured(size.width, size.height, 5), SiftConfig());
+  }
+}
+
+TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsForEveryConfiguration) {
+  const cv::Mat image = textured(320, 240, 6);
+  for (const int layers : {1, 2, 3, 4, 5}) {
+    SCOPED_TRACE("layers " + std::to_string(layers));
+    SiftConfig config;
+    config.octave_layers = layers;
+    expectLikeOpenCv(image, config);
+  }
+  SiftConfig contrast;
+  contrast.contrast_threshold = 0.1;
+  expectLikeOpenCv(image, contrast);
+  contrast.contrast_threshold = 0.0;
+  expectLikeOpenCv(image, contrast, 0.95);
+  SiftConfig edge;
+  edge.edge_threshold = 3.0;
+  expectLikeOpenCv(image, edge);
+  for (const double sigma_px : {0.8, 1.2, 3.0}) {
+    SCOPED_TRACE("sigma " + std::to_string(sigma_px));
+    SiftConfig sigma;
+    sigma.sigma_px = sigma_px;
+    expectLikeOpenCv(image, sigma);
+  }
+  SiftConfig strongest;
+  strongest.max_features = 60;
+  expectLikeOpenCv(image, strongest);
+}
+
+TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsOnWallsAndNoise) {
+  expectLikeOpenCv(test::viewOf(test::wall(320, 240, 3), 0), SiftConfig());
+  cv::Mat noise(120, 160, CV_8UC1);
+  cv::RNG(3).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  expectLikeOpenCv(noise, SiftConfig());
+  cv::threshold(noise, noise, 127.0, 255.0, cv::THRESH_BINARY);
+  expectLikeOpenCv(noise, SiftConfig());
+}
+
+TEST(NativeSiftEquivalence, EveryKindOfVectorFindsTheSame) {
+  const auto use = [](std::int64_t targets) {
+    hwy::SetSupportedTargetsForTest(targets);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  };
+  const cv::Mat image = textured(203, 151, 7);
+  const auto extractor = makeSiftExtractor(SiftConfig(), kNativeSift);
+  use(0);
+  const SiftFeatures widest = extractor->extract(image);
+  ASSERT_GT(widest.size(), 100U);
+  const std::int64_t supported = hwy::SupportedTargets();
+  std::size_t tried = 0;
+  for (int bit = 0; bit < 62; ++bit) {
+    const std::int64_t target = std::int64_t{1} << bit;
+    if ((supported & target) == 0) continue;
+    SCOPED_TRACE(hwy::TargetName(target));
+    use(target);
+    expectAgreement(extractor->extract(image), widest, 0.99);
+    ++tried;
+  }
+  use(0);
+  EXPECT_GE(tried, 1U);
+}
+
+TEST(SiftBackend, IsChosenByName) {
+  EXPECT_STREQ(makeSiftExtractor(SiftConfig(), kNativeSift)->backend(), kNativeSift);
+  EXPECT_STREQ(makeSiftExtractor(SiftConfig(), kOpenCvSift)->backend(), kOpenCvSift);
+  EXPECT_THROW(makeSiftExtractor(SiftConfig(), "vlfeat"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace visual_localization
