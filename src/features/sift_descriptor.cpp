@@ -37,113 +37,96 @@ struct Square {
   float sine;
   float cell_px;   ///< side of a cell
   float reach_px;  ///< from the centre to where the weight of the outermost cell vanishes
-  float angle_turns;
+  float turns;     ///< the point's angle, counter-clockwise
   int column;
   int row;
 };
 
+/// Columns from the centre.
 struct Span {
-  int first;
-  int last;
+  float first;
+  float last;
+
+  /// Adds the condition |slope * column + offset| < reach.
+  void restrictTo(float slope, float offset, float reach) {
+    constexpr float kLevel = 1e-6F;
+    if (std::abs(slope) < kLevel) {
+      if (std::abs(offset) >= reach) last = first - 1.0F;
+      return;
+    }
+    const float middle = -offset / slope;
+    const float half = reach / std::abs(slope);
+    first = std::max(first, middle - half);
+    last = std::min(last, middle + half);
+  }
 };
 
-/// Adds the condition |slope * j + offset| < reach to a span of j.
-void restrict(float slope, float offset, float reach, float& low, float& high) {
-  constexpr float kLevel = 1e-6F;
-  if (std::abs(slope) < kLevel) {
-    if (std::abs(offset) >= reach) high = low - 1.0F;
-    return;
-  }
-  const float a = (-reach - offset) / slope;
-  const float b = (reach - offset) / slope;
-  low = std::max(low, std::min(a, b));
-  high = std::min(high, std::max(a, b));
-}
-
-/// Columns, from the centre, of the pixels inside the square in row `i` from the centre.
-Span columnsOf(const Square& square, int i, int left, int right) {
-  const float row = static_cast<float>(i);
-  float low = static_cast<float>(left);
-  float high = static_cast<float>(right);
-  restrict(square.cosine, -row * square.sine, square.reach_px, low, high);
-  restrict(square.sine, row * square.cosine, square.reach_px, low, high);
-  return {static_cast<int>(std::ceil(low)), static_cast<int>(std::floor(high))};
-}
-
-/// Position in cells, [0, 5) from the outer edge of the padding's middle, split into cell and share of the next one.
+/// Position along one side of the square in cells, (0, 5): 0 is the middle of the cells before the first.
 struct CellPosition {
-  hn::Vec<Ints> cell;
-  V share;
+  V cell;
+  V share;  ///< of the next cell
 
   HWY_INLINE explicit CellPosition(V from_centre) {
     const Floats d;
-    constexpr float kFirstCentre = 0.5F * kPadded - 0.5F;
-    const V position = hn::Add(from_centre, hn::Set(d, kFirstCentre));
-    const V inside = hn::Min(hn::Max(position, hn::Zero(d)), hn::Set(d, kPadded - 1 - 1e-4F));
-    cell = hn::ConvertTo(Ints(), inside);
-    share = hn::Sub(inside, hn::ConvertTo(d, cell));
+    const V position = hn::Add(from_centre, hn::Set(d, 0.5F * (kPadded - 1)));
+    cell = hn::Floor(position);
+    share = hn::Sub(position, cell);
   }
 };
 
-/// What the pixels in `span` of row `i` add, into work from sample `n` on; whole vectors are written.
-void sampleRow(const FloatPlane& level, const Square& square, int i, Span span, int n, SiftDescriber::Workspace& work) {
+/// What the pixels in columns [first, first + count) of row `i` from the centre add, into the samples from `n` on.
+HWY_INLINE void sampleRow(const FloatPlane& level, const Square& square, int i, int first, int count,
+                          const GaussianWindow& window, int n, SiftDescriber::Samples& samples) {
   const Floats d;
-  const Ints ints;
   const float row = static_cast<float>(i);
-  const float per_px = 1.0F / square.cell_px;
-  const V cosine = hn::Set(d, square.cosine * per_px);
-  const V sine = hn::Set(d, square.sine * per_px);
-  const V row_cosine = hn::Set(d, row * square.cosine * per_px);
-  const V row_sine = hn::Set(d, row * square.sine * per_px);
-  const V row_weight = hn::Set(d, work.window.centre()[i]);
+  const float cosine_per_px = square.cosine / square.cell_px;
+  const float sine_per_px = square.sine / square.cell_px;
+  const V row_weight = hn::Set(d, window.centre()[i]);
   const float* pixels = level.row(square.row + i) + square.column;
-  std::int32_t* cells = reinterpret_cast<std::int32_t*>(work.cells.data());
-  for (int j = span.first; j <= span.last; j += kLanes, n += kLanes) {
-    const auto gradient = gradientAt(d, pixels + j, static_cast<std::ptrdiff_t>(level.stride()));
-    const V weight = hn::Mul(magnitudeOf(gradient), hn::Mul(row_weight, hn::LoadU(d, work.window.centre() + j)));
-    const V turns = hn::Sub(turnsOf(d, gradient), hn::Set(d, square.angle_turns));
+  for (const int end = n + count; n < end; n += kLanes, first += kLanes) {
+    const auto gradient = polarGradientAt(d, pixels + first, static_cast<std::ptrdiff_t>(level.stride()));
+    const V weight = hn::Mul(gradient.magnitude, hn::Mul(row_weight, hn::LoadU(d, window.centre() + first)));
+    const V turns = hn::Sub(gradient.turns, hn::Set(d, square.turns));
     const V direction = hn::Mul(hn::Sub(turns, hn::Floor(turns)), hn::Set(d, kDirections));
-    const V column = hn::ConvertTo(d, hn::Iota(ints, j));
-    const CellPosition across(hn::Sub(hn::Mul(column, cosine), row_sine));
-    const CellPosition down(hn::MulAdd(column, sine, row_cosine));
-    const auto cell = hn::Add(hn::Mul(down.cell, hn::Set(ints, kPadded)), across.cell);
-    hn::StoreU(hn::ShiftLeft<3>(cell), ints, cells + n);
-    hn::StoreU(direction, d, work.directions.data() + n);
+    const V column = hn::Iota(d, static_cast<float>(first));
+    const CellPosition across(hn::MulAdd(column, hn::Set(d, cosine_per_px), hn::Set(d, -row * sine_per_px)));
+    const CellPosition down(hn::MulAdd(column, hn::Set(d, sine_per_px), hn::Set(d, row * cosine_per_px)));
+    const V cell = hn::MulAdd(down.cell, hn::Set(d, kPadded), across.cell);
     const V lower = hn::Mul(weight, down.share);
     const V upper = hn::Sub(weight, lower);
     const V lower_right = hn::Mul(lower, across.share);
     const V upper_right = hn::Mul(upper, across.share);
-    hn::StoreU(hn::Sub(upper, upper_right), d, work.weights[0].data() + n);
-    hn::StoreU(upper_right, d, work.weights[1].data() + n);
-    hn::StoreU(hn::Sub(lower, lower_right), d, work.weights[2].data() + n);
-    hn::StoreU(lower_right, d, work.weights[3].data() + n);
+    hn::StoreU(smallInteger(d, hn::Mul(cell, hn::Set(d, kDirections))), Ints(), samples.bins + n);
+    hn::StoreU(direction, d, samples.directions + n);
+    hn::StoreU(hn::Sub(upper, upper_right), d, samples.upper_left + n);
+    hn::StoreU(upper_right, d, samples.upper_right + n);
+    hn::StoreU(hn::Sub(lower, lower_right), d, samples.lower_left + n);
+    hn::StoreU(lower_right, d, samples.lower_right + n);
   }
 }
 
 /// Adds `count` samples to the histograms. The two directions nearest to a sample's are found for all eight at once:
 /// the weight of each falls linearly with the distance around the circle.
-void addSamples(int count, SiftDescriber::Workspace& work) {
-  static_assert(kDirections == 8, "a cell is shifted by 3 bits");
+void addSamples(const SiftDescriber::Samples& samples, int count, float* histograms) {
   const hn::CappedTag<float, kDirections> d;
   constexpr int kStep = static_cast<int>(hn::MaxLanes(d));
-  const std::int32_t* cells = reinterpret_cast<const std::int32_t*>(work.cells.data());
   const auto half_circle = hn::Set(d, 0.5F * kDirections);
   const auto nearly_half = hn::Set(d, 0.5F * kDirections - 1.0F);
   for (int part = 0; part < kDirections; part += kStep) {
     const auto bins = hn::Iota(d, static_cast<float>(part));
     for (int k = 0; k < count; ++k) {
-      float* upper = work.histograms.data() + k % kCopies * kHistograms + cells[k] + part;
+      float* upper = histograms + k % kCopies * kHistograms + samples.bins[k] + part;
       float* lower = upper + kPadded * kDirections;
-      const auto distance = hn::Abs(hn::Sub(hn::Set(d, work.directions.data()[k]), bins));
+      const auto distance = hn::Abs(hn::Sub(hn::Set(d, samples.directions[k]), bins));
       const auto across = hn::Abs(hn::Sub(distance, half_circle));
       const auto share = hn::Max(hn::Sub(across, nearly_half), hn::Zero(d));
-      const auto add = [&](int cell, float* at) {
-        hn::Store(hn::MulAdd(share, hn::Set(d, work.weights[cell].data()[k]), hn::Load(d, at)), d, at);
+      const auto add = [&](float weight, float* at) {
+        hn::Store(hn::MulAdd(share, hn::Set(d, weight), hn::Load(d, at)), d, at);
       };
-      add(0, upper);
-      add(1, upper + kDirections);
-      add(2, lower);
-      add(3, lower + kDirections);
+      add(samples.upper_left[k], upper);
+      add(samples.upper_right[k], upper + kDirections);
+      add(samples.lower_left[k], lower);
+      add(samples.lower_right[k], lower + kDirections);
     }
   }
 }
@@ -190,48 +173,58 @@ void toBytes(float* elements, std::uint8_t* descriptor) {
   }
 }
 
-void describeImpl(const FloatPlane& level, const SiftPoint& point, SiftDescriber::Workspace& work,
-                  std::uint8_t* descriptor) {
+Square squareOf(const SiftPoint& point) {
   constexpr float kCellSigmas = 3.0F;
   constexpr float kDegree = 3.14159265F / 180.0F;
+  constexpr float kInside = 0.9999F;  // what rounding may add must not lead out of the cells
   const float turn_deg = point.angle_deg > 0.0F ? 360.0F - point.angle_deg : 0.0F;
   const float cell_px = kCellSigmas * point.sigma_px;
-  const float reach_px = 0.5F * (kCells + 1) * cell_px;
-  const Square square{std::cos(turn_deg * kDegree),
-                      std::sin(turn_deg * kDegree),
-                      cell_px,
-                      reach_px,
-                      turn_deg / 360.0F,
-                      static_cast<int>(std::lrint(point.x_px)),
-                      static_cast<int>(std::lrint(point.y_px))};
-  constexpr float kDiagonal = 1.41421356F;
-  const int radius = static_cast<int>(std::ceil(reach_px * kDiagonal));
-  work.window.set(0.5F * kCells * cell_px, radius);
+  return {std::cos(turn_deg * kDegree),
+          std::sin(turn_deg * kDegree),
+          cell_px,
+          0.5F * (kCells + 1) * cell_px * kInside,
+          turn_deg / 360.0F,
+          static_cast<int>(std::lrint(point.x_px)),
+          static_cast<int>(std::lrint(point.y_px))};
+}
 
-  const auto space = static_cast<std::size_t>(SiftDescriber::Workspace::kSamples + 2 * radius + 1 + kLanes);
-  for (AlignedFloats* buffer :
-       {&work.cells, &work.directions, &work.weights[0], &work.weights[1], &work.weights[2], &work.weights[3]}) {
-    buffer->reserve(space);
-  }
-  work.histograms.reserve(kCopies * kHistograms);
-  std::fill_n(work.histograms.data(), kCopies * kHistograms, 0.0F);
-
-  const int left = std::max(-radius, 1 - square.column);
-  const int right = std::min(radius, level.width() - 2 - square.column);
+/// Collects the gradients of all pixels inside the square that have neighbours.
+void collect(const FloatPlane& level, const Square& square, int radius, SiftDescriber::Workspace& work,
+             float* histograms) {
+  constexpr int kCapacity = SiftDescriber::Samples::kCapacity;
+  const auto left = static_cast<float>(std::max(-radius, 1 - square.column));
+  const auto right = static_cast<float>(std::min(radius, level.width() - 2 - square.column));
   const int bottom = std::min(radius, level.height() - 2 - square.row);
   int samples = 0;
   for (int i = std::max(-radius, 1 - square.row); i <= bottom; ++i) {
-    const Span span = columnsOf(square, i, left, right);
-    if (span.first > span.last) continue;
-    sampleRow(level, square, i, span, samples, work);
-    samples += span.last - span.first + 1;
-    if (samples < SiftDescriber::Workspace::kSamples) continue;
-    addSamples(samples, work);
-    samples = 0;
+    Span span{left, right};
+    span.restrictTo(square.cosine, -static_cast<float>(i) * square.sine, square.reach_px);
+    span.restrictTo(square.sine, static_cast<float>(i) * square.cosine, square.reach_px);
+    int first = static_cast<int>(std::ceil(span.first));
+    const int end = static_cast<int>(std::floor(span.last)) + 1;
+    while (first < end) {
+      const int count = std::min(end - first, kCapacity - samples);
+      sampleRow(level, square, i, first, count, work.window, samples, work.samples);
+      first += count;
+      samples += count;
+      if (samples < kCapacity) continue;
+      addSamples(work.samples, samples, histograms);
+      samples = 0;
+    }
   }
-  addSamples(samples, work);
+  addSamples(work.samples, samples, histograms);
+}
+
+void describeImpl(const FloatPlane& level, const SiftPoint& point, SiftDescriber::Workspace& work,
+                  std::uint8_t* descriptor) {
+  constexpr float kDiagonal = 1.41421356F;
+  const Square square = squareOf(point);
+  const int radius = static_cast<int>(std::ceil(square.reach_px * kDiagonal));
+  work.window.set(0.5F * kCells * square.cell_px, radius);
+  alignas(64) float histograms[kCopies * kHistograms] = {};
+  collect(level, square, radius, work, histograms);
   alignas(64) float elements[kElements];
-  gather(work.histograms.data(), elements);
+  gather(histograms, elements);
   toBytes(elements, descriptor);
 }
 

@@ -30,12 +30,12 @@ void gradientsOfRow(const float* row, std::ptrdiff_t stride, const float* window
   const Floats d;
   const Ints ints;
   for (int i = 0; i < count; i += kLanes) {
-    const auto gradient = gradientAt(d, row + i, stride);
+    const auto gradient = polarGradientAt(d, row + i, stride);
     const auto weight = hn::Mul(hn::LoadU(d, window + i), hn::Set(d, row_weight));
-    const auto bin = hn::NearestInt(hn::Mul(turnsOf(d, gradient), hn::Set(d, static_cast<float>(kBins))));
+    const auto bin = smallInteger(d, hn::Mul(gradient.turns, hn::Set(d, static_cast<float>(kBins))));
     const auto wrapped = hn::IfThenElse(hn::Eq(bin, hn::Set(ints, kBins)), hn::Zero(ints), bin);
     hn::StoreU(wrapped, ints, bins + i);
-    hn::StoreU(hn::Mul(weight, magnitudeOf(gradient)), d, weights + i);
+    hn::StoreU(hn::Mul(weight, gradient.magnitude), d, weights + i);
   }
 }
 

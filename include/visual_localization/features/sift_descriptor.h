@@ -16,14 +16,21 @@ class SiftDescriber {
   /// image that the point was found in.
   void describe(const FloatPlane& level, const SiftPoint& point, std::uint8_t* descriptor);
 
-  /// What a pixel adds to the histograms, for up to kSamples pixels and a row more.
+  /// What pixels add to the histograms.
+  struct Samples {
+    static constexpr int kCapacity = 512;
+    static constexpr int kSpace = kCapacity + 16;  ///< whole vectors are written
+    alignas(64) std::int32_t bins[kSpace];         ///< first one of the upper left of the four cells around the pixel
+    alignas(64) float directions[kSpace];          ///< in bins, [0, 8]
+    alignas(64) float upper_left[kSpace];          ///< weight in that cell
+    alignas(64) float upper_right[kSpace];
+    alignas(64) float lower_left[kSpace];
+    alignas(64) float lower_right[kSpace];
+  };
+
   struct Workspace {
-    static constexpr int kSamples = 1024;
     GaussianWindow window;
-    AlignedFloats cells;       ///< int32: first of the 8 bins of the upper left of the four cells around the pixel
-    AlignedFloats directions;  ///< in bins, [0, 8]
-    AlignedFloats weights[4];  ///< in the upper left, upper right, lower left and lower right cell
-    AlignedFloats histograms;
+    Samples samples;
   };
 
  private:
