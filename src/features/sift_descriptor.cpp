@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -19,7 +20,7 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Floats = hn::CappedTag<float, CacheLine::kFloats>;
+using Floats = hn::CappedTag<float, 8>;
 using Ints = hn::RebindToSigned<Floats>;
 using V = hn::Vec<Floats>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Floats()));
@@ -74,6 +75,9 @@ struct CellPosition {
   }
 };
 
+/// Levels are larger than the caches and read in pieces of rows, which the CPU does not foresee.
+constexpr int kRowsAhead = 8;
+
 /// What the pixels in columns [first, first + count) of row `i` from the centre add, into the samples from `n` on.
 HWY_INLINE void sampleRow(const FloatPlane& level, const Square& square, int i, int first, int count,
                           const GaussianWindow& window, int n, SiftDescriber::Samples& samples) {
@@ -83,12 +87,14 @@ HWY_INLINE void sampleRow(const FloatPlane& level, const Square& square, int i, 
   const float sine_per_px = square.sine / square.cell_px;
   const V row_weight = hn::Set(d, window.centre()[i]);
   const float* pixels = level.row(square.row + i) + square.column;
+  const auto stride = static_cast<std::ptrdiff_t>(level.stride());
   for (const int end = n + count; n < end; n += kLanes, first += kLanes) {
-    const auto gradient = polarGradientAt(d, pixels + first, static_cast<std::ptrdiff_t>(level.stride()));
+    hwy::Prefetch(pixels + first + kRowsAhead * stride);
+    const auto gradient = polarGradientAt(d, pixels + first, stride);
     const V weight = hn::Mul(gradient.magnitude, hn::Mul(row_weight, hn::LoadU(d, window.centre() + first)));
     const V turns = hn::Sub(gradient.turns, hn::Set(d, square.turns));
     const V direction = hn::Mul(hn::Sub(turns, hn::Floor(turns)), hn::Set(d, kDirections));
-    const V column = hn::Iota(d, static_cast<float>(first));
+    const V column = hn::Add(hn::Iota(d, 0.0F), hn::Set(d, static_cast<float>(first)));
     const CellPosition across(hn::MulAdd(column, hn::Set(d, cosine_per_px), hn::Set(d, -row * sine_per_px)));
     const CellPosition down(hn::MulAdd(column, hn::Set(d, sine_per_px), hn::Set(d, row * cosine_per_px)));
     const V cell = hn::MulAdd(down.cell, hn::Set(d, kPadded), across.cell);
