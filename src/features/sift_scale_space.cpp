@@ -11,11 +11,15 @@ constexpr double kCameraBlur_px = 0.5;  ///< Lowe 2004, section 3.3: what an ima
 /// Blur from one level to the next: variances add up.
 double stepSigma(double from_px, double to_px) { return std::sqrt(to_px * to_px - from_px * from_px); }
 
-std::vector<GaussianKernel> kernelsFor(const SiftConfig& config) {
+DoublingKernel firstKernel(const SiftConfig& config) {
   constexpr double kLeastVariance = 0.01;
   const double doubled_px = 2.0 * kCameraBlur_px;
   const double variance = config.sigma_px * config.sigma_px - doubled_px * doubled_px;
-  std::vector<GaussianKernel> kernels{GaussianKernel(std::sqrt(std::max(variance, kLeastVariance)))};
+  return DoublingKernel(std::sqrt(std::max(variance, kLeastVariance)));
+}
+
+std::vector<GaussianKernel> kernelsFor(const SiftConfig& config) {
+  std::vector<GaussianKernel> kernels;
   const double factor = std::pow(2.0, 1.0 / config.octave_layers);
   for (int level = 1; level < config.octave_layers + 3; ++level) {
     const double sigma_px = config.sigma_px * std::pow(factor, level - 1);
@@ -33,29 +37,24 @@ void halve(const FloatPlane& from, FloatPlane& to) {
   }
 }
 
-/// Linear interpolation at a quarter of a pixel, `from` nearer than `beside`.
-float between(int nearer, int beside) {
-  return 0.75F * static_cast<float>(nearer) + 0.25F * static_cast<float>(beside);
-}
-
 }  // namespace
 
-SiftScaleSpace::SiftScaleSpace(const SiftConfig& config) : kernels_(kernelsFor(config)), rows_done_(kernels_.size()) {}
+SiftScaleSpace::SiftScaleSpace(const SiftConfig& config)
+    : first_kernel_(firstKernel(config)), kernels_(kernelsFor(config)), rows_done_(kernels_.size() + 1) {}
 
 void SiftScaleSpace::setImage(const cv::Mat& grey) {
-  grey_ = grey;
-  doubled_.resize(2 * grey.cols, 2 * grey.rows);
-  doubled_rows_ = 0;
+  grey_.resize(grey.cols, grey.rows);
+  for (int y = 0; y < grey.rows; ++y) std::copy_n(grey.ptr<std::uint8_t>(y), grey.cols, grey_.row(y));
+  int width = 2 * grey.cols;
+  int height = 2 * grey.rows;
   // OpenCV's number of octaves, less those that are all border.
-  const int smaller = std::min(doubled_.width(), doubled_.height());
+  const int smaller = std::min(width, height);
   const auto most = static_cast<std::size_t>(std::lrint(std::log2(static_cast<double>(smaller)) - 2.0) + 1);
-  int width = doubled_.width();
-  int height = doubled_.height();
   octave_count_ = 0;
   while (octave_count_ < most && std::min(width, height) > 2 * kBorder) {
     if (octaves_.size() == octave_count_) octaves_.emplace_back();
     SiftOctave& octave = octaves_[octave_count_++];
-    octave.levels.resize(kernels_.size());
+    octave.levels.resize(rows_done_.size());
     for (FloatPlane& level : octave.levels) level.resize(width, height);
     width /= 2;
     height /= 2;
@@ -79,42 +78,20 @@ int SiftScaleSpace::advance() {
   return rows_done_.back();
 }
 
-bool SiftScaleSpace::advanceLevel(std::size_t level) {
+void SiftScaleSpace::advanceLevel(std::size_t level) {
   std::vector<FloatPlane>& levels = octaves_[current_].levels;
   const int height = levels.front().height();
   const int first = rows_done_[level];
   const int last = std::min(height, first + kStrip);
-  const int needed = std::min(height, last + kernels_[level].radius());
-  if (first == height) return false;
+  if (first == height) return;
   if (level == 0) {
-    doubleRows(needed);
-  } else if (rows_done_[level - 1] < needed) {
-    return false;
+    blur_.doubleRows(grey_, first_kernel_, first, last, levels.front());
+  } else {
+    const GaussianKernel& kernel = kernels_[level - 1];
+    if (rows_done_[level - 1] < std::min(height, last + kernel.radius())) return;
+    blur_.blurRows(levels[level - 1], kernel, first, last, levels[level]);
   }
-  blur_.blurRows(level == 0 ? doubled_ : levels[level - 1], kernels_[level], first, last, levels[level]);
   rows_done_[level] = last;
-  return true;
-}
-
-void SiftScaleSpace::doubleRows(int last_row) {
-  for (; doubled_rows_ < last_row; ++doubled_rows_) {
-    const int y = doubled_rows_ / 2;
-    const int other = std::clamp(doubled_rows_ % 2 == 0 ? y - 1 : y + 1, 0, grey_.rows - 1);
-    const std::uint8_t* near_row = grey_.ptr<std::uint8_t>(y);
-    const std::uint8_t* far_row = grey_.ptr<std::uint8_t>(other);
-    float* out = doubled_.row(doubled_rows_);
-    const int last = grey_.cols - 1;
-    const auto column = [&](int x) { return between(near_row[x], far_row[x]); };
-    float before = column(0);
-    float here = before;
-    for (int x = 0; x <= last; ++x) {
-      const float after = column(std::min(x + 1, last));
-      out[2 * x] = 0.25F * before + 0.75F * here;
-      out[2 * x + 1] = 0.75F * here + 0.25F * after;
-      before = here;
-      here = after;
-    }
-  }
 }
 
 }  // namespace visual_localization

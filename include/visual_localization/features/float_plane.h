@@ -30,6 +30,8 @@ class AlignedFloats {
 /// at any column of a row, the padding behind the last column means nothing.
 class FloatPlane {
  public:
+  static constexpr int kSpareRows = 15;  ///< after the last one, which mean nothing either
+
   void resize(int width, int height) {
     width_ = width;
     height_ = height;
@@ -38,7 +40,7 @@ class FloatPlane {
     // Rows a multiple of 4 KiB apart would compete for the same lines of the first-level cache.
     constexpr std::size_t kPageFloats = 1024;
     if (stride_ % (kPageFloats / 4) == 0) stride_ += CacheLine::kFloats;
-    floats_.reserve(stride_ * static_cast<std::size_t>(height) + CacheLine::kFloats);
+    floats_.reserve(stride_ * static_cast<std::size_t>(height + kSpareRows) + CacheLine::kFloats);
   }
 
   int width() const { return width_; }

@@ -44,15 +44,12 @@ class SiftScaleSpace {
   int advance();
 
  private:
-  void doubleRows(int last_row);
-  bool advanceLevel(std::size_t level);
-  int rowsDone(std::size_t level) const;
+  void advanceLevel(std::size_t level);
 
-  std::vector<GaussianKernel> kernels_;  ///< from one level to the next; the first from the doubled image
+  DoublingKernel first_kernel_;          ///< from the image to the first level
+  std::vector<GaussianKernel> kernels_;  ///< from each level to the next
   GaussianBlur blur_;
-  cv::Mat grey_;
-  FloatPlane doubled_;
-  int doubled_rows_ = 0;
+  FloatPlane grey_;
   std::vector<SiftOctave> octaves_;
   std::size_t octave_count_ = 0;
   std::size_t current_ = 0;
