@@ -76,13 +76,17 @@ void searchRow(int y, int level, SiftExtremaSearch::Workspace& work, std::vector
   for (int x = 0; x < work.width; x += kLanes) {
     const V value = hn::Load(d, rows[1][1] + x);
     Candidates candidates{value, hn::Gt(value, threshold), hn::Lt(value, negative_threshold)};
+    candidates.compare(hn::Load(d, rows[1][0] + x));
+    candidates.compare(hn::Load(d, rows[1][2] + x));
+    candidates.compare(hn::Load(d, rows[0][1] + x));
+    candidates.compare(hn::Load(d, rows[2][1] + x));
     if (candidates.none()) continue;
     candidates.compareBeside(rows[1][1] + x);
-    candidates.compareThree(rows[1][0] + x);
-    candidates.compareThree(rows[1][2] + x);
     if (candidates.none()) continue;
+    candidates.compareBeside(rows[1][0] + x);
+    candidates.compareBeside(rows[1][2] + x);
     for (const int l : {0, 2}) {
-      candidates.compareThree(rows[l][1] + x);
+      candidates.compareBeside(rows[l][1] + x);
       candidates.compareThree(rows[l][0] + x);
       candidates.compareThree(rows[l][2] + x);
       if (candidates.none()) break;
