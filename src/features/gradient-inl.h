@@ -29,6 +29,9 @@ HWY_INLINE Gradient<V> gradientAt(D d, const float* row, std::ptrdiff_t stride) 
           hn::Sub(hn::LoadU(d, row - stride), hn::LoadU(d, row + stride))};
 }
 
+/// Levels are larger than the caches and read in pieces of rows, which the CPU does not foresee.
+constexpr int kRowsAhead = 8;
+
 /// Twice the gradient by length and direction.
 template <class V>
 struct PolarGradient {

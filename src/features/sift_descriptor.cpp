@@ -36,30 +36,30 @@ constexpr int kElements = kCells * kCells * kDirections;
 struct Square {
   float cosine;
   float sine;
-  float cell_px;   ///< side of a cell
-  float reach_px;  ///< from the centre to where the weight of the outermost cell vanishes
-  float turns;     ///< the point's angle, counter-clockwise
+  float cosine_per_px;  ///< in cells
+  float sine_per_px;    ///< in cells
+  float cell_px;        ///< side of a cell
+  float reach_px;       ///< from the centre to where the weight of the outermost cell vanishes
+  float turns;          ///< the point's angle, counter-clockwise
   int column;
   int row;
 };
 
-/// Columns from the centre.
-struct Span {
-  float first;
-  float last;
-
-  /// Adds the condition |slope * column + offset| < reach.
-  void restrictTo(float slope, float offset, float reach) {
-    constexpr float kLevel = 1e-6F;
-    if (std::abs(slope) < kLevel) {
-      if (std::abs(offset) >= reach) last = first - 1.0F;
-      return;
-    }
-    const float middle = -offset / slope;
-    const float half = reach / std::abs(slope);
-    first = std::max(first, middle - half);
-    last = std::min(last, middle + half);
+/// Two opposite sides of the square: which columns of a row lie between them.
+class Sides {
+ public:
+  /// |slope * column + offset of the row| < reach
+  Sides(float slope, float reach) {
+    constexpr float kLevel = 1e-6F;  // as good as parallel to the rows: all columns or none
+    inverse_ = 1.0F / (std::abs(slope) > kLevel ? slope : kLevel);
+    half_ = reach * std::abs(inverse_);
   }
+  float first(float offset) const { return -offset * inverse_ - half_; }
+  float last(float offset) const { return -offset * inverse_ + half_; }
+
+ private:
+  float inverse_;
+  float half_;
 };
 
 /// Position along one side of the square in cells, (0, 5): 0 is the middle of the cells before the first.
@@ -75,16 +75,11 @@ struct CellPosition {
   }
 };
 
-/// Levels are larger than the caches and read in pieces of rows, which the CPU does not foresee.
-constexpr int kRowsAhead = 8;
-
 /// What the pixels in columns [first, first + count) of row `i` from the centre add, into the samples from `n` on.
 HWY_INLINE void sampleRow(const FloatPlane& level, const Square& square, int i, int first, int count,
                           const GaussianWindow& window, int n, SiftDescriber::Samples& samples) {
   const Floats d;
   const float row = static_cast<float>(i);
-  const float cosine_per_px = square.cosine / square.cell_px;
-  const float sine_per_px = square.sine / square.cell_px;
   const V row_weight = hn::Set(d, window.centre()[i]);
   const float* pixels = level.row(square.row + i) + square.column;
   const auto stride = static_cast<std::ptrdiff_t>(level.stride());
@@ -95,8 +90,9 @@ HWY_INLINE void sampleRow(const FloatPlane& level, const Square& square, int i, 
     const V turns = hn::Sub(gradient.turns, hn::Set(d, square.turns));
     const V direction = hn::Mul(hn::Sub(turns, hn::Floor(turns)), hn::Set(d, kDirections));
     const V column = hn::Add(hn::Iota(d, 0.0F), hn::Set(d, static_cast<float>(first)));
-    const CellPosition across(hn::MulAdd(column, hn::Set(d, cosine_per_px), hn::Set(d, -row * sine_per_px)));
-    const CellPosition down(hn::MulAdd(column, hn::Set(d, sine_per_px), hn::Set(d, row * cosine_per_px)));
+    const CellPosition across(
+        hn::MulAdd(column, hn::Set(d, square.cosine_per_px), hn::Set(d, -row * square.sine_per_px)));
+    const CellPosition down(hn::MulAdd(column, hn::Set(d, square.sine_per_px), hn::Set(d, row * square.cosine_per_px)));
     const V cell = hn::MulAdd(down.cell, hn::Set(d, kPadded), across.cell);
     const V lower = hn::Mul(weight, down.share);
     const V upper = hn::Sub(weight, lower);
@@ -187,6 +183,8 @@ Square squareOf(const SiftPoint& point) {
   const float cell_px = kCellSigmas * point.sigma_px;
   return {std::cos(turn_deg * kDegree),
           std::sin(turn_deg * kDegree),
+          std::cos(turn_deg * kDegree) / cell_px,
+          std::sin(turn_deg * kDegree) / cell_px,
           cell_px,
           0.5F * (kCells + 1) * cell_px * kInside,
           turn_deg / 360.0F,
@@ -201,13 +199,14 @@ void collect(const FloatPlane& level, const Square& square, int radius, SiftDesc
   const auto left = static_cast<float>(std::max(-radius, 1 - square.column));
   const auto right = static_cast<float>(std::min(radius, level.width() - 2 - square.column));
   const int bottom = std::min(radius, level.height() - 2 - square.row);
+  const Sides sides(square.cosine, square.reach_px);
+  const Sides ends(square.sine, square.reach_px);
   int samples = 0;
   for (int i = std::max(-radius, 1 - square.row); i <= bottom; ++i) {
-    Span span{left, right};
-    span.restrictTo(square.cosine, -static_cast<float>(i) * square.sine, square.reach_px);
-    span.restrictTo(square.sine, static_cast<float>(i) * square.cosine, square.reach_px);
-    int first = static_cast<int>(std::ceil(span.first));
-    const int end = static_cast<int>(std::floor(span.last)) + 1;
+    const float across = -static_cast<float>(i) * square.sine;
+    const float down = static_cast<float>(i) * square.cosine;
+    int first = static_cast<int>(std::ceil(std::max({left, sides.first(across), ends.first(down)})));
+    const int end = static_cast<int>(std::floor(std::min({right, sides.last(across), ends.last(down)}))) + 1;
     while (first < end) {
       const int count = std::min(end - first, kCapacity - samples);
       sampleRow(level, square, i, first, count, work.window, samples, work.samples);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -30,6 +31,7 @@ void gradientsOfRow(const float* row, std::ptrdiff_t stride, const float* window
   const Floats d;
   const Ints ints;
   for (int i = 0; i < count; i += kLanes) {
+    hwy::Prefetch(row + i + kRowsAhead * stride);
     const auto gradient = polarGradientAt(d, row + i, stride);
     const auto weight = hn::Mul(hn::LoadU(d, window + i), hn::Set(d, row_weight));
     const auto bin = smallInteger(d, hn::Mul(gradient.turns, hn::Set(d, static_cast<float>(kBins))));
@@ -76,10 +78,14 @@ using Histogram = std::array<float, kBins>;
 
 /// Convolution with (1 4 6 4 1) / 16 around the circle.
 Histogram smoothed(const Histogram& from) {
+  std::array<float, kBins + 4> around;  // with two bins of the other end at either end
+  std::copy(from.end() - 2, from.end(), around.begin());
+  std::copy(from.begin(), from.end(), around.begin() + 2);
+  std::copy(from.begin(), from.begin() + 2, around.end() - 2);
   Histogram result;
   for (std::size_t i = 0; i < kBins; ++i) {
-    const auto at = [&](std::size_t offset) { return from[(i + kBins + offset - 2) % kBins]; };
-    result[i] = (at(0) + at(4)) * (1.0F / 16.0F) + (at(1) + at(3)) * (4.0F / 16.0F) + at(2) * (6.0F / 16.0F);
+    result[i] = (around[i] + around[i + 4]) * (1.0F / 16.0F) + (around[i + 1] + around[i + 3]) * (4.0F / 16.0F) +
+                around[i + 2] * (6.0F / 16.0F);
   }
   return result;
 }

@@ -35,7 +35,8 @@ class GaussianBlur {
   /// Rows [first_row, last_row) of `from` blurred into `to`, which has the same size. Rows of `from` up to the
   /// kernel's radius away are read; beyond its border the image is mirrored without its last pixel.
   void blurRows(const FloatPlane& from, const GaussianKernel& kernel, int first_row, int last_row, FloatPlane& to);
-  /// The same for `to` twice as wide and high as `from`; first_row must be even. Mirrored with the last pixel.
+  /// The same for `to` twice as wide and high as `from`; first_row must be a multiple of four. Mirrored with the last
+  /// pixel: nearly what OpenCV does, which repeats that pixel to double the image and mirrors the result.
   void doubleRows(const FloatPlane& from, const DoublingKernel& kernel, int first_row, int last_row, FloatPlane& to);
 
   /// Memory that is kept from call to call.
