@@ -29,7 +29,7 @@ constexpr int kCells = 4;            ///< along each side
 constexpr int kPadded = kCells + 2;  ///< with cells around, into which what lies outside is added unseen
 constexpr int kDirections = 8;
 constexpr int kHistograms = kPadded * kPadded * kDirections;
-constexpr int kCopies = 4;  ///< neighbours add to the same bins: they need not wait for each other
+constexpr int kCopies = 4;  ///< a group of neighbours adds to the same bins: none need wait for the one before
 constexpr int kElements = kCells * kCells * kDirections;
 
 /// A point's square of cells, turned, in the level's pixels.
@@ -83,13 +83,13 @@ HWY_INLINE void sampleRow(const FloatPlane& level, const Square& square, int i, 
   const V row_weight = hn::Set(d, window.centre()[i]);
   const float* pixels = level.row(square.row + i) + square.column;
   const auto stride = static_cast<std::ptrdiff_t>(level.stride());
+  V column = hn::Add(hn::Iota(d, 0.0F), hn::Set(d, static_cast<float>(first)));
   for (const int end = n + count; n < end; n += kLanes, first += kLanes) {
     hwy::Prefetch(pixels + first + kRowsAhead * stride);
     const auto gradient = polarGradientAt(d, pixels + first, stride);
     const V weight = hn::Mul(gradient.magnitude, hn::Mul(row_weight, hn::LoadU(d, window.centre() + first)));
     const V turns = hn::Sub(gradient.turns, hn::Set(d, square.turns));
     const V direction = hn::Mul(hn::Sub(turns, hn::Floor(turns)), hn::Set(d, kDirections));
-    const V column = hn::Add(hn::Iota(d, 0.0F), hn::Set(d, static_cast<float>(first)));
     const CellPosition across(
         hn::MulAdd(column, hn::Set(d, square.cosine_per_px), hn::Set(d, -row * square.sine_per_px)));
     const CellPosition down(hn::MulAdd(column, hn::Set(d, square.sine_per_px), hn::Set(d, row * square.cosine_per_px)));
@@ -104,31 +104,50 @@ HWY_INLINE void sampleRow(const FloatPlane& level, const Square& square, int i, 
     hn::StoreU(upper_right, d, samples.upper_right + n);
     hn::StoreU(hn::Sub(lower, lower_right), d, samples.lower_left + n);
     hn::StoreU(lower_right, d, samples.lower_right + n);
+    column = hn::Add(column, hn::Set(d, kLanes));
   }
+}
+
+/// Fills the samples up to whole groups of kCopies by such as add nothing.
+int padded(int count, SiftDescriber::Samples& samples) {
+  for (; count % kCopies != 0; ++count) {
+    samples.bins[count] = 0;
+    samples.directions[count] = samples.upper_left[count] = samples.upper_right[count] = 0.0F;
+    samples.lower_left[count] = samples.lower_right[count] = 0.0F;
+  }
+  return count;
 }
 
 /// Adds `count` samples to the histograms. The two directions nearest to a sample's are found for all eight at once:
 /// the weight of each falls linearly with the distance around the circle.
-void addSamples(const SiftDescriber::Samples& samples, int count, float* histograms) {
+void addSamples(int count, SiftDescriber::Samples& samples, float* histograms) {
   const hn::CappedTag<float, kDirections> d;
   constexpr int kStep = static_cast<int>(hn::MaxLanes(d));
   const auto half_circle = hn::Set(d, 0.5F * kDirections);
   const auto nearly_half = hn::Set(d, 0.5F * kDirections - 1.0F);
+  const int end = padded(count, samples);
   for (int part = 0; part < kDirections; part += kStep) {
     const auto bins = hn::Iota(d, static_cast<float>(part));
-    for (int k = 0; k < count; ++k) {
-      float* upper = histograms + k % kCopies * kHistograms + samples.bins[k] + part;
+    const auto add = [&](int k, float* copy) {
+      float* upper = copy + samples.bins[k];
       float* lower = upper + kPadded * kDirections;
       const auto distance = hn::Abs(hn::Sub(hn::Set(d, samples.directions[k]), bins));
       const auto across = hn::Abs(hn::Sub(distance, half_circle));
       const auto share = hn::Max(hn::Sub(across, nearly_half), hn::Zero(d));
-      const auto add = [&](float weight, float* at) {
+      const auto to = [&](float weight, float* at) {
         hn::Store(hn::MulAdd(share, hn::Set(d, weight), hn::Load(d, at)), d, at);
       };
-      add(samples.upper_left[k], upper);
-      add(samples.upper_right[k], upper + kDirections);
-      add(samples.lower_left[k], lower);
-      add(samples.lower_right[k], lower + kDirections);
+      to(samples.upper_left[k], upper);
+      to(samples.upper_right[k], upper + kDirections);
+      to(samples.lower_left[k], lower);
+      to(samples.lower_right[k], lower + kDirections);
+    };
+    float* copies = histograms + part;
+    for (int k = 0; k < end; k += kCopies) {
+      add(k, copies);
+      add(k + 1, copies + kHistograms);
+      add(k + 2, copies + 2 * kHistograms);
+      add(k + 3, copies + 3 * kHistograms);
     }
   }
 }
@@ -213,11 +232,11 @@ void collect(const FloatPlane& level, const Square& square, int radius, SiftDesc
       first += count;
       samples += count;
       if (samples < kCapacity) continue;
-      addSamples(work.samples, samples, histograms);
+      addSamples(samples, work.samples, histograms);
       samples = 0;
     }
   }
-  addSamples(work.samples, samples, histograms);
+  addSamples(samples, work.samples, histograms);
 }
 
 void describeImpl(const FloatPlane& level, const SiftPoint& point, SiftDescriber::Workspace& work,
