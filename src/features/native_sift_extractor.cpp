@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 #include <tuple>
-#include <utility>
 
 #include "visual_localization/features/sift_refinement.h"
 
@@ -39,21 +38,20 @@ void sortAndRemoveDuplicates(std::vector<SiftPoint>& points) {
 NativeSiftExtractor::NativeSiftExtractor(const SiftConfig& config)
     : config_(config), scale_space_(config), search_(config) {}
 
-SiftFeatures NativeSiftExtractor::extract(const cv::Mat& grey) {
+void NativeSiftExtractor::extract(const cv::Mat& grey, SiftFeatures& features) {
   requireExtractable(grey);
   scale_space_.setImage(grey);
   detect();
-  std::vector<SiftKeypoint> keypoints;
-  keypoints.reserve(points_.size());
-  std::vector<std::uint8_t> descriptors(points_.size() * SiftFeatures::kDescriptorSize);
-  std::uint8_t* descriptor = descriptors.data();
+  keypoints_.clear();
+  descriptors_.resize(points_.size() * SiftFeatures::kDescriptorSize);
+  std::uint8_t* descriptor = descriptors_.data();
   for (const SiftPoint& point : points_) {
-    keypoints.push_back(keypointOf(point));
+    keypoints_.push_back(keypointOf(point));
     const SiftOctave& octave = scale_space_.octave(static_cast<std::size_t>(point.octave));
     describer_.describe(octave.levels[static_cast<std::size_t>(point.level)], point, descriptor);
     descriptor += SiftFeatures::kDescriptorSize;
   }
-  return SiftFeatures(std::move(keypoints), std::move(descriptors));
+  features.swapIn(keypoints_, descriptors_);
 }
 
 void NativeSiftExtractor::detect() {

@@ -21,7 +21,8 @@ class OpenCvSiftExtractor : public SiftExtractor {
 
   const char* backend() const override { return kOpenCvSift; }
 
-  SiftFeatures extract(const cv::Mat& grey) override {
+  using SiftExtractor::extract;
+  void extract(const cv::Mat& grey, SiftFeatures& features) override {
     requireExtractable(grey);
     sift_->detectAndCompute(grey, cv::noArray(), found_, descriptors_);
     std::vector<SiftKeypoint> keypoints;
@@ -29,7 +30,7 @@ class OpenCvSiftExtractor : public SiftExtractor {
     for (const auto& point : found_) keypoints.push_back({point.pt.x, point.pt.y, point.size, point.angle});
     std::vector<std::uint8_t> bytes;
     if (!found_.empty()) bytes.assign(descriptors_.datastart, descriptors_.dataend);
-    return SiftFeatures(std::move(keypoints), std::move(bytes));
+    features.swapIn(keypoints, bytes);
   }
 
  private:

@@ -19,7 +19,9 @@ class NativeSiftExtractor : public SiftExtractor {
  public:
   explicit NativeSiftExtractor(const SiftConfig& config);
 
-  SiftFeatures extract(const cv::Mat& grey) override;
+  using SiftExtractor::extract;
+  /// Allocates nothing once it has seen the largest image and the most features.
+  void extract(const cv::Mat& grey, SiftFeatures& features) override;
   const char* backend() const override { return kNativeSift; }
 
  private:
@@ -35,6 +37,8 @@ class NativeSiftExtractor : public SiftExtractor {
   std::vector<SiftExtremum> extrema_;
   std::vector<SiftPoint> points_;
   std::vector<float> responses_;
+  std::vector<SiftKeypoint> keypoints_;    ///< next features, or what is left of those before
+  std::vector<std::uint8_t> descriptors_;  ///< theirs
 };
 
 }  // namespace visual_localization

@@ -39,7 +39,13 @@ class SiftExtractor {
  public:
   virtual ~SiftExtractor() = default;
   /// Throws like requireExtractable.
-  virtual SiftFeatures extract(const cv::Mat& grey) = 0;
+  SiftFeatures extract(const cv::Mat& grey) {
+    SiftFeatures features;
+    extract(grey, features);
+    return features;
+  }
+  /// The same into `features`, whose memory is used again.
+  virtual void extract(const cv::Mat& grey, SiftFeatures& features) = 0;
   /// Which of siftBackends() this is.
   virtual const char* backend() const = 0;
 };

@@ -23,6 +23,10 @@ class SiftFeatures {
   /// `descriptors` holds keypoints.size() x 128 bytes, row by row; throws std::invalid_argument otherwise.
   SiftFeatures(std::vector<SiftKeypoint> keypoints, std::vector<std::uint8_t> descriptors);
 
+  /// Takes these instead of its own, which are left in their place: whoever makes features again and again uses the
+  /// same memory. Throws like the constructor, and then nothing has changed.
+  void swapIn(std::vector<SiftKeypoint>& keypoints, std::vector<std::uint8_t>& descriptors);
+
   std::size_t size() const { return keypoints_.size(); }
   bool empty() const { return keypoints_.empty(); }
   const std::vector<SiftKeypoint>& keypoints() const { return keypoints_; }
