@@ -20,7 +20,7 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Floats = hn::CappedTag<float, 8>;
+using Floats = hn::CappedTag<float, CacheLine::kFloats>;
 using Ints = hn::RebindToSigned<Floats>;
 using V = hn::Vec<Floats>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Floats()));

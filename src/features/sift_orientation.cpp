@@ -20,7 +20,7 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Floats = hn::CappedTag<float, 8>;
+using Floats = hn::CappedTag<float, 8>;  // a row is some 20 pixels long: wider vectors would be half empty
 using Ints = hn::RebindToSigned<Floats>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Floats()));
 constexpr int kBins = SiftOrientations::kBins;
