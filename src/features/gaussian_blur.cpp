@@ -25,15 +25,15 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(Floats()));
 
 /// Symmetric convolution of a line of inputs (a column of pixels, or a row of columns) into four neighbouring results.
 /// `at(i)` loads input i; result j has its centre at input radius + j. Inputs at equal distance are added first, so
-/// there is one multiplication for the two, and the results share their inputs: two loads a weight. `kFixed`: the
+/// there is one multiplication for the two, and the results share their inputs: two loads a weight. `Fixed`: the
 /// radius if it is known when compiling, so that all weights are unrolled; otherwise 0.
-template <int kFixed>
+template <int Fixed>
 struct Symmetric {
   static constexpr int kInputs = 4;  ///< from one four of results to the next
   const float* weights;
   int any_radius;
 
-  HWY_INLINE int radius() const { return kFixed > 0 ? kFixed : any_radius; }
+  HWY_INLINE int radius() const { return Fixed > 0 ? Fixed : any_radius; }
 
   template <class At>
   HWY_INLINE void four(const At& at, V& s0, V& s1, V& s2, V& s3) const {
@@ -41,8 +41,8 @@ struct Symmetric {
     s0 = s1 = s2 = s3 = hn::Zero(Floats());
     const V a0 = at(0), a1 = at(1), a2 = at(2), a3 = at(3);
     const V b0 = at(2 * r), b1 = at(2 * r + 1), b2 = at(2 * r + 2), b3 = at(2 * r + 3);
-    if constexpr (kFixed > 0) {
-      unrolled<kFixed>(at, a0, a1, a2, a3, b0, b1, b2, b3, s0, s1, s2, s3);
+    if constexpr (Fixed > 0) {
+      unrolled<Fixed>(at, a0, a1, a2, a3, b0, b1, b2, b3, s0, s1, s2, s3);
     } else {
       looped(at, a0, a1, a2, a3, b0, b1, b2, b3, s0, s1, s2, s3);
     }
@@ -57,13 +57,14 @@ struct Symmetric {
     s3 = hn::MulAdd(weight, i3, s3);
   }
 
-  /// The inputs at distance k below (a) and above (b) the four centres, then those nearer.
-  template <int k, class At>
+  /// The inputs at a distance below (a) and above (b) the four centres, then those nearer.
+  template <int Distance, class At>
   HWY_INLINE void unrolled(const At& at, V a0, V a1, V a2, V a3, V b0, V b1, V b2, V b3, V& s0, V& s1, V& s2,
                            V& s3) const {
-    if constexpr (k > 0) {
-      add(k, hn::Add(a0, b0), hn::Add(a1, b1), hn::Add(a2, b2), hn::Add(a3, b3), s0, s1, s2, s3);
-      unrolled<k - 1>(at, a1, a2, a3, at(kFixed - k + 4), at(kFixed + k - 1), b0, b1, b2, s0, s1, s2, s3);
+    if constexpr (Distance > 0) {
+      add(Distance, hn::Add(a0, b0), hn::Add(a1, b1), hn::Add(a2, b2), hn::Add(a3, b3), s0, s1, s2, s3);
+      unrolled<Distance - 1>(at, a1, a2, a3, at(Fixed - Distance + 4), at(Fixed + Distance - 1), b0, b1, b2, s0, s1, s2,
+                             s3);
     } else {
       add(0, a0, a1, a2, a3, s0, s1, s2, s3);
     }
@@ -133,19 +134,25 @@ HWY_INLINE void turned(const Four& four, const Use& use) {
 #endif
 }
 
+/// Column `i` of a turned strip.
+template <class Float>
+HWY_INLINE Float* columnAt(Float* columns, int i) {
+  return columns + static_cast<std::ptrdiff_t>(i) * kStrip;
+}
+
 /// A strip of kStrip rows, convolved along its columns, into work.columns from column `radius` on, where each column
 /// is kStrip floats.
 template <class Filter>
 void alongColumns(const Filter& filter, int width, GaussianBlur::Workspace& work) {
   const Floats d;
-  float* to = work.columns.data() + filter.radius() * kStrip;
+  float* to = columnAt(work.columns.data(), filter.radius());
   for (int x = 0; x < width; x += kLanes) {
     turned(
         [&](int group, V& s0, V& s1, V& s2, V& s3) {
           const float* const* rows = work.rows.data() + Filter::kInputs * group;
           filter.four([&](int i) { return hn::Load(d, rows[i] + x); }, s0, s1, s2, s3);
         },
-        [&](int i, V column) { hn::Store(column, d, to + x * kStrip + i * kLanes); });
+        [&](int i, V column) { hn::Store(column, d, columnAt(to, x) + static_cast<std::ptrdiff_t>(i) * kLanes); });
   }
 }
 
@@ -158,17 +165,17 @@ void alongRows(const Filter& filter, const GaussianBlur::Workspace& work, int fi
     float* out = to.row(first_row) + x;
 #if HWY_TARGET == HWY_SCALAR
     for (int row = 0; row < kStrip; ++row) {
-      const float* columns = work.columns.data() + x / 4 * Filter::kInputs * kStrip + row;
+      const float* columns = columnAt(work.columns.data(), x / 4 * Filter::kInputs) + row;
       V s0, s1, s2, s3;
-      filter.four([&](int i) { return hn::Load(d, columns + i * kStrip); }, s0, s1, s2, s3);
+      filter.four([&](int i) { return hn::Load(d, columnAt(columns, i)); }, s0, s1, s2, s3);
       float* at = out + static_cast<std::size_t>(row) * stride;
       hn::Store(s0, d, at), hn::Store(s1, d, at + 1), hn::Store(s2, d, at + 2), hn::Store(s3, d, at + 3);
     }
 #else
     turned(
         [&](int group, V& s0, V& s1, V& s2, V& s3) {
-          const float* columns = work.columns.data() + (x / 4 + group) * Filter::kInputs * kLanes;
-          filter.four([&](int i) { return hn::Load(d, columns + i * kLanes); }, s0, s1, s2, s3);
+          const float* columns = columnAt(work.columns.data(), (x / 4 + group) * Filter::kInputs);
+          filter.four([&](int i) { return hn::Load(d, columnAt(columns, i)); }, s0, s1, s2, s3);
         },
         [&](int i, V row) { hn::Store(row, d, out + static_cast<std::size_t>(i) * stride); });
 #endif
@@ -177,10 +184,8 @@ void alongRows(const Filter& filter, const GaussianBlur::Workspace& work, int fi
 
 /// Continues the columns at both ends.
 void mirrorColumns(int width, int radius, Mirror mirror, float* columns) {
-  float* first = columns + radius * kStrip;
-  const auto copy = [first](int from, int to) {
-    for (int i = 0; i < kStrip; ++i) first[to * kStrip + i] = first[from * kStrip + i];
-  };
+  float* first = columnAt(columns, radius);
+  const auto copy = [first](int from, int to) { std::copy_n(columnAt(first, from), kStrip, columnAt(first, to)); };
   for (int i = 1; i <= radius; ++i) {
     copy(mirrored(-i, width, mirror), -i);
     copy(mirrored(width - 1 + i, width, mirror), width - 1 + i);
@@ -193,7 +198,7 @@ void convolve(const Filter& filter, const FloatPlane& from, Mirror mirror, int f
               GaussianBlur::Workspace& work, FloatPlane& to) {
   const int radius = filter.radius();
   const int inputs = kStrip / 4 * Filter::kInputs + 2 * radius + 1;
-  work.columns.reserve(static_cast<std::size_t>((from.width() + 2 * kLanes + 2 * radius + 4) * kStrip));
+  work.columns.reserve(static_cast<std::size_t>(from.width() + 2 * kLanes + 2 * radius + 4) * kStrip);
   if (work.rows.size() < static_cast<std::size_t>(inputs)) work.rows.resize(static_cast<std::size_t>(inputs));
   for (int first = first_row; first < last_row; first += kStrip) {
     for (int i = 0; i < inputs; ++i) {
@@ -261,15 +266,16 @@ GaussianKernel::GaussianKernel(double sigma_px) {
 DoublingKernel::DoublingKernel(double sigma_px) {
   const GaussianKernel blur(sigma_px);
   const int radius = blur.radius() / 2 + 1;
-  std::vector<double> exact(static_cast<std::size_t>(2 * radius + 1), 0.0);
+  std::vector<double> exact(2 * static_cast<std::size_t>(radius) + 1, 0.0);
+  double* middle = exact.data() + radius;
   // The doubled image's even pixel 2 i lies a quarter of a pixel before pixel i, the odd one 2 i + 1 as far behind it.
   constexpr double kNear = 0.75;
   for (int k = -blur.radius(); k <= blur.radius(); ++k) {
     const int nearer = k >= 0 ? k / 2 : -((1 - k) / 2);
     const int other = nearer + (k % 2 == 0 ? -1 : 1);
     const double weight = blur.weights[static_cast<std::size_t>(std::abs(k))];
-    exact[static_cast<std::size_t>(radius + nearer)] += kNear * weight;
-    exact[static_cast<std::size_t>(radius + other)] += (1.0 - kNear) * weight;
+    middle[nearer] += kNear * weight;
+    middle[other] += (1.0 - kNear) * weight;
   }
   for (const double weight : exact) weights.push_back(static_cast<float>(weight));
 }

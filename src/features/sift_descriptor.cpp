@@ -28,7 +28,8 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(Floats()));
 constexpr int kCells = 4;            ///< along each side
 constexpr int kPadded = kCells + 2;  ///< with cells around, into which what lies outside is added unseen
 constexpr int kDirections = 8;
-constexpr int kHistograms = kPadded * kPadded * kDirections;
+constexpr std::ptrdiff_t kRow = std::ptrdiff_t{kPadded} * kDirections;  ///< floats of a row of cells
+constexpr std::ptrdiff_t kHistograms = kPadded * kRow;                  ///< floats of all cells
 constexpr int kCopies = 4;  ///< a group of neighbours adds to the same bins: none need wait for the one before
 constexpr int kElements = kCells * kCells * kDirections;
 
@@ -130,7 +131,7 @@ void addSamples(int count, SiftDescriber::Samples& samples, float* histograms) {
     const auto bins = hn::Iota(d, static_cast<float>(part));
     const auto add = [&](int k, float* copy) {
       float* upper = copy + samples.bins[k];
-      float* lower = upper + kPadded * kDirections;
+      float* lower = upper + kRow;
       const auto distance = hn::Abs(hn::Sub(hn::Set(d, samples.directions[k]), bins));
       const auto across = hn::Abs(hn::Sub(distance, half_circle));
       const auto share = hn::Max(hn::Sub(across, nearly_half), hn::Zero(d));
@@ -157,12 +158,13 @@ void gather(const float* histograms, float* elements) {
   const hn::CappedTag<float, kDirections> d;
   constexpr int kStep = static_cast<int>(hn::MaxLanes(d));
   for (int r = 0; r < kCells; ++r) {
-    const float* row = histograms + ((r + 1) * kPadded + 1) * kDirections;
+    const float* row = histograms + (r + 1) * kRow + kDirections;
     for (int i = 0; i < kCells * kDirections; i += kStep) {
       auto sum = hn::Load(d, row + i);
       for (int copy = 1; copy < kCopies; ++copy) sum = hn::Add(sum, hn::Load(d, row + copy * kHistograms + i));
-      hn::Store(sum, d, elements + r * kCells * kDirections + i);
+      hn::Store(sum, d, elements + i);
     }
+    elements += std::ptrdiff_t{kCells} * kDirections;
   }
 }
 

@@ -2,18 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace visual_localization {
 namespace {
 
-constexpr double kCameraBlur_px = 0.5;  ///< Lowe 2004, section 3.3: what an image is assumed to have
+constexpr double kCameraBlurPx = 0.5;  ///< Lowe 2004, section 3.3: what an image is assumed to have
 
 /// Blur from one level to the next: variances add up.
 double stepSigma(double from_px, double to_px) { return std::sqrt(to_px * to_px - from_px * from_px); }
 
 DoublingKernel firstKernel(const SiftConfig& config) {
   constexpr double kLeastVariance = 0.01;
-  const double doubled_px = 2.0 * kCameraBlur_px;
+  const double doubled_px = 2.0 * kCameraBlurPx;
   const double variance = config.sigma_px * config.sigma_px - doubled_px * doubled_px;
   return DoublingKernel(std::sqrt(std::max(variance, kLeastVariance)));
 }
@@ -33,7 +34,7 @@ void halve(const FloatPlane& from, FloatPlane& to) {
   for (int y = 0; y < to.height(); ++y) {
     const float* in = from.row(2 * y);
     float* out = to.row(y);
-    for (int x = 0; x < to.width(); ++x) out[x] = in[2 * x];
+    for (int x = 0; x < to.width(); ++x) out[x] = in[2 * static_cast<std::ptrdiff_t>(x)];
   }
 }
 

@@ -14,7 +14,7 @@
 namespace visual_localization {
 namespace {
 
-constexpr float kQuarter_px = 0.25F;  ///< OpenCV 4.6's keypoints lie so far to the right of and below the thing
+constexpr float kQuarterPx = 0.25F;  ///< OpenCV 4.6's keypoints lie so far to the right of and below the thing
 
 /// A bright or dark spot on a slope, which if steep gives it one orientation.
 cv::Mat spot(int width, int height, double x, double y, double sigma_px, double contrast, double slope_y = 0.0) {
@@ -65,8 +65,8 @@ TEST(NativeSift, ASpotIsFoundOnceAtItsPlaceAndSize) {
         EXPECT_NEAR(other.x_px, keypoint.x_px, 0.05F);
         EXPECT_NEAR(other.size_px, keypoint.size_px, 0.05F);
       }
-      EXPECT_NEAR(keypoint.x_px, 70.2F + kQuarter_px, 0.1F);
-      EXPECT_NEAR(keypoint.y_px, 60.6F + kQuarter_px, 0.1F);
+      EXPECT_NEAR(keypoint.x_px, 70.2F + kQuarterPx, 0.1F);
+      EXPECT_NEAR(keypoint.y_px, 60.6F + kQuarterPx, 0.1F);
       // A difference of Gaussians of ratio k is extreme at 1 / sqrt(k) of the spot; the camera is given half a pixel.
       const double expected_px = 2.0 * std::sqrt(sigma_px * sigma_px - 0.25) / std::exp2(1.0 / 6.0);
       EXPECT_NEAR(keypoint.size_px, expected_px, 0.06 * expected_px);
@@ -95,7 +95,7 @@ TEST(NativeSift, ATurnedImageShowsTheSameFeaturesTurned) {
   const SiftFeatures before = all.subset(first_octave);
   const SiftFeatures after = extract(turned);
   const double share = shareFound(before, after, [](SiftKeypoint keypoint) {
-    return SiftKeypoint{240.0F - 1.0F + 2.0F * kQuarter_px - keypoint.y_px, keypoint.x_px, keypoint.size_px,
+    return SiftKeypoint{240.0F - 1.0F + 2.0F * kQuarterPx - keypoint.y_px, keypoint.x_px, keypoint.size_px,
                         std::fmod(keypoint.angle_deg + 90.0F, 360.0F)};
   });
   ASSERT_GT(before.size(), 40U);

@@ -43,7 +43,7 @@ class SiftExtremaSearch {
       return columns / CacheLine::kFloats * CacheLine::kFloats + 2 * kMargin;
     }
     float* row(int level, int y) {
-      const auto slot = static_cast<std::size_t>(level * kRows + y % kRows);
+      const auto slot = static_cast<std::size_t>(level) * kRows + static_cast<std::size_t>(y % kRows);
       return differences.data() + slot * stride() + kMargin;
     }
   };
