@@ -1,7 +1,10 @@
 #include "visual_localization/localizer/state_assessor.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
+
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 
@@ -41,7 +44,8 @@ void StateConfig::declare(ParameterVisitor& visitor) {
 
 std::vector<std::string> StateConfig::violations() const {
   if (images_to_confirm <= window) return {};
-  return {"parameter 'state/images_to_confirm' must not exceed 'state/window'"};
+  return {parameters::exceeds("state/images_to_confirm", std::int64_t{images_to_confirm}, "'state/window'",
+                              std::int64_t{window})};
 }
 
 void StateAssessor::reset() { *this = StateAssessor(config_); }

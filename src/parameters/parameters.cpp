@@ -232,4 +232,10 @@ std::string toString(const ParameterValue& value) {
   return std::get<std::string>(value);
 }
 
+std::string exceeds(const std::string& name, const ParameterValue& value, const std::string& limit_name,
+                    const ParameterValue& limit) {
+  return "parameter '" + name + "' = " + toString(value) + " is not allowed: must not exceed " + limit_name + " = " +
+         toString(limit);
+}
+
 }  // namespace visual_localization::parameters

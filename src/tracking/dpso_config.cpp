@@ -1,5 +1,7 @@
 #include "visual_localization/tracking/dpso_config.h"
 
+#include "visual_localization/parameters/parameters.h"
+
 namespace visual_localization {
 
 void DpsoConfig::declare(ParameterVisitor& visitor) {
@@ -37,14 +39,17 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
 
 std::vector<std::string> DpsoConfig::violations() const {
   std::vector<std::string> wrong;
-  if (v0_min > v0) wrong.emplace_back("parameter 'dpso/v0_min' must not exceed 'dpso/v0'");
-  if (v0 > v0_max) wrong.emplace_back("parameter 'dpso/v0' must not exceed 'dpso/v0_max'");
-  if (quantum_share > quantum_share_max) {
-    wrong.emplace_back("parameter 'dpso/quantum_share' must not exceed 'dpso/quantum_share_max'");
-  }
-  if (phi2_min > phi2) wrong.emplace_back("parameter 'dpso/phi2_min' must not exceed 'dpso/phi2'");
+  const auto require = [&wrong](const std::string& name, double value, const std::string& limit_name, double limit) {
+    if (value > limit) wrong.push_back(parameters::exceeds(name, value, limit_name, limit));
+  };
+  require("dpso/v0_min", v0_min, "'dpso/v0'", v0);
+  require("dpso/v0", v0, "'dpso/v0_max'", v0_max);
+  require("dpso/quantum_share", quantum_share, "'dpso/quantum_share_max'", quantum_share_max);
+  require("dpso/phi2_min", phi2_min, "'dpso/phi2'", phi2);
+  // Not by the difference: 1 - 0.9 is less than 0.1.
   if (quantum_share_max + high_energy_share > 1.0) {
-    wrong.emplace_back("'dpso/quantum_share_max' + 'dpso/high_energy_share' must not exceed 1");
+    wrong.push_back(parameters::exceeds("dpso/quantum_share_max", quantum_share_max, "1 - 'dpso/high_energy_share'",
+                                        1.0 - high_energy_share));
   }
   return wrong;
 }

@@ -143,6 +143,14 @@ TEST(StateAssessor, ACoveredCameraIsNotOffTheMap) {
   EXPECT_EQ(state, LocalizationState::kUncertain);
 }
 
+TEST(StateAssessor, AnImpossibleWindowIsNamedWithBothValues) {
+  StateConfig config;
+  config.window = 3;
+  ASSERT_EQ(config.violations().size(), 1U);
+  EXPECT_EQ(config.violations().front(),
+            "parameter 'state/images_to_confirm' = 4 is not allowed: must not exceed 'state/window' = 3");
+}
+
 TEST(StateAssessor, NamesOfTheStates) {
   EXPECT_EQ(toString(LocalizationState::kOffMap), "OFF_MAP");
   EXPECT_EQ(toString(LocalizationState::kNoMap), "NO_MAP");

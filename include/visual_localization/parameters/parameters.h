@@ -52,6 +52,10 @@ ParameterValue parseScalar(const std::string& text);
 /// The value as a user would type it.
 std::string toString(const ParameterValue& value);
 
+/// In words, that one parameter exceeds another one that it must not exceed: both names, both values.
+std::string exceeds(const std::string& name, const ParameterValue& value, const std::string& limit_name,
+                    const ParameterValue& limit);
+
 }  // namespace parameters
 
 /// Sets the named fields of `config`; strong guarantee, see parameters::assign. Constraints that span fields
