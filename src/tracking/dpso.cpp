@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "visual_localization/tracking/cloud.h"
+#include "visual_localization/tracking/tracker_factory.h"
 
 namespace visual_localization {
 namespace {
@@ -64,6 +66,17 @@ void Dpso::reset(const Prior& prior) {
     particle.weight = 1.0 / static_cast<double>(particles_.size());
     confine(particle, area_);
   }
+  assignKinds();
+}
+
+void Dpso::configure(const TrackerConfig& config) {
+  const DpsoConfig before = std::exchange(config_, config.dpso);
+  fitness_config_ = config.fitness;
+  if (config_.v0 != before.v0) tuning_.v0 = config_.v0;
+  if (config_.quantum_share != before.quantum_share) tuning_.quantum_share = config_.quantum_share;
+  if (config_.phi2 != before.phi2) tuning_.phi2 = config_.phi2;
+  tuning_.v0 = std::clamp(tuning_.v0, config_.v0_min, config_.v0_max);
+  if (config_.recovery == "none" && tuning_.recovering) endRecovery();
   assignKinds();
 }
 
@@ -197,18 +210,19 @@ void Dpso::adaptDiversity(const Score& best) {
   if (!bad) position_unknown_ = false;
   if (config_.recovery == "none") return;
   bad_images_ = bad ? bad_images_ + 1 : 0;
-  if (!bad && tuning_.recovering) {
-    tuning_.v0 = config_.v0;
-    tuning_.quantum_share = config_.quantum_share;
-    tuning_.phi2 = config_.phi2;
-    speed_known_ = false;
-  }
+  if (!bad && tuning_.recovering) endRecovery();
   tuning_.recovering = bad_images_ >= config_.recovery_patience;
   if (!tuning_.recovering) return;
   tuning_.v0 = approach(tuning_.v0, config_.v0_max, config_.v0, config_.recovery_step);
   tuning_.quantum_share =
       approach(tuning_.quantum_share, config_.quantum_share_max, config_.quantum_share, config_.recovery_step);
   tuning_.phi2 = approach(tuning_.phi2, config_.phi2_min, config_.phi2, config_.recovery_step);
+}
+
+void Dpso::endRecovery() {
+  tuning_ = {config_.v0, tuning_.speed_ema, config_.quantum_share, config_.phi2, false};
+  speed_known_ = false;
+  bad_images_ = 0;
 }
 
 }  // namespace visual_localization

@@ -18,6 +18,12 @@ FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& co
       first_(features == "global" ? FeatureKind::kGlobal : FeatureKind::kSift),
       next_(first_) {}
 
+void FeatureChoice::configure(const std::string& features, const HybridConfig& config) {
+  FeatureChoice changed(features, config);
+  if (changed.hybrid_ == hybrid_ && changed.first_ == first_) changed.next_ = next_;
+  *this = changed;
+}
+
 void FeatureChoice::reset() { next_ = first_; }
 
 void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool doubtful) {

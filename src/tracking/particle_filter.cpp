@@ -7,6 +7,7 @@
 
 #include "visual_localization/geo/angles.h"
 #include "visual_localization/tracking/cloud.h"
+#include "visual_localization/tracking/tracker_factory.h"
 
 namespace visual_localization {
 
@@ -61,6 +62,12 @@ void ParticleFilter::reset(const Prior& prior) {
     motion_->start(particle, random_);
   }
   seen_an_image_ = false;
+}
+
+void ParticleFilter::configure(const TrackerConfig& config) {
+  config_ = config.pf;
+  fitness_config_ = config.fitness;
+  motion_ = makeMotionModel(config.tracker, config.pf, map_);
 }
 
 TrackerEstimate ParticleFilter::update(const TrackerInput& input) {

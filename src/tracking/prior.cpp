@@ -1,7 +1,9 @@
 #include "visual_localization/tracking/prior.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -46,6 +48,22 @@ Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& 
   const Eigen::Matrix2d root = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   return [mean_m, root](Random& random) {
     return Eigen::Vector2d(mean_m + root * random.normal(Eigen::Vector2d(1.0, 1.0)));
+  };
+}
+
+Prior drawnFrom(std::vector<Particle> cloud) {
+  if (cloud.empty()) throw std::invalid_argument("a cloud without particles is no prior");
+  std::vector<double> cumulated;
+  double total = 0.0;
+  for (const Particle& particle : cloud) cumulated.push_back(total += particle.weight);
+  return [cloud = std::move(cloud), cumulated = std::move(cumulated)](Random& random) {
+    const double sum = cumulated.back();
+    const bool by_weight = random.uniform(0.0, 1.0) < 0.5 && sum > 0.0;
+    const double target = random.uniform(0.0, by_weight ? sum : static_cast<double>(cloud.size()));
+    const auto found = std::upper_bound(cumulated.begin(), cumulated.end(), target);
+    const auto index =
+        by_weight ? static_cast<std::size_t>(found - cumulated.begin()) : static_cast<std::size_t>(target);
+    return cloud[std::min(index, cloud.size() - 1)].position_m;
   };
 }
 

@@ -99,5 +99,19 @@ TEST(FeatureChoice, ResetBeginsWithSiftAgain) {
   EXPECT_EQ(after(choice, 1.0, 1.0), kGlobal);
 }
 
+TEST(FeatureChoice, OtherThresholdsKeepTheChoiceOtherFeaturesDoNot) {
+  FeatureChoice choice = hybridAt(kGlobal);
+  HybridConfig wider;
+  wider.global_above_m = 20.0;
+  choice.configure("hybrid", wider);
+  EXPECT_EQ(choice.next(), kGlobal);
+  EXPECT_EQ(after(choice, 10.0, 10.0), kGlobal);
+  choice.configure("sift", wider);
+  EXPECT_EQ(choice.next(), kSift);
+  EXPECT_EQ(after(choice, 0.0, 0.0), kSift);
+  choice.configure("global", wider);
+  EXPECT_EQ(choice.next(), kGlobal);
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -19,6 +19,8 @@ class Dpso final : public Tracker {
 
   void reset() override;
   void reset(const Prior& prior) override;
+  /// What has adapted itself to the images stays, unless just that was changed.
+  void configure(const TrackerConfig& config) override;
   TrackerEstimate update(const TrackerInput& input) override;
   const std::vector<Particle>& particles() const override { return particles_; }
   TrackerTuning tuning() const override { return tuning_; }
@@ -32,6 +34,7 @@ class Dpso final : public Tracker {
   TrackerEstimate estimate() const;
   void adaptSpeed();
   void adaptDiversity(const Score& best);
+  void endRecovery();
   Eigen::Vector2d centreOfMass() const;
 
   const TrainingMap& map_;

@@ -29,6 +29,8 @@ class FeatureChoice {
   /// `features`: "sift", "global" or "hybrid".
   FeatureChoice(const std::string& features, const HybridConfig& config);
 
+  /// Other features or thresholds. The next image is compared as it would have been, unless the features are others.
+  void configure(const std::string& features, const HybridConfig& config);
   /// The position is unknown: the hybrid choice begins with SIFT.
   void reset();
   FeatureKind next() const { return next_; }

@@ -42,6 +42,7 @@ class ParticleFilter final : public Tracker {
 
   void reset() override { reset(anywhere_); }
   void reset(const Prior& prior) override;
+  void configure(const TrackerConfig& config) override;
   TrackerEstimate update(const TrackerInput& input) override;
   const std::vector<Particle>& particles() const override { return particles_; }
   TrackerTuning tuning() const override { return {}; }

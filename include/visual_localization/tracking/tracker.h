@@ -42,6 +42,8 @@ struct TrackerInput {
   Travel travel = {};     ///< since the last image
 };
 
+struct TrackerConfig;
+
 /// Follows the position from image to image, with or without odometry.
 class Tracker {
  public:
@@ -50,6 +52,8 @@ class Tracker {
   virtual void reset() = 0;
   /// Forgets the past; the particles of the next image are drawn from `prior`.
   virtual void reset(const Prior& prior) = 0;
+  /// Goes on with other parameters; the particles stay. Tracker and number of particles must be the ones it has.
+  virtual void configure(const TrackerConfig& config) = 0;
   /// One image: moves the particles, scores them, estimates.
   virtual TrackerEstimate update(const TrackerInput& input) = 0;
   virtual const std::vector<Particle>& particles() const = 0;
