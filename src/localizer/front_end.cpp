@@ -18,6 +18,12 @@ FrontEnd::FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size im
       max_image_gap_s_(max_image_gap_s),
       sift_extractor_(makeSiftExtractor(sift, sift_backend)) {}
 
+void FrontEnd::configure(const MatchConfig& match, bool prune, double max_image_gap_s) {
+  match_ = match;
+  prune_ = prune;
+  max_image_gap_s_ = max_image_gap_s;
+}
+
 void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   requireExtractable(grey);

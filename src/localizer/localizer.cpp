@@ -6,8 +6,7 @@
 #include "visual_localization/localizer/live_image.h"
 #include "visual_localization/localizer/stopwatch.h"
 #include "visual_localization/parameters/parameters.h"
-#include "visual_localization/tracking/dpso.h"
-#include "visual_localization/tracking/particle_filter.h"
+#include "visual_localization/tracking/tracker_factory.h"
 
 namespace visual_localization {
 namespace {
@@ -18,11 +17,8 @@ const LocalizerConfig& validated(const LocalizerConfig& config) {
   return config;
 }
 
-std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const LocalizerConfig& config) {
-  const auto seed = static_cast<std::uint32_t>(config.seed);
-  if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed);
-  return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf, map), config.pf,
-                                          config.fitness, seed);
+TrackerConfig trackerConfigOf(const LocalizerConfig& config) {
+  return {config.tracker, config.dpso, config.pf, config.fitness};
 }
 
 }  // namespace
@@ -36,7 +32,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       global_similarity_(config_.similarity),
       scores_(map_->size()),
       places_(map_->size(), static_cast<std::size_t>(config_.max_proposal_images), map_->globalsKept()),
-      tracker_(makeTracker(*map_, config_)),
+      tracker_(makeTracker(*map_, trackerConfigOf(config_), static_cast<std::uint32_t>(config_.seed))),
       choice_(config_.features, config_.hybrid),
       place_check_(*map_, static_cast<std::size_t>(config_.state.place_check_images), config_.state.max_distance_m),
       assessor_(config_.state) {}
@@ -90,6 +86,31 @@ Evidence Localizer::evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   evidence.blind =
       sift ? image.siftFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
   return evidence;
+}
+
+void Localizer::configure(const LocalizerConfig& config) {
+  const LocalizerConfig before = std::exchange(config_, LocalizerConfig(validated(config)));
+  front_end_.configure(config_.match, config_.prune, config_.max_image_gap_s);
+  sift_similarity_ = SiftSimilarity(config_.match, config_.similarity);
+  global_similarity_ = GlobalSimilarity(config_.similarity);
+  if (config_.max_proposal_images != before.max_proposal_images) {
+    places_ = PlaceProposal(map_->size(), static_cast<std::size_t>(config_.max_proposal_images), map_->globalsKept());
+  }
+  place_check_.configure(static_cast<std::size_t>(config_.state.place_check_images), config_.state.max_distance_m);
+  choice_.configure(config_.features, config_.hybrid);
+  assessor_.configure(config_.state);
+  configureTracker(before.tracker);
+}
+
+void Localizer::configureTracker(const std::string& tracker_before) {
+  const TrackerConfig config = trackerConfigOf(config_);
+  if (config.tracker == tracker_before && config.particles() == tracker_->particles().size()) {
+    tracker_->configure(config);
+    return;
+  }
+  auto successor = makeTracker(*map_, config, static_cast<std::uint32_t>(config_.seed));
+  successor->reset(drawnFrom(tracker_->particles()));
+  tracker_ = std::move(successor);
 }
 
 void Localizer::relocalize() {

@@ -4,11 +4,15 @@
 
 namespace visual_localization {
 
-PlaceCheck::PlaceCheck(const TrainingMap& map, std::size_t max_images, double near_m)
-    : map_(map),
-      near_m_(near_m),
-      stride_((map.size() + max_images - 1) / max_images),
-      rounds_(std::clamp<std::size_t>(map.globalsKept() / ((map.size() + stride_ - 1) / stride_), 1, stride_)) {}
+PlaceCheck::PlaceCheck(const TrainingMap& map, std::size_t max_images, double near_m) : map_(map) {
+  configure(max_images, near_m);
+}
+
+void PlaceCheck::configure(std::size_t max_images, double near_m) {
+  near_m_ = near_m;
+  stride_ = (map_.size() + max_images - 1) / max_images;
+  rounds_ = std::clamp<std::size_t>(map_.globalsKept() / ((map_.size() + stride_ - 1) / stride_), 1, stride_);
+}
 
 double PlaceCheck::ratio(ComparableImage& image, const Eigen::Vector2d& position_m) {
   constexpr std::size_t kNeighbours = 32;  // in a denser map the nearest ones speak for the others

@@ -48,6 +48,11 @@ std::vector<std::string> StateConfig::violations() const {
                               std::int64_t{window})};
 }
 
+void StateAssessor::configure(const StateConfig& config) {
+  if (config.course_length != config_.course_length) course_ = Course(static_cast<std::size_t>(config.course_length));
+  config_ = config;
+}
+
 void StateAssessor::reset() { *this = StateAssessor(config_); }
 
 LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, const Evidence& evidence) {
@@ -73,8 +78,8 @@ void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& ev
   confirmations_.push_back(confirms(estimate, evidence.features));
   place_ratios_.push_back(evidence.place_ratio);
   const auto window = static_cast<std::size_t>(config_.window);
-  if (confirmations_.size() > window) confirmations_.pop_front();
-  if (place_ratios_.size() > window) place_ratios_.pop_front();
+  while (confirmations_.size() > window) confirmations_.pop_front();
+  while (place_ratios_.size() > window) place_ratios_.pop_front();
 }
 
 bool StateAssessor::isCertain() const {

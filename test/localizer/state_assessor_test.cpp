@@ -143,6 +143,21 @@ TEST(StateAssessor, ACoveredCameraIsNotOffTheMap) {
   EXPECT_EQ(state, LocalizationState::kUncertain);
 }
 
+TEST(StateAssessor, OtherThresholdsKeepWhatTheLastImagesSaid) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  StateConfig stricter;
+  stricter.window = 2;
+  stricter.images_to_confirm = 2;
+  stricter.min_similarity = 0.9;
+  assessor.configure(stricter);
+  EXPECT_EQ(assessor.assess(kGood, sift()), LocalizationState::kUncertain);
+  stricter.min_similarity = StateConfig().min_similarity;
+  assessor.configure(stricter);
+  assessor.assess(kGood, sift());
+  EXPECT_EQ(assessor.assess(kGood, sift()), LocalizationState::kTracking);
+}
+
 TEST(StateAssessor, AnImpossibleWindowIsNamedWithBothValues) {
   StateConfig config;
   config.window = 3;

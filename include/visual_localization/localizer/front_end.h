@@ -23,6 +23,8 @@ class FrontEnd {
   FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s,
            const std::string& sift_backend = kNativeSift);
 
+  /// Holds from the next image on.
+  void configure(const MatchConfig& match, bool prune, double max_image_gap_s);
   /// The next image. `grey`: 8-bit, one channel, any size of at least 16 x 16; throws std::invalid_argument otherwise,
   /// and then nothing has changed.
   void setImage(std::int64_t stamp_ns, const cv::Mat& grey);

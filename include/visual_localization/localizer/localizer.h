@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -35,6 +36,10 @@ class Localizer {
   /// The same for an image that knows by itself how to compare: its times and counts of features stay zero.
   Estimate process(std::int64_t stamp_ns, ComparableImage& image);
 
+  /// Goes on with other parameters from the next image on, without losing the track: another tracker, or another number
+  /// of particles, begins with particles drawn from the present ones; the rest keeps all it knows. The seed holds for
+  /// trackers that are made from now on. Throws ParameterError when `config` is invalid, and then nothing has changed.
+  void configure(const LocalizerConfig& config);
   /// The position is unknown: anywhere in the map.
   void relocalize();
   /// The position is unknown within a prior (see prior.h).
@@ -46,6 +51,7 @@ class Localizer {
   SiftFeatures lastSift() const { return front_end_.siftIfExtracted().value_or(SiftFeatures()); }
 
  private:
+  void configureTracker(const std::string& tracker_before);
   Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
                       ComparableImage& image);
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state) const;

@@ -18,15 +18,17 @@ class PlaceCheck {
   /// with more of them than can be kept in memory.
   PlaceCheck(const TrainingMap& map, std::size_t max_images, double near_m);
 
+  /// Other numbers of images and distance.
+  void configure(std::size_t max_images, double near_m);
   /// Best global similarity within `near_m` of `position_m`, as a share of the best in the whole map, in [0, 1]. One
   /// when nothing looks alike anywhere.
   double ratio(ComparableImage& image, const Eigen::Vector2d& position_m);
 
  private:
   const TrainingMap& map_;
-  double near_m_;
-  std::size_t stride_;
-  std::size_t rounds_;  ///< after so many times it begins with the same training image again
+  double near_m_ = 0.0;
+  std::size_t stride_ = 1;
+  std::size_t rounds_ = 1;  ///< after so many times it begins with the same training image again
   std::size_t round_ = 0;
 };
 

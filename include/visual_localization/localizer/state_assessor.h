@@ -51,6 +51,8 @@ class StateAssessor {
  public:
   explicit StateAssessor(const StateConfig& config)
       : config_(config), course_(static_cast<std::size_t>(config.course_length)) {}
+  /// Other thresholds, with what the last images said: they are not judged anew.
+  void configure(const StateConfig& config);
   /// The position is unknown again.
   void reset();
   /// The state after one more image.
