@@ -11,6 +11,7 @@
 #include <ros/this_node.h>
 
 #include "visual_localization/ros/localizer_nodelet.h"
+#include "visual_localization/ros/parameters_page.h"
 
 namespace {
 
@@ -21,8 +22,9 @@ const char* const kHelp =
     "Usage: localizer_node [image:=TOPIC] [_map:=FILE] [_PARAMETER:=VALUE ...]\n"
     "Localises with one camera in a map of training images; the nodelet\n"
     "visual_localization/LocalizerNodelet standing alone. Needs a roscore.\n\n"
-    "  --help     this text\n"
-    "  --version  the version\n\n"
+    "  --help        this text\n"
+    "  --version     the version\n"
+    "  --parameters  every parameter with its default, range and meaning, in Markdown\n\n"
     "Topics, services and parameters: README.md and config/localizer.yaml.\n";
 
 /// Arguments that are not for ROS, without the program's name.
@@ -40,6 +42,10 @@ int answer(const std::string& argument) {
   }
   if (argument == "--version") {
     std::cout << "localizer_node " << VISUAL_LOCALIZATION_VERSION << "\n";
+    return 0;
+  }
+  if (argument == "--parameters") {
+    std::cout << visual_localization::parametersPage();
     return 0;
   }
   std::cerr << "localizer_node: unknown argument '" << argument << "'; see --help\n";

@@ -6,15 +6,23 @@
 
 namespace visual_localization {
 
+namespace {
+
+constexpr bool kAtStartOnly = true;
+
+}  // namespace
+
 void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.choice({"tracker", "", "dynamic particle swarm, or particle filter with Gaussian or linear motion"}, tracker,
                  {"dpso", "pf_gaussian", "pf_linear"});
   visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
                  features, {"sift", "global", "hybrid"});
-  visitor.choice({"sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any map"},
-                 sift_backend, siftBackends());
-  visitor.integer({"seed", "1", "of the random generator; the same seed, map and images give the same track"}, seed, 0,
-                  std::numeric_limits<int>::max());
+  visitor.choice(
+      {"sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any map", kAtStartOnly},
+      sift_backend, siftBackends());
+  visitor.integer(
+      {"seed", "1", "of the random generator; the same seed, map and images give the same track", kAtStartOnly}, seed,
+      0, std::numeric_limits<int>::max());
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);
   visitor.real({"max_image_gap", "s", "after a longer pause the image before is not used for pruning"}, max_image_gap_s,
                0.001, 3600.0);

@@ -150,6 +150,12 @@ class Collector : public ParameterVisitor {
 
 class TableWriter : public ParameterVisitor {
  public:
+  explicit TableWriter(bool with_run_time)
+      : table(with_run_time
+                  ? "| parameter | default | unit | allowed | while running | meaning |\n|---|---|---|---|---|---|\n"
+                  : "| parameter | default | unit | allowed | meaning |\n|---|---|---|---|---|\n"),
+        with_run_time_(with_run_time) {}
+
   void real(const ParameterInfo& info, double& field, double min, double max) override {
     row(info, number(field), range(min, max));
   }
@@ -162,13 +168,16 @@ class TableWriter : public ParameterVisitor {
   }
   void text(const ParameterInfo& info, std::string& field) override { row(info, "\"" + field + "\"", "text"); }
 
-  std::string table = "| parameter | default | unit | allowed | meaning |\n|---|---|---|---|---|\n";
+  std::string table;
 
  private:
   void row(const ParameterInfo& info, const std::string& value, const std::string& allowed) {
-    table +=
-        "| `" + info.name + "` | " + value + " | " + info.unit + " | " + allowed + " | " + info.description + " |\n";
+    const std::string run_time = with_run_time_ ? std::string(info.at_start_only ? "" : "yes") + " | " : "";
+    table += "| `" + info.name + "` | " + value + " | " + info.unit + " | " + allowed + " | " + run_time +
+             info.description + " |\n";
   }
+
+  const bool with_run_time_;
 };
 
 }  // namespace
@@ -193,8 +202,8 @@ ParameterValues values(const Declaration& declare) {
   return collector.collected;
 }
 
-std::string markdownTable(const Declaration& declare) {
-  TableWriter writer;
+std::string markdownTable(const Declaration& declare, bool with_run_time) {
+  TableWriter writer(with_run_time);
   declare(writer);
   return writer.table;
 }

@@ -7,6 +7,7 @@
 namespace visual_localization {
 namespace {
 
+constexpr bool kAtStartOnly = true;
 constexpr int kLargestMapCache_mb = 1 << 20;  ///< a tebibyte
 
 /// tf2 knows no leading slash, and an empty name is no frame.
@@ -19,19 +20,21 @@ void checkFrame(const std::string& name, const std::string& frame, std::vector<s
 }  // namespace
 
 void NodeConfig::declare(ParameterVisitor& visitor) {
-  visitor.text({"map", "", "path of the map file; empty: none until ~load_map is called"}, map);
-  visitor.integer({"map_cache_mb", "MiB", "features of a larger map are read when needed and kept up to this"},
-                  map_cache_mb, 0, kLargestMapCache_mb);
-  visitor.text({"image_transport", "", "raw, compressed (decoded here) or another installed image transport"},
-               image_transport);
-  visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf"}, tf_mode,
-                 {"none", "map_to_odom", "map_to_base"});
+  visitor.text({"map", "", "path of the map file; empty: none until ~load_map is called", kAtStartOnly}, map);
+  visitor.integer(
+      {"map_cache_mb", "MiB", "features of a larger map are read when needed and kept up to this", kAtStartOnly},
+      map_cache_mb, 0, kLargestMapCache_mb);
+  visitor.text(
+      {"image_transport", "", "raw, compressed (decoded here) or another installed image transport", kAtStartOnly},
+      image_transport);
+  visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf", kAtStartOnly},
+                 tf_mode, {"none", "map_to_odom", "map_to_base"});
   visitor.real({"transform_tolerance", "s", "transforms are dated so far after the image"}, transform_tolerance_s, 0.0,
                60.0);
   visitor.real({"image_timeout", "s", "diagnostics warn when the newest image is older"}, image_timeout_s, 0.1, 3600.0);
-  visitor.text({"global_frame_id", "", "frame of the map"}, global_frame_id);
-  visitor.text({"odom_frame_id", "", "frame of the odometry"}, odom_frame_id);
-  visitor.text({"base_frame_id", "", "frame of the robot"}, base_frame_id);
+  visitor.text({"global_frame_id", "", "frame of the map", kAtStartOnly}, global_frame_id);
+  visitor.text({"odom_frame_id", "", "frame of the odometry", kAtStartOnly}, odom_frame_id);
+  visitor.text({"base_frame_id", "", "frame of the robot", kAtStartOnly}, base_frame_id);
 }
 
 std::vector<std::string> NodeConfig::violations() const {

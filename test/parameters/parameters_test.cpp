@@ -24,7 +24,7 @@ struct Engine {
     visitor.integer({"engine/cylinders", "1", "how many"}, cylinders, 1, 12);
     visitor.flag({"engine/turbo", "", "louder"}, turbo);
     visitor.choice({"engine/fuel", "", "what it drinks"}, fuel, {"petrol", "diesel"});
-    visitor.text({"name", "", "what it is called"}, name);
+    visitor.text({"name", "", "what it is called", true}, name);
   }
   std::vector<std::string> violations() const {
     if (turbo && cylinders < 2) return {"a turbo needs two cylinders"};
@@ -144,6 +144,9 @@ TEST(Parameters, TableHasARowForEveryParameter) {
   const std::string table = parameters::markdownTable(declare);
   for (const auto& [name, value] : parameters::values(declare)) EXPECT_THAT(table, HasSubstr("`" + name + "`"));
   EXPECT_THAT(table, HasSubstr("| `engine/power` | 10 | W | [0, 100] | how strong |"));
+  const std::string longer = parameters::markdownTable(declare, true);
+  EXPECT_THAT(longer, HasSubstr("| `engine/power` | 10 | W | [0, 100] | yes | how strong |"));
+  EXPECT_THAT(longer, HasSubstr("| `name` | \"unnamed\" |  | text |  | what it is called |"));
 }
 
 }  // namespace

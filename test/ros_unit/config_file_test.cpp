@@ -1,3 +1,5 @@
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -5,6 +7,7 @@
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/node_config.h"
+#include "visual_localization/ros/parameters_page.h"
 
 namespace visual_localization {
 namespace {
@@ -42,6 +45,12 @@ TEST(NodeConfig, MapCacheIsASizeInItsRange) {
   EXPECT_EQ(config.node.mapLoading({}).cache_bytes, std::size_t{1} << 40U);
   assignParameters(config, {{"map_cache_mb", std::int64_t{0}}});
   EXPECT_EQ(config.node.mapLoading({}).cache_bytes, 0U);
+}
+
+TEST(ConfigFile, ThePageOfParametersIsWhatTheCodeSays) {
+  std::ifstream file(CONFIG_DIR "/../doc/parameters.md");
+  const std::string page((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  EXPECT_EQ(page, parametersPage()) << "make it anew: localizer_node --parameters > doc/parameters.md";
 }
 
 }  // namespace

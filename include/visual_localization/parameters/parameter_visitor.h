@@ -7,9 +7,10 @@ namespace visual_localization {
 
 /// What a user needs to know about one parameter besides its value and range.
 struct ParameterInfo {
-  std::string name;         ///< relative name as in the YAML file and on the parameter server, e.g. "dpso/inertia"
-  std::string unit;         ///< SI symbol, "px", "1" for a pure number; empty for names and switches
-  std::string description;  ///< one sentence, with the papers' symbol where there is one
+  std::string name;            ///< relative name as in the YAML file and on the parameter server, e.g. "dpso/inertia"
+  std::string unit;            ///< SI symbol, "px", "1" for a pure number; empty for names and switches
+  std::string description;     ///< one sentence, with the papers' symbol where there is one
+  bool at_start_only = false;  ///< read when the node starts; everything else can change while it runs
 };
 
 /// Walks over the fields of a configuration. Every configuration struct has a member

@@ -39,8 +39,9 @@ std::vector<std::string> violations(const Declaration& declare);
 /// The current value of every field.
 ParameterValues values(const Declaration& declare);
 
-/// A Markdown table of all parameters: name, default, unit, allowed values, meaning.
-std::string markdownTable(const Declaration& declare);
+/// A Markdown table of all parameters: name, default, unit, allowed values, meaning; `with_run_time`: also whether it
+/// can change while the node runs.
+std::string markdownTable(const Declaration& declare, bool with_run_time = false);
 
 /// Reads a YAML file of nested mappings. Throws ParameterError naming the file and the key for anything that
 /// is not a mapping of names to scalars.
