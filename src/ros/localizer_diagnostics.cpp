@@ -22,6 +22,11 @@ LocalizerDiagnostics::LocalizerDiagnostics(const ros::NodeHandle& node, const ro
   updater_.add("map", this, &LocalizerDiagnostics::reportMap);
 }
 
+void LocalizerDiagnostics::setImageTimeout(double image_timeout_s) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  image_timeout_s_ = image_timeout_s;
+}
+
 void LocalizerDiagnostics::imageArrived() {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++arrived_;

@@ -24,8 +24,8 @@ std_msgs::Header headerOf(const std::string& frame_id, const ros::Time& stamp) {
 
 }  // namespace
 
-LocalizerPublisher::LocalizerPublisher(ros::NodeHandle node, const NodeParameters& parameters)
-    : parameters_(parameters), image_transport_(node) {
+LocalizerPublisher::LocalizerPublisher(ros::NodeHandle node, const NodeConfig& config)
+    : config_(config), image_transport_(node) {
   constexpr bool kLatched = true;
   pose_ = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue);
   fix_ = node.advertise<sensor_msgs::NavSatFix>("fix", kQueue);
@@ -39,21 +39,21 @@ LocalizerPublisher::LocalizerPublisher(ros::NodeHandle node, const NodeParameter
 }
 
 void LocalizerPublisher::publishMap(const TrainingMap& map) {
-  map_path_.publish(toPath(map, parameters_.node.global_frame_id));
-  map_markers_.publish(toMarkers(map, parameters_.node.global_frame_id));
+  map_path_.publish(toPath(map, config_.global_frame_id));
+  map_markers_.publish(toMarkers(map, config_.global_frame_id));
 }
 
 void LocalizerPublisher::publishNoMap(const ImageCounts& counts) {
   Estimate nothing;
   nothing.state = LocalizationState::kNoMap;
-  publishStatus(toStatus(nothing, headerOf(parameters_.node.global_frame_id, ros::Time::now())), -1.0, counts);
+  publishStatus(toStatus(nothing, headerOf(config_.global_frame_id, ros::Time::now())), -1.0, counts);
 }
 
 void LocalizerPublisher::publish(const SharedLocalizer::Result& result, const ros::Time& stamp, double latency_ms,
                                  const ImageCounts& counts) {
-  const std_msgs::Header header = headerOf(parameters_.node.global_frame_id, stamp);
+  const std_msgs::Header header = headerOf(config_.global_frame_id, stamp);
   pose_.publish(toPose(result.estimate, header));
-  fix_.publish(toFix(result.estimate, headerOf(parameters_.node.base_frame_id, stamp)));
+  fix_.publish(toFix(result.estimate, headerOf(config_.base_frame_id, stamp)));
   publishParticles(result.particles, header);
   publishStatus(toStatus(result.estimate, header), latency_ms, counts);
 }
@@ -79,8 +79,8 @@ void LocalizerPublisher::publishStatus(LocalizationStatus status, double latency
 void LocalizerPublisher::publishMatches(const SharedLocalizer::Result& result, const cv::Mat& grey,
                                         const std_msgs::Header& header) {
   if (matches_.getNumSubscribers() == 0) return;
-  const cv::Mat canvas = drawMatches(grey, result.sift, *result.map, result.estimate.best_image,
-                                     parameters_.localizer.match.max_angle_ratio);
+  const cv::Mat canvas =
+      drawMatches(grey, result.sift, *result.map, result.estimate.best_image, result.match.max_angle_ratio);
   matches_.publish(cv_bridge::CvImage(header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
 }
 

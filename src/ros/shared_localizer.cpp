@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "visual_localization/parameters/parameters.h"
+
 namespace visual_localization {
 
 namespace {
@@ -21,9 +23,23 @@ void requireOnMap(const Eigen::Vector2d& centre_m, double radius_m, const Area& 
 
 }  // namespace
 
-void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
-  auto localizer = std::make_unique<Localizer>(map, config_);
+void SharedLocalizer::configure(const LocalizerConfig& config) {
+  const auto wrong = config.violations();
+  if (!wrong.empty()) throw ParameterError(wrong.front());
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (localizer_) localizer_->configure(config);
+  config_ = config;
+}
+
+LocalizerConfig SharedLocalizer::configuration() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return config_;
+}
+
+void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
+  auto localizer = std::make_unique<Localizer>(map, configuration());  // without the lock: images go on meanwhile
+  const std::lock_guard<std::mutex> lock(mutex_);
+  localizer->configure(config_);  // it may have changed just now
   if (waiting_guess_) localizer->relocalize(normallyDistributed(waiting_guess_->mean_m, waiting_guess_->covariance_m2));
   waiting_guess_.reset();
   // The old localizer and map now end with this function, when the lock is free again.
@@ -41,7 +57,7 @@ std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t sta
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return std::nullopt;
   const Estimate estimate = localizer_->process(stamp_ns, grey);
-  return Result{estimate, localizer_->particles(), localizer_->lastSift(), map_};
+  return Result{estimate, localizer_->particles(), localizer_->lastSift(), config_.match, map_};
 }
 
 bool SharedLocalizer::relocalizeAnywhere() {

@@ -26,7 +26,8 @@ tf2::Transform odomInMap(const tf2::Transform& base_in_map, const tf2::Transform
   return base_in_map * base_in_odom.inverse();
 }
 
-TransformPublisher::TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node) : config_(config) {
+TransformPublisher::TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node)
+    : config_(config), tolerance_s_(config.transform_tolerance_s) {
   if (config_.tf_mode == "map_to_odom") listener_ = std::make_unique<tf2_ros::TransformListener>(buffer_, node);
 }
 
@@ -69,7 +70,7 @@ void TransformPublisher::broadcast(const tf2::Transform& child_in_map, const std
   message.child_frame_id = child;
   message.transform = tf2::toMsg(child_in_map);
   try {
-    message.header.stamp = stamp + ros::Duration(config_.transform_tolerance_s);
+    message.header.stamp = stamp + ros::Duration(tolerance_s_);
   } catch (const std::runtime_error&) {
     message.header.stamp = stamp;  // at the end of what a stamp can hold
   }

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "test/ros_unit/small_map.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
@@ -65,6 +66,41 @@ TEST(SharedLocalizer, AnUnusableImageChangesNothing) {
   EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat()), std::invalid_argument);
   EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
   EXPECT_TRUE(localizer.process(kSecond_ns, noise()).has_value());
+}
+
+TEST(SharedLocalizer, ParametersHoldForThisMapAndForTheNext) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  LocalizerConfig config;
+  config.dpso.particles = 40;
+  localizer.setMap(test::smallMap());
+  localizer.configure(config);
+  EXPECT_EQ(localizer.process(kSecond_ns, noise())->particles.size(), 40U);
+  localizer.setMap(test::smallMap());
+  EXPECT_EQ(localizer.process(kSecond_ns, noise())->particles.size(), 40U);
+  config.dpso.v0 = 2.0;
+  EXPECT_THROW(localizer.configure(config), ParameterError);
+  EXPECT_EQ(localizer.process(2 * kSecond_ns, noise())->particles.size(), 40U);
+}
+
+TEST(SharedLocalizer, ParametersAndMapsMayChangeWhileImagesAreProcessed) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  std::atomic<bool> done{false};
+  std::thread replacer([&] {
+    while (!done) localizer.setMap(test::smallMap());
+  });
+  std::thread tuner([&] {
+    LocalizerConfig config;
+    while (!done) {
+      config.tracker = config.tracker == "dpso" ? "pf_linear" : "dpso";
+      config.dpso.particles = config.dpso.particles == 80 ? 40 : 80;
+      localizer.configure(config);
+    }
+  });
+  for (int i = 1; i <= 20; ++i) EXPECT_TRUE(localizer.process(i * kSecond_ns, noise()).has_value());
+  done = true;
+  replacer.join();
+  tuner.join();
 }
 
 TEST(SharedLocalizer, MapsMayBeReplacedWhileImagesAreProcessed) {

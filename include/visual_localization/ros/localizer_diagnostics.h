@@ -27,6 +27,7 @@ class LocalizerDiagnostics {
   LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, const std::string& name,
                        double image_timeout_s);
 
+  void setImageTimeout(double image_timeout_s);
   void imageArrived();
   void imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts);
   void imageRefused(const ImageCounts& counts, const std::string& reason);
@@ -41,8 +42,8 @@ class LocalizerDiagnostics {
   void reportImages(Wrapper& status);
   void reportMap(Wrapper& status);
 
-  const double image_timeout_s_;
   std::mutex mutex_;
+  double image_timeout_s_;
   std::optional<Estimate> estimate_;
   double latency_ms_ = 0.0;
   ImageCounts counts_;

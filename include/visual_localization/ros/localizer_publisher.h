@@ -17,7 +17,7 @@ namespace visual_localization {
 /// All topics that the node publishes under its own name.
 class LocalizerPublisher {
  public:
-  LocalizerPublisher(ros::NodeHandle private_node, const NodeParameters& parameters);
+  LocalizerPublisher(ros::NodeHandle private_node, const NodeConfig& config);
 
   void publishMap(const TrainingMap& map);
   /// That there is no map.
@@ -32,7 +32,7 @@ class LocalizerPublisher {
   void publishParticles(const std::vector<Particle>& particles, const std_msgs::Header& header);
   void publishStatus(LocalizationStatus status, double latency_ms, const ImageCounts& counts);
 
-  const NodeParameters parameters_;
+  const NodeConfig config_;
   image_transport::ImageTransport image_transport_;
   ros::Publisher pose_;
   ros::Publisher fix_;

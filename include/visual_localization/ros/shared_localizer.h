@@ -29,10 +29,15 @@ class SharedLocalizer {
     Estimate estimate;
     std::vector<Particle> particles;
     SiftFeatures sift;  ///< of the image, after pruning; empty when they were not needed
+    MatchConfig match;  ///< how it was compared
     std::shared_ptr<const TrainingMap> map;
   };
 
   explicit SharedLocalizer(const LocalizerConfig& config) : config_(config) {}
+
+  /// Other parameters from the next image on, and for later maps; see Localizer::configure. Throws ParameterError when
+  /// `config` is invalid, and then nothing has changed.
+  void configure(const LocalizerConfig& config);
 
   /// Starts anew in `map`, or around the guess that has been waiting for a map.
   void setMap(std::shared_ptr<const TrainingMap> map);
@@ -50,8 +55,10 @@ class SharedLocalizer {
   bool relocalizeAt(const Guess& guess);
 
  private:
-  const LocalizerConfig config_;
+  LocalizerConfig configuration() const;
+
   mutable std::mutex mutex_;
+  LocalizerConfig config_;
   std::shared_ptr<const TrainingMap> map_;
   std::unique_ptr<Localizer> localizer_;
   std::optional<Guess> waiting_guess_;
