@@ -44,6 +44,7 @@ void LocalizerNodelet::stop() {
   timer_.stop();
   service_spinner_.reset();
   services_.clear();
+  reconfigure_.reset();
   initial_pose_.shutdown();
   if (images_) images_->shutdown();
   queue_.close();
@@ -59,7 +60,7 @@ void LocalizerNodelet::start() {
   ros::NodeHandle& private_node = getPrivateNodeHandle();
   parameters_ = loadParameters(private_node);
   localizer_ = std::make_unique<SharedLocalizer>(parameters_.localizer);
-  publisher_ = std::make_unique<LocalizerPublisher>(private_node, parameters_);
+  publisher_ = std::make_unique<LocalizerPublisher>(private_node, parameters_.node);
   transform_publisher_ = std::make_unique<TransformPublisher>(parameters_.node, node);
   diagnostics_ =
       std::make_unique<LocalizerDiagnostics>(node, private_node, getName(), parameters_.node.image_timeout_s);
@@ -89,6 +90,10 @@ void LocalizerNodelet::offerServices() {
   services_.push_back(private_node.advertiseService("relocalize", &LocalizerNodelet::onRelocalize, this));
   services_.push_back(private_node.advertiseService("load_map", &LocalizerNodelet::onLoadMap, this));
   services_.push_back(node.advertiseService("global_localization", &LocalizerNodelet::onGlobalLocalization, this));
+  reconfigure_ = std::make_unique<ReconfigureServer>(
+      private_node, parameters_,
+      [this](const NodeParameters& parameters, const ParameterValues& changed) { configure(parameters, changed); },
+      [this](const std::string& reason) { NODELET_WARN_STREAM("Parameters: " << reason); });
   service_spinner_ = std::make_unique<ros::AsyncSpinner>(1, &service_queue_);
   service_spinner_->start();
 }
@@ -134,6 +139,7 @@ bool LocalizerNodelet::onGlobalLocalization(std_srvs::Empty::Request&, std_srvs:
 bool LocalizerNodelet::onLoadMap(LoadMap::Request& request, LoadMap::Response& response) {
   try {
     response.images = static_cast<std::uint32_t>(useMap(request.path));
+    reconfigure_->setMap(request.path);
     response.success = true;
     response.message = "loaded " + request.path;
   } catch (const std::exception& error) {
@@ -144,6 +150,16 @@ bool LocalizerNodelet::onLoadMap(LoadMap::Request& request, LoadMap::Response& r
     NODELET_WARN_STREAM("Map not loaded: " << error.what());
   }
   return true;
+}
+
+void LocalizerNodelet::configure(const NodeParameters& parameters, const ParameterValues& changed) {
+  localizer_->configure(parameters.localizer);
+  diagnostics_->setImageTimeout(parameters.node.image_timeout_s);
+  transform_publisher_->setTolerance(parameters.node.transform_tolerance_s);
+  std::string all;
+  for (const auto& [name, value] : changed)
+    all += (all.empty() ? "" : ", ") + name + " = " + parameters::toString(value);
+  NODELET_INFO_STREAM("Parameters changed: " << all);
 }
 
 void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 
+#include <ros/master.h>
+
 namespace visual_localization {
 namespace {
 
@@ -31,6 +33,13 @@ void flattenInto(XmlRpcValue value, const std::string& name, ParameterValues& ou
   }
 }
 
+XmlRpcValue toXmlRpc(const ParameterValue& value) {
+  if (const auto* flag = std::get_if<bool>(&value)) return XmlRpcValue(*flag);
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) return XmlRpcValue(static_cast<int>(*integer));
+  if (const auto* real = std::get_if<double>(&value)) return XmlRpcValue(*real);
+  return XmlRpcValue(std::get<std::string>(value));
+}
+
 void dropForeign(XmlRpcValue& tree, XmlRpcValue& kept) {
   for (auto& [key, child] : tree) {
     if (!belongsToOthers(key)) kept[key] = child;
@@ -43,6 +52,12 @@ ParameterValues flatten(const XmlRpcValue& tree) {
   ParameterValues out;
   if (tree.valid()) flattenInto(tree, "", out);
   return out;
+}
+
+bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values) {
+  if (!ros::master::check()) return false;
+  for (const auto& [name, value] : values) private_node.setParam(name, toXmlRpc(value));
+  return true;
 }
 
 bool belongsToOthers(const std::string& name) {

@@ -7,7 +7,7 @@ import time
 
 import rosbag
 import rospy
-from sensor_msgs.msg import NavSatFix
+from sensor_msgs.msg import CompressedImage, NavSatFix
 
 from visual_localization.msg import LocalizationStatus
 
@@ -81,6 +81,27 @@ class Localizer:
     def counts(self):
         last = self.status.last()
         return (last.images_processed, last.images_refused) if last else (0, 0)
+
+
+class Camera:
+    """Shows images to a localizer one by one, as fast as it takes them."""
+
+    def __init__(self, localizer, topic=IMAGE_TOPIC):
+        self._localizer = localizer
+        self._publisher = rospy.Publisher(topic, CompressedImage, queue_size=10)
+        wait_for(self._publisher.get_num_connections, 60.0, 'a subscriber of ' + topic)
+
+    def publish(self, image):
+        self._publisher.publish(image)
+
+    def show(self, image, timeout_s=30.0):
+        """The status that the image led to."""
+        def answer():
+            return [s for s in self._localizer.status.messages()
+                    if s.header.stamp == image.header.stamp and s.images_processed > before]
+        before = self._localizer.counts()[0]
+        self.publish(image)
+        return wait_for(answer, timeout_s, 'the answer to an image')[0]
 
 
 def truth_of(bag_path):

@@ -23,6 +23,7 @@
 #include "visual_localization/ros/localizer_diagnostics.h"
 #include "visual_localization/ros/localizer_publisher.h"
 #include "visual_localization/ros/node_config.h"
+#include "visual_localization/ros/reconfigure_server.h"
 #include "visual_localization/ros/shared_localizer.h"
 #include "visual_localization/ros/throttle.h"
 #include "visual_localization/ros/transform_publisher.h"
@@ -47,6 +48,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   bool onRelocalize(Relocalize::Request& request, Relocalize::Response& response);
   bool onGlobalLocalization(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
   bool onLoadMap(LoadMap::Request& request, LoadMap::Response& response);
+  void configure(const NodeParameters& parameters, const ParameterValues& changed);
   void onTimer(const ros::WallTimerEvent& event);
 
   /// Throws MapStoreError and leaves everything as it is when there is no map at `path`.
@@ -58,7 +60,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   void refuse(const std::string& reason);
   ImageCounts counts() const;
 
-  NodeParameters parameters_;
+  NodeParameters parameters_;  ///< at the start; what can change lives where it is used
   std::unique_ptr<SharedLocalizer> localizer_;
   std::unique_ptr<LocalizerPublisher> publisher_;
   std::unique_ptr<TransformPublisher> transform_publisher_;
@@ -67,6 +69,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   ros::Subscriber initial_pose_;
   ros::CallbackQueue service_queue_;
   std::vector<ros::ServiceServer> services_;
+  std::unique_ptr<ReconfigureServer> reconfigure_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
   ros::WallTimer timer_;
 

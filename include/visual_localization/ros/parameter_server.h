@@ -14,6 +14,10 @@ namespace visual_localization {
 /// parameter for anything that is neither a struct nor a scalar.
 ParameterValues flatten(const XmlRpc::XmlRpcValue& tree);
 
+/// Writes values into a node's private namespace. False, and nothing is written, when there is no master: roscpp would
+/// wait for it.
+bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values);
+
 /// True for parameters that stand in a node's private namespace but belong to others: diagnostic_updater,
 /// bond, the nodelet manager, plugins of image_transport.
 bool belongsToOthers(const std::string& name);
