@@ -125,6 +125,8 @@ void Localizer::relocalize(const Prior& prior) {
   assessor_.reset();
 }
 
+LocalizationState Localizer::doubt() { return assessor_.doubt(tracker_->tuning().recovering); }
+
 /// While the images confirm the position the covariance is that of its mode; otherwise that of the whole cloud
 /// about it, so that nothing downstream trusts a guess.
 PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) const {

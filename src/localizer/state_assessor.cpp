@@ -55,24 +55,29 @@ void StateAssessor::configure(const StateConfig& config) {
 
 void StateAssessor::reset() { *this = StateAssessor(config_); }
 
+LocalizationState StateAssessor::doubt(bool recovering) {
+  forget();
+  return stateOf(false, recovering);
+}
+
 LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, const Evidence& evidence) {
   remember(estimate, evidence);
   const bool certain = isCertain();
   ever_confirmed_ = ever_confirmed_ || certain;
   if (certain) unconfirmed_ = 0;
   if (!certain && !evidence.blind) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
+  return stateOf(certain, evidence.recovering);
+}
+
+LocalizationState StateAssessor::stateOf(bool certain, bool recovering) const {
   if (unconfirmed_ >= config_.off_map_images) return LocalizationState::kOffMap;
-  if (evidence.recovering) return LocalizationState::kRecovering;
+  if (recovering) return LocalizationState::kRecovering;
   if (certain) return LocalizationState::kTracking;
   return ever_confirmed_ ? LocalizationState::kUncertain : LocalizationState::kInitializing;
 }
 
 void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& evidence) {
-  if (last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m) {
-    confirmations_.clear();
-    place_ratios_.clear();
-    course_.clear();
-  }
+  if (last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m) forget();
   last_position_m_ = estimate.position_m;
   course_.add(evidence.stamp_ns, estimate.position_m);
   confirmations_.push_back(confirms(estimate, evidence.features));
@@ -80,6 +85,12 @@ void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& ev
   const auto window = static_cast<std::size_t>(config_.window);
   while (confirmations_.size() > window) confirmations_.pop_front();
   while (place_ratios_.size() > window) place_ratios_.pop_front();
+}
+
+void StateAssessor::forget() {
+  confirmations_.clear();
+  place_ratios_.clear();
+  course_.clear();
 }
 
 bool StateAssessor::isCertain() const {

@@ -143,6 +143,16 @@ TEST(StateAssessor, ACoveredCameraIsNotOffTheMap) {
   EXPECT_EQ(state, LocalizationState::kUncertain);
 }
 
+TEST(StateAssessor, InDoubtThePositionMustBeConfirmedAnew) {
+  StateAssessor assessor{StateConfig()};
+  EXPECT_EQ(assessor.doubt(false), LocalizationState::kInitializing);
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.doubt(false), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kUncertain);
+  EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kUncertain);
+  EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
+}
+
 TEST(StateAssessor, OtherThresholdsKeepWhatTheLastImagesSaid) {
   StateAssessor assessor{StateConfig()};
   afterGood(assessor, 10);

@@ -45,6 +45,9 @@ class Localizer {
   /// The position is unknown within a prior (see prior.h).
   void relocalize(const Prior& prior);
 
+  /// Nothing was seen for long: the particles stay, but the position must be confirmed anew. The state until then.
+  LocalizationState doubt();
+
   const TrainingMap& map() const { return *map_; }
   const std::vector<Particle>& particles() const { return tracker_->particles(); }
   /// SIFT features of the last image after pruning, for drawing its matches; empty when there was no need for them.

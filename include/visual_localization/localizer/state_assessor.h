@@ -55,6 +55,8 @@ class StateAssessor {
   void configure(const StateConfig& config);
   /// The position is unknown again.
   void reset();
+  /// What the last images confirmed no longer counts; the state until the next one.
+  LocalizationState doubt(bool recovering);
   /// The state after one more image.
   LocalizationState assess(const TrackerEstimate& estimate, const Evidence& evidence);
   /// Whether the last images look more like another place.
@@ -64,7 +66,9 @@ class StateAssessor {
  private:
   bool confirms(const TrackerEstimate& estimate, FeatureKind features) const;
   void remember(const TrackerEstimate& estimate, const Evidence& evidence);
+  void forget();
   bool isCertain() const;
+  LocalizationState stateOf(bool certain, bool recovering) const;
 
   StateConfig config_;
   std::deque<bool> confirmations_;  ///< of the last images, newest at the back
