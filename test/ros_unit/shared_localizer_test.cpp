@@ -68,6 +68,34 @@ TEST(SharedLocalizer, AnUnusableImageChangesNothing) {
   EXPECT_TRUE(localizer.process(kSecond_ns, noise()).has_value());
 }
 
+/// Positions of all particles, to see whether they moved.
+std::vector<Eigen::Vector2d> cloudOf(const std::optional<SharedLocalizer::Result>& result) {
+  std::vector<Eigen::Vector2d> positions;
+  for (const Particle& particle : result->particles) positions.push_back(particle.position_m);
+  return positions;
+}
+
+TEST(SharedLocalizer, ARepeatedImageGetsTheAnswerItHad) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  const cv::Mat image = noise();
+  localizer.process(kSecond_ns, noise());
+  const auto first = localizer.process(2 * kSecond_ns, image);
+  EXPECT_EQ(cloudOf(localizer.process(2 * kSecond_ns, image.clone())), cloudOf(first));
+  EXPECT_NE(cloudOf(localizer.process(2 * kSecond_ns, noise())), cloudOf(first))
+      << "the stamp alone does not repeat it";
+}
+
+TEST(SharedLocalizer, ARepeatedImageIsLookedAtAnewAfterARelocalization) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  const cv::Mat image = noise();
+  const auto first = localizer.process(kSecond_ns, image);
+  localizer.relocalizeAnywhere();
+  EXPECT_NE(cloudOf(localizer.process(kSecond_ns, image)), cloudOf(first));
+  EXPECT_EQ(localizer.doubt(), LocalizationState::kInitializing);
+}
+
 TEST(SharedLocalizer, ParametersHoldForThisMapAndForTheNext) {
   SharedLocalizer localizer{LocalizerConfig{}};
   LocalizerConfig config;
