@@ -13,6 +13,8 @@ namespace {
 
 /// How long an image waits for odometry of its stamp. Wall time: simulated time may stand still.
 constexpr std::chrono::milliseconds kOdometryWait{100};
+/// The same when there has never been any: every image would lose that time.
+constexpr std::chrono::milliseconds kUnknownOdometryWait{20};
 constexpr std::chrono::milliseconds kOdometryPoll{5};
 
 tf2::Transform baseInMap(const PoseEstimate& pose) {
@@ -31,23 +33,29 @@ TransformPublisher::TransformPublisher(const NodeConfig& config, const ros::Node
   if (config_.tf_mode == "map_to_odom") listener_ = std::make_unique<tf2_ros::TransformListener>(buffer_, node);
 }
 
+void TransformPublisher::forget() {
+  buffer_.clear();
+  last_stamp_ = ros::Time();
+}
+
 std::string TransformPublisher::publish(const PoseEstimate& pose, const ros::Time& stamp) {
-  // tf2 complains about a second transform for the same stamp.
-  if (config_.tf_mode == "none" || stamp == last_stamp_) return {};
+  if (config_.tf_mode == "none") return {};
+  if (stamp == last_stamp_) return last_reason_;  // tf2 complains about a second transform for the same stamp
   last_stamp_ = stamp;
   if (config_.tf_mode == "map_to_base") {
     broadcast(baseInMap(pose), config_.base_frame_id, stamp);
     return {};
   }
-  std::string reason;
-  const auto base_in_odom = baseInOdom(stamp, reason);
+  last_reason_.clear();
+  const auto base_in_odom = baseInOdom(stamp, last_reason_);
   if (base_in_odom) broadcast(odomInMap(baseInMap(pose), *base_in_odom), config_.odom_frame_id, stamp);
-  return reason;
+  return last_reason_;
 }
 
 std::optional<tf2::Transform> TransformPublisher::baseInOdom(const ros::Time& stamp, std::string& reason) const {
   const tf2::BufferCore& transforms = buffer_;
-  const auto deadline = std::chrono::steady_clock::now() + kOdometryWait;
+  const bool is_known = transforms.canTransform(config_.odom_frame_id, config_.base_frame_id, ros::Time());
+  const auto deadline = std::chrono::steady_clock::now() + (is_known ? kOdometryWait : kUnknownOdometryWait);
   while (!transforms.canTransform(config_.odom_frame_id, config_.base_frame_id, stamp) &&
          std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(kOdometryPoll);

@@ -27,6 +27,8 @@ class TransformPublisher {
   TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node);
 
   void setTolerance(double transform_tolerance_s) { tolerance_s_ = transform_tolerance_s; }
+  /// Time has gone back: what was heard of odometry is from the future.
+  void forget();
   /// `stamp` of the image. Returns why nothing could be broadcast, and an empty text otherwise.
   std::string publish(const PoseEstimate& pose, const ros::Time& stamp);
 
@@ -40,6 +42,7 @@ class TransformPublisher {
   std::unique_ptr<tf2_ros::TransformListener> listener_;  ///< only with odometry
   tf2_ros::TransformBroadcaster broadcaster_;
   ros::Time last_stamp_;
+  std::string last_reason_;  ///< why nothing was broadcast for that stamp
 };
 
 }  // namespace visual_localization
