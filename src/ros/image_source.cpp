@@ -50,6 +50,7 @@ ImageSource::ImageSource(ros::NodeHandle node, const ros::NodeHandle& private_no
         "image", 1, [callback](const sensor_msgs::ImageConstPtr& message) { callback(received(message)); },
         ros::VoidPtr(), hints);
   }
+  topic_ = compressed_ ? compressed_.getTopic() : by_plugin_.getTopic();
 }
 
 void ImageSource::shutdown() {
@@ -57,6 +58,9 @@ void ImageSource::shutdown() {
   compressed_.shutdown();
 }
 
-std::string ImageSource::topic() const { return compressed_ ? compressed_.getTopic() : by_plugin_.getTopic(); }
+std::string ImageSource::description() const {
+  const unsigned publishers = compressed_ ? compressed_.getNumPublishers() : by_plugin_.getNumPublishers();
+  return topic() + (publishers == 0 ? ", which nobody publishes" : " (publishers: " + std::to_string(publishers) + ")");
+}
 
 }  // namespace visual_localization

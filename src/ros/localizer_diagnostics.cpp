@@ -1,5 +1,7 @@
 #include "visual_localization/ros/localizer_diagnostics.h"
 
+#include <utility>
+
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
 namespace visual_localization {
@@ -14,12 +16,16 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 LocalizerDiagnostics::LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
-                                           const std::string& name, double image_timeout_s)
-    : image_timeout_s_(image_timeout_s), updater_(node, private_node, name) {
+                                           const std::string& name, const NodeConfig& config,
+                                           DescribeCamera describe_camera)
+    : image_timeout_s_(config.image_timeout_s),
+      describe_camera_(std::move(describe_camera)),
+      updater_(node, private_node, name) {
   updater_.setHardwareID("none");
   updater_.add("localization", this, &LocalizerDiagnostics::reportState);
   updater_.add("images", this, &LocalizerDiagnostics::reportImages);
   updater_.add("map", this, &LocalizerDiagnostics::reportMap);
+  if (config.tf_mode != "none") updater_.add("transform", this, &LocalizerDiagnostics::reportTransform);
 }
 
 void LocalizerDiagnostics::setImageTimeout(double image_timeout_s) {
@@ -29,8 +35,26 @@ void LocalizerDiagnostics::setImageTimeout(double image_timeout_s) {
 
 void LocalizerDiagnostics::imageArrived() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  ++arrived_;
+  arrivals_.add();
   last_arrival_ = Clock::now();
+}
+
+double LocalizerDiagnostics::age_s() const { return secondsSince(last_arrival_.value_or(start_)); }
+
+std::optional<double> LocalizerDiagnostics::silence_s() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double silence = age_s();
+  return silence > image_timeout_s_ ? std::optional<double>(silence) : std::nullopt;
+}
+
+void LocalizerDiagnostics::stateIs(LocalizationState state) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (estimate_) estimate_->state = state;
+}
+
+void LocalizerDiagnostics::transformMissing(const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  missing_transform_ = reason;
 }
 
 void LocalizerDiagnostics::imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts) {
@@ -75,26 +99,29 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
 
 void LocalizerDiagnostics::reportImages(Wrapper& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const double interval_s = secondsSince(last_report_);
-  const double rate_hz = interval_s > 0.0 ? static_cast<double>(arrived_) / interval_s : 0.0;
-  arrived_ = 0;
-  last_report_ = Clock::now();
-
-  if (!last_arrival_) {
-    status.summary(DiagnosticStatus::WARN, "No image has arrived yet");
-  } else if (secondsSince(*last_arrival_) > image_timeout_s_) {
-    status.summary(DiagnosticStatus::WARN, "No new images");
+  if (age_s() > image_timeout_s_) {
+    status.summaryf(DiagnosticStatus::ERROR, "No image for %.1f s on %s", age_s(), describe_camera_().c_str());
+  } else if (!last_arrival_) {
+    status.summary(DiagnosticStatus::WARN, "No image has arrived yet on " + describe_camera_());
   } else if (!last_refusal_.empty()) {
     status.summary(DiagnosticStatus::WARN, "Refused: " + last_refusal_);
   } else {
     status.summary(DiagnosticStatus::OK, "Images arrive");
   }
-  status.addf("Rate (Hz)", "%.2f", rate_hz);
-  if (last_arrival_) status.addf("Age of the newest (s)", "%.2f", secondsSince(*last_arrival_));
+  status.addf("Rate (Hz)", "%.2f", arrivals_.rate_hz());
+  if (last_arrival_) status.addf("Age of the newest (s)", "%.2f", age_s());
   if (latency_ms_ >= 0.0) status.addf("Latency (ms)", "%.1f", latency_ms_);
   status.add("Processed", counts_.processed);
   status.add("Dropped", counts_.dropped);
+  status.add("Late", counts_.late);
   status.add("Refused", counts_.refused);
+}
+
+void LocalizerDiagnostics::reportTransform(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool missing = !missing_transform_.empty();
+  status.summary(missing ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
+                 missing ? "Nothing broadcast: " + missing_transform_ : "Broadcast with every image");
 }
 
 void LocalizerDiagnostics::reportMap(Wrapper& status) {

@@ -62,8 +62,8 @@ void LocalizerNodelet::start() {
   localizer_ = std::make_unique<SharedLocalizer>(parameters_.localizer);
   publisher_ = std::make_unique<LocalizerPublisher>(private_node, parameters_.node);
   transform_publisher_ = std::make_unique<TransformPublisher>(parameters_.node, node);
-  diagnostics_ =
-      std::make_unique<LocalizerDiagnostics>(node, private_node, getName(), parameters_.node.image_timeout_s);
+  diagnostics_ = std::make_unique<LocalizerDiagnostics>(node, private_node, getName(), parameters_.node,
+                                                        [this] { return images_->description(); });
   images_ = std::make_unique<ImageSource>(node, private_node, parameters_.node.image_transport,
                                           [this](ReceivedImage image) { onImage(std::move(image)); });
   if (!parameters_.node.map.empty()) {
@@ -163,8 +163,23 @@ void LocalizerNodelet::configure(const NodeParameters& parameters, const Paramet
 }
 
 void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {
-  if (!localizer_->hasMap()) publisher_->publishNoMap(counts());
+  if (!localizer_->hasMap()) publisher_->publishState(LocalizationState::kNoMap, counts());
+  watchCamera();
   diagnostics_->publish();
+}
+
+/// A robot that sees nothing may be anywhere by now: nobody must go on to trust the last state.
+void LocalizerNodelet::watchCamera() {
+  const auto silence_s = diagnostics_->silence_s();
+  if (silence_s && !camera_silent_)
+    NODELET_ERROR_STREAM("No image for " << *silence_s << " s on " << images_->description());
+  if (!silence_s && camera_silent_) NODELET_INFO("Images arrive again");
+  camera_silent_ = silence_s.has_value();
+  if (!camera_silent_) return;
+  const auto state = localizer_->doubt();
+  if (!state) return;
+  diagnostics_->stateIs(*state);
+  publisher_->publishState(*state, counts());
 }
 
 std::size_t LocalizerNodelet::useMap(const std::string& path) {
@@ -190,6 +205,7 @@ void LocalizerNodelet::work() {
 
 void LocalizerNodelet::process(const ReceivedImage& image) {
   const cv::Mat grey = image.decode();
+  if (!localizer_->hasMap()) return;
   const ros::Time stamp = usableStamp(image.header.stamp);
   const auto result = localizer_->process(static_cast<std::int64_t>(stamp.toNSec()), grey);
   if (!result) return;
@@ -209,6 +225,7 @@ void LocalizerNodelet::publish(const SharedLocalizer::Result& result, const ros:
   publisher_->publish(result, stamp, latency_ms, counts());
   diagnostics_->imageProcessed(result.estimate, latency_ms, counts());
   const std::string missing = transform_publisher_->publish(result.estimate.pose, stamp);
+  diagnostics_->transformMissing(missing);
   if (!missing.empty() && transform_throttle_.ready()) NODELET_WARN_STREAM("Nothing broadcast on tf: " << missing);
 }
 
@@ -224,7 +241,7 @@ void LocalizerNodelet::refuse(const std::string& reason) {
   if (refusal_throttle_.ready()) NODELET_WARN_STREAM("Image refused: " << reason);
 }
 
-ImageCounts LocalizerNodelet::counts() const { return {processed_, queue_.dropped(), refused_}; }
+ImageCounts LocalizerNodelet::counts() const { return {processed_, queue_.dropped(), 0, refused_}; }
 
 }  // namespace visual_localization
 

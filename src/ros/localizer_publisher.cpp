@@ -43,9 +43,9 @@ void LocalizerPublisher::publishMap(const TrainingMap& map) {
   map_markers_.publish(toMarkers(map, config_.global_frame_id));
 }
 
-void LocalizerPublisher::publishNoMap(const ImageCounts& counts) {
+void LocalizerPublisher::publishState(LocalizationState state, const ImageCounts& counts) {
   Estimate nothing;
-  nothing.state = LocalizationState::kNoMap;
+  nothing.state = state;
   publishStatus(toStatus(nothing, headerOf(config_.global_frame_id, ros::Time::now())), -1.0, counts);
 }
 
@@ -71,7 +71,7 @@ void LocalizerPublisher::publishParticles(const std::vector<Particle>& all, cons
 void LocalizerPublisher::publishStatus(LocalizationStatus status, double latency_ms, const ImageCounts& counts) {
   status.latency_ms = latency_ms;
   status.images_processed = counts.processed;
-  status.images_dropped = counts.dropped;
+  status.images_dropped = counts.dropped + counts.late;
   status.images_refused = counts.refused;
   status_.publish(status);
 }

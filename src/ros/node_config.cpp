@@ -31,7 +31,9 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
                  tf_mode, {"none", "map_to_odom", "map_to_base"});
   visitor.real({"transform_tolerance", "s", "transforms are dated so far after the image"}, transform_tolerance_s, 0.0,
                60.0);
-  visitor.real({"image_timeout", "s", "diagnostics warn when the newest image is older"}, image_timeout_s, 0.1, 3600.0);
+  visitor.real({"image_timeout", "s",
+                "without an image for so long diagnostics show an error and the state is no longer TRACKING"},
+               image_timeout_s, 0.1, 3600.0);
   visitor.text({"global_frame_id", "", "frame of the map", kAtStartOnly}, global_frame_id);
   visitor.text({"odom_frame_id", "", "frame of the odometry", kAtStartOnly}, odom_frame_id);
   visitor.text({"base_frame_id", "", "frame of the robot", kAtStartOnly}, base_frame_id);

@@ -28,12 +28,15 @@ class ImageSource {
 
   /// Returns after a callback that is running.
   void shutdown();
-  std::string topic() const;
+  const std::string& topic() const { return topic_; }
+  /// For people: the topic and how many publish it.
+  std::string description() const;
 
  private:
   image_transport::ImageTransport image_transport_;
   image_transport::Subscriber by_plugin_;
   ros::Subscriber compressed_;
+  std::string topic_;  ///< kept, because a subscriber that is shut down has none
 };
 
 }  // namespace visual_localization

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -10,6 +11,8 @@
 #include <ros/node_handle.h>
 
 #include "visual_localization/localizer/estimate.h"
+#include "visual_localization/ros/node_config.h"
+#include "visual_localization/ros/rate_meter.h"
 
 namespace visual_localization {
 
@@ -17,20 +20,30 @@ namespace visual_localization {
 struct ImageCounts {
   std::uint64_t processed = 0;
   std::uint64_t dropped = 0;  ///< replaced by a newer one before they were processed
+  std::uint64_t late = 0;     ///< older than one that was processed
   std::uint64_t refused = 0;  ///< unusable
 };
 
 /// What the node tells on /diagnostics: state, images, latency, map. Thread-safe.
 class LocalizerDiagnostics {
  public:
-  /// `name` of the node; images older than `image_timeout_s` are a warning.
+  /// Tells where images should come from.
+  using DescribeCamera = std::function<std::string()>;
+
+  /// `name` of the node. It is an error when no image comes for longer than the timeout.
   LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, const std::string& name,
-                       double image_timeout_s);
+                       const NodeConfig& config, DescribeCamera describe_camera);
 
   void setImageTimeout(double image_timeout_s);
   void imageArrived();
   void imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts);
   void imageRefused(const ImageCounts& counts, const std::string& reason);
+  /// How long no image has come, when that is longer than the timeout.
+  std::optional<double> silence_s();
+  /// The state has changed without an image.
+  void stateIs(LocalizationState state);
+  /// Empty when the transform was broadcast.
+  void transformMissing(const std::string& reason);
   void mapLoaded(const std::string& path, std::size_t images);
   void publish() { updater_.force_update(); }
 
@@ -41,6 +54,8 @@ class LocalizerDiagnostics {
   void reportState(Wrapper& status);
   void reportImages(Wrapper& status);
   void reportMap(Wrapper& status);
+  void reportTransform(Wrapper& status);
+  double age_s() const;
 
   std::mutex mutex_;
   double image_timeout_s_;
@@ -50,8 +65,10 @@ class LocalizerDiagnostics {
   std::string last_refusal_;
   std::string map_path_;
   std::size_t map_images_ = 0;
-  std::uint64_t arrived_ = 0;  ///< since the last report
-  Clock::time_point last_report_ = Clock::now();
+  std::string missing_transform_;
+  DescribeCamera describe_camera_;
+  RateMeter arrivals_;
+  const Clock::time_point start_ = Clock::now();
   std::optional<Clock::time_point> last_arrival_;
   diagnostic_updater::Updater updater_;  ///< last: it refers to everything above
 };

@@ -55,6 +55,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   std::size_t useMap(const std::string& path);
   void work();
   void process(const ReceivedImage& image);
+  void watchCamera();
   void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, bool stamp_is_usable);
   ros::Time usableStamp(const ros::Time& stamp);
   void refuse(const std::string& reason);
@@ -76,6 +77,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   LatestQueue<ReceivedImage> queue_;
   std::atomic<std::uint64_t> processed_{0};
   std::atomic<std::uint64_t> refused_{0};
+  bool camera_silent_ = false;  ///< of the timer
   Throttle refusal_throttle_;
   Throttle initial_pose_throttle_;
   Throttle stamp_throttle_;

@@ -20,8 +20,8 @@ class LocalizerPublisher {
   LocalizerPublisher(ros::NodeHandle private_node, const NodeConfig& config);
 
   void publishMap(const TrainingMap& map);
-  /// That there is no map.
-  void publishNoMap(const ImageCounts& counts);
+  /// What is known without an image: that there is no map, or that none comes. Stamped with the present.
+  void publishState(LocalizationState state, const ImageCounts& counts);
   /// Everything that is known after an image but the drawing. `result` must be finite.
   void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, double latency_ms,
                const ImageCounts& counts);

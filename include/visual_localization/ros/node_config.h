@@ -17,7 +17,7 @@ struct NodeConfig {
   std::string image_transport = "raw";     ///< raw, compressed (decoded here), or another installed transport
   std::string tf_mode = "none";            ///< none, map_to_odom, map_to_base
   double transform_tolerance_s = 0.1;      ///< how far transforms are dated into the future
-  double image_timeout_s = 5.0;            ///< diagnostics warn when the newest image is older
+  double image_timeout_s = 5.0;            ///< without an image for so long it is an error
   std::string global_frame_id = "map";
   std::string odom_frame_id = "odom";
   std::string base_frame_id = "base_link";
