@@ -205,7 +205,7 @@ void LocalizerNodelet::work() {
 
 void LocalizerNodelet::process(const ReceivedImage& image) {
   const cv::Mat grey = image.decode();
-  if (!localizer_->hasMap()) return;
+  if (!localizer_->hasMap() || !isInOrder(image.header.stamp)) return;
   const ros::Time stamp = usableStamp(image.header.stamp);
   const auto result = localizer_->process(static_cast<std::int64_t>(stamp.toNSec()), grey);
   if (!result) return;
@@ -229,6 +229,26 @@ void LocalizerNodelet::publish(const SharedLocalizer::Result& result, const ros:
   if (!missing.empty() && transform_throttle_.ready()) NODELET_WARN_STREAM("Nothing broadcast on tf: " << missing);
 }
 
+bool LocalizerNodelet::isInOrder(const ros::Time& stamp) {
+  if (stamp.isZero()) return true;
+  const auto verdict = stamps_.judge(static_cast<std::int64_t>(stamp.toNSec()));
+  if (verdict == StampMonitor::Verdict::kInOrder) return true;
+  if (verdict == StampMonitor::Verdict::kWentBack) {
+    if (jump_throttle_.ready()) {
+      NODELET_WARN_STREAM("Time went back by " << stamps_.lag_s()
+                                               << " s, as when a bag begins anew: goes on from there");
+    }
+    transform_publisher_->forget();
+    return true;
+  }
+  ++late_;
+  if (order_throttle_.ready()) {
+    NODELET_WARN_STREAM("An image is " << stamps_.lag_s() << " s older than one before it and is left out; "
+                                       << images_->topic());
+  }
+  return false;
+}
+
 ros::Time LocalizerNodelet::usableStamp(const ros::Time& stamp) {
   if (!stamp.isZero()) return stamp;
   if (stamp_throttle_.ready()) NODELET_WARN("Images without a stamp: the time of processing is used");
@@ -241,7 +261,7 @@ void LocalizerNodelet::refuse(const std::string& reason) {
   if (refusal_throttle_.ready()) NODELET_WARN_STREAM("Image refused: " << reason);
 }
 
-ImageCounts LocalizerNodelet::counts() const { return {processed_, queue_.dropped(), 0, refused_}; }
+ImageCounts LocalizerNodelet::counts() const { return {processed_, queue_.dropped(), late_, refused_}; }
 
 }  // namespace visual_localization
 

@@ -25,6 +25,7 @@
 #include "visual_localization/ros/node_config.h"
 #include "visual_localization/ros/reconfigure_server.h"
 #include "visual_localization/ros/shared_localizer.h"
+#include "visual_localization/ros/stamp_monitor.h"
 #include "visual_localization/ros/throttle.h"
 #include "visual_localization/ros/transform_publisher.h"
 
@@ -55,6 +56,8 @@ class LocalizerNodelet : public nodelet::Nodelet {
   std::size_t useMap(const std::string& path);
   void work();
   void process(const ReceivedImage& image);
+  /// False for an image that comes too late to be of use.
+  bool isInOrder(const ros::Time& stamp);
   void watchCamera();
   void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, bool stamp_is_usable);
   ros::Time usableStamp(const ros::Time& stamp);
@@ -76,13 +79,17 @@ class LocalizerNodelet : public nodelet::Nodelet {
 
   LatestQueue<ReceivedImage> queue_;
   std::atomic<std::uint64_t> processed_{0};
+  std::atomic<std::uint64_t> late_{0};
   std::atomic<std::uint64_t> refused_{0};
+  StampMonitor stamps_;         ///< of the worker
   bool camera_silent_ = false;  ///< of the timer
   Throttle refusal_throttle_;
   Throttle initial_pose_throttle_;
   Throttle stamp_throttle_;
   Throttle transform_throttle_;
   Throttle finite_throttle_;
+  Throttle order_throttle_;
+  Throttle jump_throttle_;
   std::thread worker_;
 };
 
