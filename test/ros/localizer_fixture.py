@@ -4,9 +4,14 @@ import os
 import subprocess
 import threading
 import time
+import xmlrpc.client
 
 import rosbag
+import rosgraph
+import rosnode
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CompressedImage, NavSatFix
 
 from visual_localization.msg import LocalizationStatus
@@ -62,6 +67,42 @@ class Recorder:
         return self._subscriber.get_num_connections() > 0
 
 
+class LogRecorder(Recorder):
+    """What all nodes log."""
+
+    def __init__(self):
+        super().__init__('/rosout', Log)
+
+    def wait_for(self, text, timeout_s):
+        wait_for(lambda: any(text in line.msg for line in self.messages()), timeout_s, '"%s" in the log' % text)
+
+
+class Diagnostics(Recorder):
+    """What one node reports of its parts."""
+    OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+    def __init__(self, node):
+        self._node = node
+        super().__init__('/diagnostics', DiagnosticArray)
+
+    def last_of(self, part):
+        name = '%s: %s' % (self._node, part)
+        found = [status for array in self.messages() for status in array.status if status.name == name]
+        return found[-1] if found else None
+
+    def wait_for(self, part, level, timeout_s):
+        """The message of the next report with this level."""
+        def reached():
+            last = self.last_of(part)
+            return last if last is not None and last.level == level else None
+        self.clear()
+        return wait_for(reached, timeout_s, 'level %r of %s' % (level, part)).message
+
+    def value(self, part, key):
+        last = self.last_of(part)
+        return {item.key: item.value for item in last.values}[key] if last else 'nan'
+
+
 class Localizer:
     """The node under test as its users see it."""
 
@@ -102,6 +143,13 @@ class Camera:
         before = self._localizer.counts()[0]
         self.publish(image)
         return wait_for(answer, timeout_s, 'the answer to an image')[0]
+
+
+def memory_mb(node):
+    """Resident memory of a node's process."""
+    _, _, pid = xmlrpc.client.ServerProxy(rosnode.get_api_uri(rosgraph.Master('/test'), node)).getPid('/test')
+    with open('/proc/%d/status' % pid) as status:
+        return [float(line.split()[1]) / 1024.0 for line in status if line.startswith('VmRSS')][0]
 
 
 def truth_of(bag_path):

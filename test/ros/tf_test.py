@@ -37,6 +37,7 @@ class TfTest(unittest.TestCase):
         self.odometry = rospy.Publisher('/tf', TFMessage, queue_size=10)
         self.transforms = fixture.Recorder('/tf', TFMessage)
         self.poses = fixture.Recorder('/localizer/pose', PoseWithCovarianceStamped)
+        self.diagnostics = fixture.Diagnostics('localizer')
         self.localizer = fixture.Localizer()
         self.localizer.wait_until_up()
         for publisher in (self.camera, self.odometry):
@@ -61,6 +62,8 @@ class TfTest(unittest.TestCase):
         for _ in range(3):
             self.show_image()
         self.assertEqual(self.from_map(), [])
+        message = self.diagnostics.wait_for('transform', self.diagnostics.WARN, DEADLINE_S)
+        self.assertIn('no transform from odom to base_link', message)
 
     def test_2_with_odometry_the_chain_leads_to_the_pose(self):
         odometry = (3.0, -2.0, 0.7)
@@ -76,6 +79,7 @@ class TfTest(unittest.TestCase):
         self.assertAlmostEqual(transform.transform.translation.y + math.sin(yaw) * x + math.cos(yaw) * y,
                                pose.pose.pose.position.y, places=6)
         self.assertAlmostEqual(math.cos(yaw + base_yaw - yaw_of(pose.pose.pose.orientation)), 1.0, places=6)
+        self.diagnostics.wait_for('transform', self.diagnostics.OK, DEADLINE_S)
 
 
 if __name__ == '__main__':

@@ -7,6 +7,8 @@ import unittest
 
 import rospy
 import rostest
+from dynamic_reconfigure.client import Client
+from nav_msgs.msg import Path
 from nodelet.srv import NodeletList, NodeletLoad, NodeletLoadRequest, NodeletUnload
 from sensor_msgs.msg import CompressedImage
 
@@ -78,6 +80,23 @@ class UnloadTest(unittest.TestCase):
         for name in ('/left', '/right'):
             self.wait_until_it_works(name)
         for name in ('/left', '/right'):
+            self.unload(name)
+
+    def test_two_maps_in_one_manager(self):
+        """Each has its own map, parameters and diagnostics."""
+        paths = {'/fine': fixture.Recorder('/fine/map_path', Path), '/coarse': fixture.Recorder('/coarse/map_path', Path)}
+        self.assertTrue(self.load('/fine'))
+        self.assertTrue(self.load('/coarse', map=rospy.get_param('~coarse_map')))
+        for name in paths:
+            self.wait_until_it_works(name)
+        lengths = {name: len(fixture.wait_for(path.last, 30.0, 'the map of ' + name).poses)
+                   for name, path in paths.items()}
+        self.assertEqual(lengths, {'/fine': 404, '/coarse': 59})
+        fine, coarse = Client('/fine', timeout=30.0), Client('/coarse', timeout=30.0)
+        fine.update_configuration({'dpso/particles': 33})
+        self.assertEqual(coarse.update_configuration({})['dpso/particles'], 80)
+        self.assertEqual(rospy.get_param('/coarse/dpso/particles'), 80)
+        for name in paths:
             self.unload(name)
 
     def test_a_bad_parameter_fails_the_nodelet_and_not_the_manager(self):

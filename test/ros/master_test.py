@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+"""A roscore that dies and comes back. It only introduces nodes to each other: connections that exist live on. This test
+has a roscore of its own for that."""
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import unittest
+
+import roslib.packages
+import rospy
+import rostest
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
+from dynamic_reconfigure.msg import IntParameter
+
+import localizer_fixture as fixture
+
+DEADLINE_S = 30.0
+BAG, MAP = sys.argv[1:3]
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+class Master:
+    """A master that can be killed and started again at the same address."""
+
+    def __init__(self, port):
+        self._port = port
+        self.start()
+
+    def start(self):
+        self._process = subprocess.Popen(['rosmaster', '--core', '-p', str(self._port)], stdout=subprocess.DEVNULL,
+                                         stderr=subprocess.DEVNULL)
+
+        def answers():
+            with socket.socket() as probe:
+                return probe.connect_ex(('127.0.0.1', self._port)) == 0
+        fixture.wait_for(answers, DEADLINE_S, 'the master')
+
+    def kill(self):
+        self._process.kill()
+        self._process.wait()
+
+
+class MasterTest(unittest.TestCase):
+    def setUp(self):
+        self.images = iter(fixture.images_of(BAG, count=60))
+        rospy.set_param('/localizer', {'map': MAP, 'image_transport': 'compressed'})
+        self.node = subprocess.Popen([roslib.packages.find_node('visual_localization', 'localizer_node')[0],
+                                      '__name:=localizer', 'image:=/stereo/left/image_raw'])
+        self.addCleanup(self.node.kill)
+        self.localizer = fixture.Localizer()
+        self.localizer.wait_until_up()
+        self.camera = fixture.Camera(self.localizer)
+        rospy.wait_for_service('/localizer/set_parameters', DEADLINE_S)
+        # Persistent, since nobody can be asked for the address while there is no master.
+        self.set_parameters = rospy.ServiceProxy('/localizer/set_parameters', Reconfigure, persistent=True)
+
+    def set_particles(self, count):
+        """The number of particles that holds afterwards, and how long the answer took."""
+        request = ReconfigureRequest()
+        request.config.ints.append(IntParameter('dpso/particles', count))
+        begin = time.monotonic()
+        answer = {item.name: item.value for item in self.set_parameters(request).config.ints}
+        return answer['dpso/particles'], time.monotonic() - begin
+
+    def show(self, count):
+        for _ in range(count):
+            self.camera.show(next(self.images))
+
+    def test_images_flow_without_and_with_a_new_master(self):
+        self.show(5)
+        self.assertEqual(self.set_particles(81)[0], 81)
+        master.kill()
+        self.show(10)
+        particles, seconds = self.set_particles(82)
+        print('without a master parameters are set after %.2f s' % seconds)
+        self.assertEqual(particles, 82)
+        self.assertLess(seconds, 5.0)
+        master.start()
+        self.show(10)
+        self.assertEqual(self.set_particles(83)[0], 83)
+        self.assertEqual(rospy.get_param('/localizer/dpso/particles'), 83)
+        master.kill()
+        self.show(5)
+        begin = time.monotonic()
+        self.node.send_signal(signal.SIGINT)
+        self.assertEqual(self.node.wait(DEADLINE_S), 0)
+        print('without a master the node ends after %.2f s' % (time.monotonic() - begin))
+
+
+if __name__ == '__main__':
+    port = free_port()
+    os.environ['ROS_MASTER_URI'] = 'http://127.0.0.1:%d' % port
+    master = Master(port)
+    try:
+        rospy.init_node('master_test', disable_signals=True)
+        rostest.rosrun('visual_localization', 'master_test', MasterTest, sys.argv)
+    finally:
+        master.kill()
