@@ -84,7 +84,7 @@ class Recorder:
         self._has_map = bool(message.poses)
 
     def _on_status(self, message: LocalizationStatus) -> None:
-        if message.state == LocalizationStatus.NO_MAP or message.header.stamp.is_zero():
+        if message.best_image < 0 or message.header.stamp.is_zero():  # no answer to an image: no map, or none came
             return
         self.statuses[message.header.stamp] = message
         self.last_answer_s = time.monotonic()

@@ -120,6 +120,7 @@ class FaultsTest(unittest.TestCase):
         self.assertIn('No image for', message)
         self.assertIn('image_raw/compressed (publishers: 1)', message)
         self.localizer.wait_for_state(LocalizationStatus.UNCERTAIN, DEADLINE_S)
+        self.assertEqual(self.localizer.status.last().best_image, -1)
         self.diagnostics.wait_for('localization', self.diagnostics.WARN, DEADLINE_S)
         self.log.wait_for('No image for', DEADLINE_S)
         self.parameters.update_configuration({'image_timeout': 5.0})
@@ -155,7 +156,6 @@ class FaultsTest(unittest.TestCase):
         return float(self.diagnostics.value('images', 'Rate (Hz)'))
 
     def test_6_from_half_an_image_a_second_to_thirty(self):
-        time.sleep(2.0)
         self.assertEqual(self.check_rate(0.5, 4), 4)
         self.assertGreater(self.check_rate(30.0, 330), 50)
         fixture.wait_for(lambda: 20.0 < self.measured_rate_hz() < 40.0, DEADLINE_S, 'the rate in the diagnostics')
