@@ -54,6 +54,7 @@ Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& 
 Prior drawnFrom(std::vector<Particle> cloud) {
   if (cloud.empty()) throw std::invalid_argument("a cloud without particles is no prior");
   std::vector<double> cumulated;
+  cumulated.reserve(cloud.size());
   double total = 0.0;
   for (const Particle& particle : cloud) cumulated.push_back(total += particle.weight);
   return [cloud = std::move(cloud), cumulated = std::move(cumulated)](Random& random) {
