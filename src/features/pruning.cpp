@@ -19,4 +19,11 @@ SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const Si
   return features.subset(kept);
 }
 
+void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, double max_angle_ratio,
+                SiftFeatures& kept) {
+  static thread_local std::vector<std::size_t> seen;
+  matchOneWay(features, neighbour, max_angle_ratio, seen);
+  features.subset(seen, kept);
+}
+
 }  // namespace visual_localization

@@ -27,15 +27,23 @@ void SiftFeatures::swapIn(std::vector<SiftKeypoint>& keypoints, std::vector<std:
 }
 
 SiftFeatures SiftFeatures::subset(const std::vector<std::size_t>& indices) const {
-  std::vector<SiftKeypoint> keypoints;
-  std::vector<std::uint8_t> descriptors;
-  keypoints.reserve(indices.size());
-  descriptors.reserve(indices.size() * kDescriptorSize);
+  SiftFeatures chosen;
+  subset(indices, chosen);
+  return chosen;
+}
+
+void SiftFeatures::subset(const std::vector<std::size_t>& indices, SiftFeatures& chosen) const {
+  chosen.keypoints_.clear();
+  chosen.descriptors_.clear();
+  chosen.inverse_norms_.clear();
+  chosen.keypoints_.reserve(indices.size());
+  chosen.descriptors_.reserve(indices.size() * kDescriptorSize);
+  chosen.inverse_norms_.reserve(indices.size());
   for (const std::size_t i : indices) {
-    keypoints.push_back(keypoints_.at(i));
-    descriptors.insert(descriptors.end(), descriptor(i), descriptor(i) + kDescriptorSize);
+    chosen.keypoints_.push_back(keypoints_.at(i));
+    chosen.descriptors_.insert(chosen.descriptors_.end(), descriptor(i), descriptor(i) + kDescriptorSize);
+    chosen.inverse_norms_.push_back(inverse_norms_[i]);
   }
-  return SiftFeatures(std::move(keypoints), std::move(descriptors));
 }
 
 }  // namespace visual_localization

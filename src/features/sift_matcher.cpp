@@ -30,6 +30,26 @@ bool matchesBack(std::size_t i, const NearestDescriptors& nearest, const AngleRa
   return of_b.index == i && isDistinct(of_a, test) && isDistinct(of_b, test);
 }
 
+template <class Use>
+void forEachOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio, Use use) {
+  if (a.size() < 2 || b.size() < 2) return;
+  const NearestDescriptors& nearest = neighboursOf(a, b);
+  const AngleRatioTest& test = ratioTest(max_angle_ratio);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (isDistinct(nearest.of_a[i], test)) use(FeatureMatch{i, nearest.of_a[i].index});
+  }
+}
+
+template <class Use>
+void forEachSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio, Use use) {
+  if (a.size() < 2 || b.size() < 2) return;
+  const NearestDescriptors& nearest = neighboursOf(a, b);
+  const AngleRatioTest& test = ratioTest(max_angle_ratio);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (matchesBack(i, nearest, test)) use(FeatureMatch{i, nearest.of_a[i].index});
+  }
+}
+
 }  // namespace
 
 void MatchConfig::declare(ParameterVisitor& visitor) {
@@ -40,25 +60,33 @@ void MatchConfig::declare(ParameterVisitor& visitor) {
 }
 
 std::vector<FeatureMatch> matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
-  if (a.size() < 2 || b.size() < 2) return {};
-  const NearestDescriptors& nearest = neighboursOf(a, b);
-  const AngleRatioTest& test = ratioTest(max_angle_ratio);
   std::vector<FeatureMatch> matches;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (isDistinct(nearest.of_a[i], test)) matches.push_back({i, nearest.of_a[i].index});
-  }
+  forEachOneWay(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
   return matches;
 }
 
 std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
-  if (a.size() < 2 || b.size() < 2) return {};
-  const NearestDescriptors& nearest = neighboursOf(a, b);
-  const AngleRatioTest& test = ratioTest(max_angle_ratio);
   std::vector<FeatureMatch> matches;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (matchesBack(i, nearest, test)) matches.push_back({i, nearest.of_a[i].index});
-  }
+  forEachSymmetric(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
   return matches;
+}
+
+void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+                 std::vector<std::size_t>& matched) {
+  matched.clear();
+  forEachOneWay(a, b, max_angle_ratio, [&matched](const FeatureMatch& match) { matched.push_back(match.a); });
+}
+
+std::size_t countOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
+  std::size_t count = 0;
+  forEachOneWay(a, b, max_angle_ratio, [&count](const FeatureMatch&) { ++count; });
+  return count;
+}
+
+std::size_t countSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
+  std::size_t count = 0;
+  forEachSymmetric(a, b, max_angle_ratio, [&count](const FeatureMatch&) { ++count; });
+  return count;
 }
 
 }  // namespace visual_localization

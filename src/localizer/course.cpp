@@ -7,7 +7,7 @@ namespace visual_localization {
 
 void Course::add(std::int64_t stamp_ns, const Eigen::Vector2d& position_m) {
   points_.push_back({stamp_ns, position_m});
-  if (points_.size() > length_) points_.pop_front();
+  if (points_.size() > length_) points_.erase(points_.begin());
 }
 
 double Course::residual_m() const {

@@ -30,26 +30,31 @@ void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   std::swap(previous_, current_);
   if (!current_) current_.emplace();
   current_->stamp_ns = stamp_ns;
-  current_->sift.reset();
+  current_->has_sift = false;
   if (grey.size() == image_size_) {
     grey.copyTo(current_->grey);
   } else {
     cv::resize(grey, current_->grey, image_size_, 0.0, 0.0, cv::INTER_AREA);
   }
-  pruned_.reset();
+  has_pruned_ = false;
   global_.reset();
   extract_ms_ = stopwatch.elapsed_ms();
 }
 
 const SiftFeatures& FrontEnd::sift() {
-  if (pruned_) return *pruned_;
+  if (has_pruned_) return pruned_;
   const Stopwatch stopwatch;
   const SiftFeatures& all = unprunedSift(*current_);
   constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
   const bool prunable = prune_ && previousIsClose() && unprunedSift(*previous_).size() >= kLeast;
-  pruned_ = prunable ? keepSeenIn(all, {&*previous_->sift}, match_.max_angle_ratio) : all;
+  if (prunable) {
+    keepSeenIn(all, previous_->sift, match_.max_angle_ratio, pruned_);
+  } else {
+    pruned_ = all;
+  }
+  has_pruned_ = true;
   extract_ms_ += stopwatch.elapsed_ms();
-  return *pruned_;
+  return pruned_;
 }
 
 const GlobalFeatures& FrontEnd::global() {
@@ -61,8 +66,9 @@ const GlobalFeatures& FrontEnd::global() {
 }
 
 const SiftFeatures& FrontEnd::unprunedSift(Image& image) {
-  if (!image.sift) image.sift = sift_extractor_->extract(image.grey);
-  return *image.sift;
+  if (!image.has_sift) sift_extractor_->extract(image.grey, image.sift);
+  image.has_sift = true;
+  return image.sift;
 }
 
 bool FrontEnd::previousIsClose() const {

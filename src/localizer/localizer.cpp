@@ -43,7 +43,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   LiveImage image(front_end_, *map_, sift_similarity_, global_similarity_);
   Estimate estimate = process(stamp_ns, image);
   estimate.features_extracted = front_end_.siftExtracted();
-  if (const auto& sift = front_end_.siftIfExtracted()) estimate.features_kept = sift->size();
+  if (const SiftFeatures* sift = front_end_.siftIfExtracted()) estimate.features_kept = sift->size();
   const double extract_ms = front_end_.extract_ms();
   estimate.times = {extract_ms, image.match_ms(), stopwatch.elapsed_ms() - extract_ms - image.match_ms()};
   return estimate;
@@ -129,7 +129,7 @@ LocalizationState Localizer::doubt() { return assessor_.doubt(tracker_->tuning()
 
 /// While the images confirm the position the covariance is that of its mode; otherwise that of the whole cloud
 /// about it, so that nothing downstream trusts a guess.
-PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) const {
+PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) {
   const double floor_m2 = config_.min_position_std_m * config_.min_position_std_m;
   PoseEstimate pose;
   pose.position_m = tracked.position_m;
@@ -142,16 +142,16 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
 }
 
 /// How much the headings of the training images around the position differ from the one that is reported.
-double Localizer::yawVariance(const TrackerEstimate& tracked) const {
+double Localizer::yawVariance(const TrackerEstimate& tracked) {
   constexpr std::size_t kNeighbours = 5;
-  const auto neighbours = map_->nearest(tracked.position_m, kNeighbours);
+  map_->nearest(tracked.position_m, kNeighbours, neighbours_);
   double squares = 0.0;
-  for (const Neighbour& neighbour : neighbours) {
+  for (const Neighbour& neighbour : neighbours_) {
     const double difference = angleDifference(map_->yaw_rad(tracked.training_image), map_->yaw_rad(neighbour.image));
     squares += difference * difference;
   }
   const double floor_rad2 = config_.min_yaw_std_rad * config_.min_yaw_std_rad;
-  return floor_rad2 + squares / static_cast<double>(neighbours.size());
+  return floor_rad2 + squares / static_cast<double>(neighbours_.size());
 }
 
 }  // namespace visual_localization

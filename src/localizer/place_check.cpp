@@ -18,7 +18,8 @@ double PlaceCheck::ratio(ComparableImage& image, const Eigen::Vector2d& position
   constexpr std::size_t kNeighbours = 32;  // in a denser map the nearest ones speak for the others
   const auto similarity = [&image](std::size_t i) { return image.compare(FeatureKind::kGlobal, i).similarity; };
   double here = 0.0;
-  for (const Neighbour& neighbour : map_.nearest(position_m, kNeighbours)) {
+  map_.nearest(position_m, kNeighbours, neighbours_);
+  for (const Neighbour& neighbour : neighbours_) {
     if (neighbour.distance_m <= near_m_) here = std::max(here, similarity(neighbour.image));
   }
   double anywhere = here;

@@ -7,6 +7,15 @@
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
+namespace {
+
+/// A short vector is moved sooner than memory is found for a list.
+template <class Value>
+void keepLast(std::size_t count, std::vector<Value>& values) {
+  if (values.size() > count) values.erase(values.begin(), values.end() - static_cast<std::ptrdiff_t>(count));
+}
+
+}  // namespace
 
 void StateConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"state/min_similarity", "1", "a weaker best match by SIFT does not confirm a position"}, min_similarity,
@@ -80,11 +89,11 @@ void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& ev
   if (last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m) forget();
   last_position_m_ = estimate.position_m;
   course_.add(evidence.stamp_ns, estimate.position_m);
-  confirmations_.push_back(confirms(estimate, evidence.features));
+  confirmations_.push_back(confirms(estimate, evidence.features) ? 1 : 0);
   place_ratios_.push_back(evidence.place_ratio);
   const auto window = static_cast<std::size_t>(config_.window);
-  while (confirmations_.size() > window) confirmations_.pop_front();
-  while (place_ratios_.size() > window) place_ratios_.pop_front();
+  keepLast(window, confirmations_);
+  keepLast(window, place_ratios_);
 }
 
 void StateAssessor::forget() {
@@ -94,7 +103,7 @@ void StateAssessor::forget() {
 }
 
 bool StateAssessor::isCertain() const {
-  const auto confirmed = std::count(confirmations_.begin(), confirmations_.end(), true);
+  const auto confirmed = std::count(confirmations_.begin(), confirmations_.end(), 1);
   return confirmed >= config_.images_to_confirm && !isDoubtful() &&
          course_.residual_m() <= config_.max_course_residual_m;
 }

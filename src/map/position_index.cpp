@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include <nanoflann.hpp>
@@ -27,33 +28,40 @@ struct Points {
 };
 
 /// The k best so far, ordered by distance and then by index. nanoflann's own result set keeps whichever of two
-/// equally distant points the tree visits first.
+/// equally distant points the tree visits first. Squared distances until finish().
 class OrderedResults {
  public:
   using DistanceType = double;
 
-  explicit OrderedResults(std::size_t capacity) : capacity_(capacity) { found_.reserve(capacity + 1); }
+  OrderedResults(std::size_t capacity, std::vector<Neighbour>& found) : capacity_(capacity), found_(found) {
+    found_.clear();
+    found_.reserve(capacity + 1);
+  }
 
   std::size_t size() const { return found_.size(); }
   bool full() const { return found_.size() == capacity_; }
   bool addPoint(double squared_m2, std::uint32_t index) {
-    const std::pair<double, std::uint32_t> candidate(squared_m2, index);
-    found_.insert(std::upper_bound(found_.begin(), found_.end(), candidate), candidate);
+    const Neighbour candidate{index, squared_m2};
+    const auto nearer = [](const Neighbour& a, const Neighbour& b) {
+      return std::tie(a.distance_m, a.image) < std::tie(b.distance_m, b.image);
+    };
+    found_.insert(std::upper_bound(found_.begin(), found_.end(), candidate, nearer), candidate);
     if (found_.size() > capacity_) found_.pop_back();
     return true;
   }
   /// Slightly more than the worst distance, because points at exactly this distance are still wanted.
   double worstDist() const {
     if (!full()) return std::numeric_limits<double>::max();
-    return found_.back().first * (1.0 + 1e-9) + std::numeric_limits<double>::min();
+    return found_.back().distance_m * (1.0 + 1e-9) + std::numeric_limits<double>::min();
   }
   void sort() {}
-
-  const std::vector<std::pair<double, std::uint32_t>>& found() const { return found_; }
+  void finish() {
+    for (Neighbour& neighbour : found_) neighbour.distance_m = std::sqrt(neighbour.distance_m);
+  }
 
  private:
   std::size_t capacity_;
-  std::vector<std::pair<double, std::uint32_t>> found_;
+  std::vector<Neighbour>& found_;
 };
 
 /// Positions up to this number get a grid; building one for a city would take longer than it saves.
@@ -82,13 +90,16 @@ class PositionIndex::Tree {
     return indices;
   }
 
-  std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
-    OrderedResults results(std::min(count, points_.positions_m.size()));
+  void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
+    OrderedResults results(std::min(count, points_.positions_m.size()), found);
     tree_.findNeighbors(results, position_m.data(), {});
-    std::vector<Neighbour> neighbours;
-    neighbours.reserve(results.size());
-    for (const auto& [squared_m2, index] : results.found()) neighbours.push_back({index, std::sqrt(squared_m2)});
-    return neighbours;
+    results.finish();
+  }
+
+  Neighbour nearest(const Eigen::Vector2d& position_m) const {
+    static thread_local std::vector<Neighbour> found;
+    nearest(position_m, 1, found);
+    return found.front();
   }
 
  private:
@@ -109,8 +120,7 @@ PositionIndex::PositionIndex(std::vector<Eigen::Vector2d> positions_m) {
   tree_ = std::make_unique<Tree>(std::move(positions_m));
   if (tree_->positions().size() > kLargestGrid) return;
   grid_ = std::make_unique<NearestGrid>(
-      tree_->positions(),
-      [this](const Eigen::Vector2d& place_m) { return tree_->nearest(place_m, 1).front().distance_m; },
+      tree_->positions(), [this](const Eigen::Vector2d& place_m) { return tree_->nearest(place_m).distance_m; },
       [this](const Eigen::Vector2d& centre_m, double radius_m) { return tree_->within(centre_m, radius_m); });
 }
 
@@ -119,12 +129,12 @@ PositionIndex::~PositionIndex() = default;
 Neighbour PositionIndex::nearest(const Eigen::Vector2d& position_m) const {
   if (!position_m.allFinite()) throw std::invalid_argument("position index: the position is not finite");
   const auto found = grid_ ? grid_->nearest(position_m) : std::nullopt;
-  return found ? Neighbour{found->index, std::sqrt(found->squared_m2)} : tree_->nearest(position_m, 1).front();
+  return found ? Neighbour{found->index, std::sqrt(found->squared_m2)} : tree_->nearest(position_m);
 }
 
-std::vector<Neighbour> PositionIndex::nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
-  if (count == 0 || !position_m.allFinite()) return {};
-  return tree_->nearest(position_m, count);
+void PositionIndex::nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
+  found.clear();
+  if (count > 0 && position_m.allFinite()) tree_->nearest(position_m, count, found);
 }
 
 }  // namespace visual_localization

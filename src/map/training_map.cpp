@@ -73,7 +73,13 @@ TrainingImage TrainingMap::image(std::size_t i) const {
 Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const { return index_.nearest(position_m); }
 
 std::vector<Neighbour> TrainingMap::nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
-  return index_.nearest(position_m, count);
+  std::vector<Neighbour> found;
+  nearest(position_m, count, found);
+  return found;
+}
+
+void TrainingMap::nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
+  index_.nearest(position_m, count, found);
 }
 
 }  // namespace visual_localization

@@ -11,9 +11,8 @@ SiftSimilarity::SiftSimilarity(const MatchConfig& match, const SimilarityConfig&
 
 Score SiftSimilarity::compare(const SiftFeatures& current, const SiftFeatures& training) const {
   if (current.size() < 2 || training.size() < 2) return {};
-  const std::size_t matches = (symmetric_ ? matchSymmetric(current, training, max_angle_ratio_)
-                                          : matchOneWay(current, training, max_angle_ratio_))
-                                  .size();
+  const std::size_t matches = symmetric_ ? countSymmetric(current, training, max_angle_ratio_)
+                                         : countOneWay(current, training, max_angle_ratio_);
   const std::size_t possible = symmetric_ ? std::min(current.size(), training.size()) : current.size();
   return scoreOf(static_cast<double>(matches) / static_cast<double>(possible), matches);
 }

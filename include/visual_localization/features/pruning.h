@@ -12,4 +12,8 @@ namespace visual_localization {
 SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
                         double max_angle_ratio);
 
+/// The same with one neighbour, into `kept`, whose memory is used again.
+void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, double max_angle_ratio,
+                SiftFeatures& kept);
+
 }  // namespace visual_localization

@@ -37,6 +37,8 @@ class SiftFeatures {
 
   /// The features at `indices`, in that order.
   SiftFeatures subset(const std::vector<std::size_t>& indices) const;
+  /// The same into `chosen`, another object, whose memory is used again.
+  void subset(const std::vector<std::size_t>& indices, SiftFeatures& chosen) const;
 
  private:
   std::vector<SiftKeypoint> keypoints_;

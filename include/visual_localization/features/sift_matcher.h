@@ -32,4 +32,11 @@ std::vector<FeatureMatch> matchOneWay(const SiftFeatures& a, const SiftFeatures&
 /// M*_AB: pairs that are each other's nearest neighbour and pass the ratio test in both directions. In order of a.
 std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
 
+/// Into `matched`: the features of `a` that matchOneWay matches, in order; without memory of its own.
+void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+                 std::vector<std::size_t>& matched);
+/// How many matches there are.
+std::size_t countOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
+std::size_t countSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
+
 }  // namespace visual_localization

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -30,7 +30,7 @@ class Course {
   bool stampsRise() const;
 
   std::size_t length_;
-  std::deque<Point> points_;
+  std::vector<Point> points_;
 };
 
 }  // namespace visual_localization

@@ -17,7 +17,7 @@ namespace visual_localization {
 /// Live image in, features out: resizes to the map's size and extracts either kind of features when it is first
 /// asked for. SIFT features are kept only if the image directly before shows them as well (Weiss et al., section
 /// III); its features too are extracted only then. The first image, or one after a gap or after an image without
-/// features, is not pruned.
+/// features, is not pruned. Takes no memory from the heap once it has seen a few images.
 class FrontEnd {
  public:
   FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s,
@@ -34,17 +34,18 @@ class FrontEnd {
   const GlobalFeatures& global();
 
   /// The pruned SIFT features if they were asked for.
-  const std::optional<SiftFeatures>& siftIfExtracted() const { return pruned_; }
+  const SiftFeatures* siftIfExtracted() const { return has_pruned_ ? &pruned_ : nullptr; }
   /// Number of SIFT features before pruning; 0 unless they were asked for.
-  std::size_t siftExtracted() const { return current_ && current_->sift ? current_->sift->size() : 0; }
+  std::size_t siftExtracted() const { return current_ && current_->has_sift ? current_->sift.size() : 0; }
   /// Time spent on extraction and pruning since setImage, which counts too.
   double extract_ms() const { return extract_ms_; }
 
  private:
   struct Image {
     std::int64_t stamp_ns = 0;
-    cv::Mat grey;                      ///< of the map's size; a copy, since the camera's buffer does not stay
-    std::optional<SiftFeatures> sift;  ///< not pruned
+    cv::Mat grey;       ///< of the map's size; a copy, since the camera's buffer does not stay
+    SiftFeatures sift;  ///< not pruned
+    bool has_sift = false;
   };
 
   const SiftFeatures& unprunedSift(Image& image);
@@ -58,7 +59,8 @@ class FrontEnd {
   GlobalExtractor global_extractor_;
   std::optional<Image> previous_;
   std::optional<Image> current_;
-  std::optional<SiftFeatures> pruned_;
+  SiftFeatures pruned_;  ///< like those of the images kept when it no longer holds, for the sake of its memory
+  bool has_pruned_ = false;
   std::optional<GlobalFeatures> global_;
   double extract_ms_ = 0.0;
 };

@@ -51,14 +51,17 @@ class Localizer {
   const TrainingMap& map() const { return *map_; }
   const std::vector<Particle>& particles() const { return tracker_->particles(); }
   /// SIFT features of the last image after pruning, for drawing its matches; empty when there was no need for them.
-  SiftFeatures lastSift() const { return front_end_.siftIfExtracted().value_or(SiftFeatures()); }
+  SiftFeatures lastSift() const {
+    const SiftFeatures* sift = front_end_.siftIfExtracted();
+    return sift == nullptr ? SiftFeatures() : *sift;
+  }
 
  private:
   void configureTracker(const std::string& tracker_before);
   Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
                       ComparableImage& image);
-  PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state) const;
-  double yawVariance(const TrackerEstimate& tracked) const;
+  PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
+  double yawVariance(const TrackerEstimate& tracked);
 
   std::shared_ptr<const TrainingMap> map_;
   LocalizerConfig config_;
@@ -71,6 +74,7 @@ class Localizer {
   FeatureChoice choice_;
   PlaceCheck place_check_;
   StateAssessor assessor_;
+  std::vector<Neighbour> neighbours_;  ///< of the last estimate
 };
 
 }  // namespace visual_localization

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -26,6 +27,7 @@ class PlaceCheck {
 
  private:
   const TrainingMap& map_;
+  std::vector<Neighbour> neighbours_;  ///< of the last position
   double near_m_ = 0.0;
   std::size_t stride_ = 1;
   std::size_t rounds_ = 1;  ///< after so many times it begins with the same training image again

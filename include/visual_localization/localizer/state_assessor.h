@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -71,8 +70,8 @@ class StateAssessor {
   LocalizationState stateOf(bool certain, bool recovering) const;
 
   StateConfig config_;
-  std::deque<bool> confirmations_;  ///< of the last images, newest at the back
-  std::deque<double> place_ratios_;
+  std::vector<char> confirmations_;  ///< of the last images, newest at the back
+  std::vector<double> place_ratios_;
   Course course_;
   int unconfirmed_ = 0;          ///< images in a row after which the position was not certain, blind ones not counted
   bool ever_confirmed_ = false;  ///< since the last reset

@@ -28,8 +28,9 @@ class PositionIndex {
 
   /// The nearest. Throws std::invalid_argument when `position_m` is not finite.
   Neighbour nearest(const Eigen::Vector2d& position_m) const;
-  /// The `count` nearest, closest first; fewer when there are fewer. A position that is not finite has none.
-  std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const;
+  /// Into `found`: the `count` nearest, closest first; fewer when there are fewer. A position that is not finite has
+  /// none.
+  void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const;
 
  private:
   class Tree;

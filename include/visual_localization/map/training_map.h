@@ -72,6 +72,8 @@ class TrainingMap {
   Neighbour nearest(const Eigen::Vector2d& position_m) const;
   /// The `count` nearest, closest first; fewer when the map has fewer.
   std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const;
+  /// The same into memory that is there already.
+  void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const;
 
  private:
   MapHeader header_;
