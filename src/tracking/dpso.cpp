@@ -61,7 +61,7 @@ void Dpso::reset(const Prior& prior) {
     particle = Particle();
     particle.position_m = prior(random_);
     for (int axis = 0; axis < 2; ++axis) {
-      particle.velocity_m[axis] = random_.uniform(-1.0, 1.0) * config_.v0 * area_.range()[axis];
+      particle.velocity_m[axis] = random_.uniform(-1.0, 1.0) * config_.v0 * range_m()[axis];
     }
     particle.weight = 1.0 / static_cast<double>(particles_.size());
     confine(particle, area_);
@@ -119,7 +119,7 @@ void Dpso::assignKinds() {
 void Dpso::move(Particle& particle) {
   const double factor = particle.kind == ParticleKind::kHighEnergy ? config_.high_energy_factor : 1.0;
   for (int axis = 0; axis < 2; ++axis) {
-    const double range = area_.range()[axis];
+    const double range = range_m()[axis];
     const double perturbation = config_.phi0 * random_.uniform(-1.0, 1.0) * range * tuning_.v0;
     const double attraction =
         attractor_m_ ? tuning_.phi2 * random_.uniform(0.0, 1.0) * ((*attractor_m_)[axis] - particle.position_m[axis])
@@ -135,7 +135,7 @@ void Dpso::move(Particle& particle) {
 void Dpso::moveQuantum(Particle& particle) {
   particle.velocity_m.setZero();
   particle.position_m = attractor_m_
-                            ? *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * area_.range()))
+                            ? *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * range_m()))
                             : anywhere(area_)(random_);
 }
 
@@ -191,7 +191,7 @@ Eigen::Vector2d Dpso::centreOfMass() const {
 void Dpso::adaptSpeed() {
   const Eigen::Vector2d centre = centreOfMass();
   if (centre_of_mass_m_) {
-    const double speed = relativeLength(centre - *centre_of_mass_m_, area_.range());
+    const double speed = relativeLength(centre - *centre_of_mass_m_, range_m());
     tuning_.speed_ema =
         speed_known_ ? (1.0 - config_.ema_alpha) * tuning_.speed_ema + config_.ema_alpha * speed : speed;
     speed_known_ = true;

@@ -72,6 +72,17 @@ TEST(Dpso, NobodyFliesFasterThanAllowed) {
   }
 }
 
+TEST(Dpso, InACityItIsNotFasterThanTheLargestRangeAllows) {
+  const auto city = test::mapAt(test::circle(200, 5000.0));
+  const Dpso swarm(*city, DpsoConfig(), FitnessConfig(), 1);
+  double fastest_m = 0.0;
+  for (const Particle& particle : swarm.particles()) {
+    fastest_m = std::max(fastest_m, particle.velocity_m.cwiseAbs().maxCoeff());
+  }
+  EXPECT_LE(fastest_m, 0.015 * 500.0);
+  EXPECT_GT(fastest_m, 0.9 * 0.015 * 500.0);
+}
+
 TEST(Dpso, AStraightStreetHasNoSecondAxis) {
   World world(test::mapAt(test::street(50, 2.0)));
   Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);

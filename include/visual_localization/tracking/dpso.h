@@ -36,6 +36,8 @@ class Dpso final : public Tracker {
   void adaptDiversity(const Score& best);
   void endRecovery();
   Eigen::Vector2d centreOfMass() const;
+  /// What speeds and the reach of quantum particles are shares of.
+  Eigen::Vector2d range_m() const { return area_.range().cwiseMin(config_.max_range_m); }
 
   const TrainingMap& map_;
   DpsoConfig config_;

@@ -26,6 +26,7 @@ struct DpsoConfig {
   int recovery_patience = 2;        ///< bad images in a row before recovery starts
   double recovery_step = 0.5;       ///< share of the way to the limits per bad image
   double v0_max = 0.1;
+  double max_range_m = 500.0;  ///< shares of the area's range are of at most so much: a city's swarm is not faster
   double quantum_share_max = 0.20;
   double phi2_min = 0.01;
   double mode_radius_m = 5.0;  ///< particles this close to the best one make up its mode
