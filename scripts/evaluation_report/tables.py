@@ -35,9 +35,9 @@ TRACKING = (Measure('runs', 'runs', 0),
 TRUST = (Measure('tracking_share', 'TRACKING [%]', 1, 100),
          Measure('wrong_tracking', 'of these beyond 5 m [%]', 2, 100),
          Measure('lost_precision', '"lost": precision [%]', 1, 100),
-         Measure('lost_recall', '"lost": recall [%]', 1, 100),
-         Measure('off_map_precision', 'OFF_MAP: precision [%]', 1, 100),
-         Measure('off_map_recall', 'OFF_MAP: recall [%]', 1, 100))
+         Measure('lost_recall', '"lost": recall [%]', 1, 100))
+OFF_MAP = (Measure('off_map_precision', 'OFF_MAP: precision [%]', 1, 100),
+           Measure('off_map_recall', 'OFF_MAP: recall [%]', 1, 100))
 ERROR = MAIN[0]
 NOTHING = '–'
 
@@ -229,6 +229,8 @@ def tracking_tables(results: Results) -> str:
 
 def trust_tables(results: Results) -> str:
     """How far the states of trackers can be trusted; empty when nothing has states."""
-    if all(outcome.get('tracking_share') is None for group in results.groups() for outcome in results.of(group)):
+    outcomes = [outcome for group in results.groups() for outcome in results.of(group)]
+    if all(outcome.get('tracking_share') is None for outcome in outcomes):
         return ''
-    return group_tables(results, Papers(None), TRUST)
+    left = any(outcome.get('off_map_recall') is not None for outcome in outcomes)  # the robot, the map
+    return group_tables(results, Papers(None), TRUST + OFF_MAP if left else TRUST)

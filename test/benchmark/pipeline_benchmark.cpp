@@ -1,0 +1,93 @@
+// The whole path from an image to a pose, on the rounds that ship: each benchmark drives the first images of the cloudy
+// round again and again through a localizer with the map of the sunny one. Beside it, what OpenCV's extraction alone
+// takes for the same images.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+#include <opencv2/features2d.hpp>
+
+#include "visual_localization/localizer/localizer.h"
+#include "visual_localization/ros/bag_reader.h"
+#include "visual_localization/ros/round_recorder.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::size_t kImages = 100;
+constexpr const char* kTopic = "/stereo/left/image_raw";
+
+struct Scene {
+  std::shared_ptr<const TrainingMap> map;
+  std::vector<cv::Mat> images;
+};
+
+/// Recorded once, when the first benchmark asks.
+const Scene& scene() {
+  static const Scene recorded = [] {
+    cv::setNumThreads(1);
+    const std::string folder = TEST_DATA_DIR "/rounds/";
+    const RoundSpec round{"map", "", "", kTopic, "/gps/fix", "/ground_truth/fix"};
+    Scene made;
+    made.map = recordMap(folder + "campus_sunny_1.bag", round, MapBuilderConfig());
+    const BagReader bag(folder + "campus_cloudy_1.bag");
+    const BagImages images = bag.images(kTopic);
+    for (std::size_t i = 0; i < kImages; ++i) made.images.push_back(images.read(i).decode());
+    return made;
+  }();
+  return recorded;
+}
+
+/// Time per image. `at` counts on from pass to pass: images to and fro, so that the robot never jumps.
+const cv::Mat& imageAt(std::size_t at) {
+  const std::size_t place = at % (2 * kImages);
+  return scene().images[place < kImages ? place : 2 * kImages - 1 - place];
+}
+
+void localize(benchmark::State& state, const std::string& features, const std::string& backend) {
+  LocalizerConfig config;
+  config.features = features;
+  config.sift_backend = backend;
+  Localizer localizer(scene().map, config);
+  std::size_t at = 0;
+  StageTimes total;
+  for (; at < kImages; ++at) localizer.process(static_cast<std::int64_t>(at) * 1000000000, imageAt(at));
+  for (auto _ : state) {
+    const Estimate estimate = localizer.process(static_cast<std::int64_t>(at) * 1000000000, imageAt(at));
+    ++at;
+    total.extract_ms += estimate.times.extract_ms;
+    total.match_ms += estimate.times.match_ms;
+    total.update_ms += estimate.times.update_ms;
+  }
+  const auto mean = benchmark::Counter::kAvgIterations;
+  state.counters["extract_ms"] = benchmark::Counter(total.extract_ms, mean);
+  state.counters["match_ms"] = benchmark::Counter(total.match_ms, mean);
+  state.counters["update_ms"] = benchmark::Counter(total.update_ms, mean);
+}
+
+void siftDpso80(benchmark::State& state) { localize(state, "sift", kNativeSift); }
+void siftDpso80WithOpenCvExtraction(benchmark::State& state) { localize(state, "sift", kOpenCvSift); }
+void hybridDpso80(benchmark::State& state) { localize(state, "hybrid", kNativeSift); }
+void globalDpso80(benchmark::State& state) { localize(state, "global", kNativeSift); }
+
+void opencvExtractionAlone(benchmark::State& state) {
+  cv::setNumThreads(1);
+  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(0, 3, 0.04, 10, 1.6, CV_8U);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  std::size_t at = 0;
+  for (auto _ : state) {
+    sift->detectAndCompute(imageAt(at++), cv::noArray(), keypoints, descriptors);
+    benchmark::DoNotOptimize(descriptors.data);
+  }
+}
+
+BENCHMARK(opencvExtractionAlone)->Unit(benchmark::kMillisecond);
+BENCHMARK(siftDpso80)->Unit(benchmark::kMillisecond);
+BENCHMARK(siftDpso80WithOpenCvExtraction)->Unit(benchmark::kMillisecond);
+BENCHMARK(hybridDpso80)->Unit(benchmark::kMillisecond);
+BENCHMARK(globalDpso80)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace visual_localization
