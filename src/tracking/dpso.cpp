@@ -134,9 +134,8 @@ void Dpso::move(Particle& particle) {
 /// Kronfeld et al. (journal), Eq. 6; anywhere as long as nothing was recognised.
 void Dpso::moveQuantum(Particle& particle) {
   particle.velocity_m.setZero();
-  particle.position_m = attractor_m_
-                            ? *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * range_m()))
-                            : anywhere(area_)(random_);
+  particle.position_m = attractor_m_ ? *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * range_m()))
+                                     : anywhere(area_)(random_);
 }
 
 /// Whether quantum particles go where the whole image looks alike instead of around the best particle.
