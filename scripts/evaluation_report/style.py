@@ -55,13 +55,15 @@ class Palette:
         free = [colour for colour in COLOURS if colour not in taken]
         self._colours: Dict[str, str] = {}
         self._styles: Dict[str, Any] = {}
+        drawn: Dict[str, int] = {}  # line styles of a colour that are taken: more families than colours share them
         for name, inside in members.items():
             chosen = PREFERRED.get(name, '')
             if taken.get(chosen) != name:
                 chosen = free.pop(0) if free else list(COLOURS)[len(self._colours) % len(COLOURS)]
             self._colours[name] = COLOURS[chosen]
-            for index, method in enumerate(dict.fromkeys(inside)):
-                self._styles[method] = STYLES[index % len(STYLES)]
+            for method in dict.fromkeys(inside):
+                self._styles[method] = STYLES[drawn.setdefault(chosen, 0) % len(STYLES)]
+                drawn[chosen] += 1
 
     def colour(self, method: str) -> str:
         """The colour of the method's family."""
