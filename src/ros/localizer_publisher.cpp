@@ -36,6 +36,7 @@ LocalizerPublisher::LocalizerPublisher(ros::NodeHandle node, const NodeConfig& c
   map_path_ = node.advertise<nav_msgs::Path>("map_path", 1, kLatched);
   map_markers_ = node.advertise<visualization_msgs::MarkerArray>("map_markers", 1, kLatched);
   matches_ = image_transport_.advertise("matches", 1);
+  dashboard_image_ = image_transport_.advertise("dashboard", 1);
 }
 
 void LocalizerPublisher::publishMap(const TrainingMap& map) {
@@ -74,6 +75,14 @@ void LocalizerPublisher::publishStatus(LocalizationStatus status, double latency
   status.images_dropped = counts.dropped + counts.late;
   status.images_refused = counts.refused;
   status_.publish(status);
+  publishDashboard(status);
+}
+
+void LocalizerPublisher::publishDashboard(const LocalizationStatus& status) {
+  dashboard_.add(status);  // also while nobody looks, so that who comes later sees what was before
+  if (dashboard_image_.getNumSubscribers() == 0) return;
+  const cv_bridge::CvImage image(status.header, sensor_msgs::image_encodings::BGR8, dashboard_.draw());
+  dashboard_image_.publish(image.toImageMsg());
 }
 
 void LocalizerPublisher::publishMatches(const SharedLocalizer::Result& result, const cv::Mat& grey,

@@ -25,7 +25,7 @@ class ReplayTest(unittest.TestCase):
         self.localizer = fixture.Localizer()
         self.topics = {name: fixture.Recorder('/localizer/' + name, kind) for name, kind in {
             'pose': PoseWithCovarianceStamped, 'particles': PoseArray, 'swarm': Swarm, 'particle_cloud': PointCloud2,
-            'map_path': Path, 'map_markers': MarkerArray, 'matches': Image}.items()}
+            'map_path': Path, 'map_markers': MarkerArray, 'matches': Image, 'dashboard': Image}.items()}
         self.diagnostics = fixture.Recorder('/diagnostics', DiagnosticArray)
         self.localizer.wait_until_up()
 
@@ -71,7 +71,8 @@ class ReplayTest(unittest.TestCase):
     def check_map_and_pictures(self):
         self.assertGreater(len(self.topics['map_path'].last().poses), 20)
         self.assertGreater(len(self.topics['map_markers'].last().markers), 1)
-        self.assertEqual(self.topics['matches'].last().encoding, 'bgr8')
+        for picture in ('matches', 'dashboard'):
+            self.assertEqual(self.topics[picture].last().encoding, 'bgr8')
 
     def check_diagnostics(self):
         names = {status.name for array in self.diagnostics.messages() for status in array.status}

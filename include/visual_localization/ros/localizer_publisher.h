@@ -8,6 +8,7 @@
 #include <ros/publisher.h>
 #include <visual_localization/LocalizationStatus.h>
 
+#include "visual_localization/ros/dashboard.h"
 #include "visual_localization/ros/localizer_diagnostics.h"
 #include "visual_localization/ros/node_config.h"
 #include "visual_localization/ros/shared_localizer.h"
@@ -31,6 +32,7 @@ class LocalizerPublisher {
  private:
   void publishParticles(const std::vector<Particle>& particles, const std_msgs::Header& header);
   void publishStatus(LocalizationStatus status, double latency_ms, const ImageCounts& counts);
+  void publishDashboard(const LocalizationStatus& status);
 
   const NodeConfig config_;
   image_transport::ImageTransport image_transport_;
@@ -43,6 +45,8 @@ class LocalizerPublisher {
   ros::Publisher map_path_;
   ros::Publisher map_markers_;
   image_transport::Publisher matches_;
+  Dashboard dashboard_;
+  image_transport::Publisher dashboard_image_;
 };
 
 }  // namespace visual_localization

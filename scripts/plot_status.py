@@ -1,0 +1,304 @@
+#!/usr/bin/python3
+"""Plots what a localizer says about itself: state, similarity, place ratio, comparisons, sigma and latency over time.
+
+Of a running localizer in a window that renews itself, or in a picture (--output FILE.png) that is written every few
+seconds, for machines without a display; of a recorded status topic with --bag. For machines without rqt.
+"""
+import argparse
+import collections
+import math
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Deque, Dict, Iterable, List, Optional
+
+import matplotlib
+import numpy as np
+
+COLOURS = {'NO_MAP': '#505050', 'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e',
+           'RECOVERING': '#d62728', 'OFF_MAP': '#9467bd'}
+FIGURES = ('best_similarity', 'place_ratio', 'comparisons', 'sigma_x', 'sigma_y', 'extract_ms', 'match_ms',
+           'update_ms', 'latency_ms')
+BLUE, ORANGE, GREEN, GREY = '#1f77b4', '#e08214', '#4d9221', '#404040'
+
+
+class Failure(Exception):
+    """What a user can mend; the message is the whole answer."""
+
+
+class History:
+    """The figures of the last images. Thread-safe."""
+
+    def __init__(self, seconds: float = math.inf):
+        self._seconds = seconds
+        self._rows: Deque[Dict[str, float]] = collections.deque()
+        self._states: Deque[str] = collections.deque()
+        self._lock = threading.Lock()
+
+    def add(self, status) -> None:
+        """One more status; begins anew when time goes back, as it does when a bag is played again."""
+        row = {name: float(getattr(status, name)) for name in FIGURES}
+        row['stamp'] = status.header.stamp.to_sec()
+        with self._lock:
+            if self._rows and row['stamp'] < self._rows[-1]['stamp']:
+                self._rows.clear()
+                self._states.clear()
+            self._rows.append(row)
+            self._states.append(status.state_name)
+            while row['stamp'] - self._rows[0]['stamp'] > self._seconds:
+                self._rows.popleft()
+                self._states.popleft()
+
+    def columns(self) -> Dict[str, np.ndarray]:
+        """The figures by name, and `seconds` since the first image shown; empty without any."""
+        with self._lock:
+            rows = list(self._rows)
+        if not rows:
+            return {}
+        columns = {name: np.array([row[name] for row in rows]) for name in (*FIGURES, 'stamp')}
+        columns['seconds'] = columns['stamp'] - columns['stamp'][0]
+        columns['latency_ms'][columns['latency_ms'] < 0] = math.nan  # the image has no stamp
+        return columns
+
+    def states(self) -> List[str]:
+        """The state's name at every image."""
+        with self._lock:
+            return list(self._states)
+
+
+class Plot:
+    """The figure: a band of states and a panel for each question."""
+
+    def __init__(self, title: str):
+        import matplotlib.pyplot as plt  # after the backend has been chosen
+        plt.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False,
+                             'axes.edgecolor': '#909090', 'axes.titlelocation': 'left', 'axes.titlesize': 9})
+        self.figure, axes = plt.subplots(6, 1, sharex=True, figsize=(10, 7.6), constrained_layout=True,
+                                         gridspec_kw={'height_ratios': [.35, 1, 1, 1, 1, 1]})
+        self._band, self._panels = axes[0], axes[1:]
+        self._title = title
+        if hasattr(self.figure.canvas.manager, 'set_window_title'):
+            self.figure.canvas.manager.set_window_title(title)
+
+    def draw(self, history: History) -> None:
+        """Everything anew."""
+        columns, states = history.columns(), history.states()
+        states = states[:len(columns['seconds'])] if columns else []
+        for axes in (self._band, *self._panels):
+            axes.clear()
+        if not states:
+            self.figure.suptitle(f'{self._title}: no status yet', x=.01, ha='left', fontsize=12)
+            return
+        self.figure.suptitle(f'{self._title}: {states[-1]}', x=.01, ha='left', fontsize=12, fontweight='bold',
+                             color=COLOURS.get(states[-1], GREY))
+        edges = self._edges(columns['seconds'])
+        self._draw_band(edges, states)
+        self._draw_panels(columns)
+        for axes in self._panels:
+            self._shade(axes, edges, states, .10)
+            axes.grid(axis='y', color='#d8d8d8', linewidth=.6, zorder=0)
+            axes.set_axisbelow(True)
+        self._panels[-1].set_xlabel('time [s]')
+        self._panels[-1].set_xlim(edges[0], edges[-1])
+
+    @staticmethod
+    def _edges(seconds: np.ndarray) -> np.ndarray:
+        """Where the stretch of each image begins, and where the last one ends."""
+        step = float(np.median(np.diff(seconds))) if seconds.size > 1 else 1.0
+        return np.append(seconds, seconds[-1] + max(step, 1e-3))
+
+    @staticmethod
+    def _shade(axes, edges: np.ndarray, states: List[str], alpha: float) -> None:
+        """One rectangle for each stretch of the same state."""
+        begin = 0
+        for i in range(1, len(states) + 1):
+            if i == len(states) or states[i] != states[begin]:
+                axes.axvspan(edges[begin], edges[i], color=COLOURS.get(states[begin], GREY), alpha=alpha, linewidth=0,
+                             zorder=0)
+                begin = i
+
+    def _draw_band(self, edges: np.ndarray, states: List[str]) -> None:
+        self._shade(self._band, edges, states, 1.0)
+        self._band.set(yticks=[], ylim=(0, 1))
+        self._band.spines['left'].set_visible(False)
+        present = [state for state in COLOURS if state in states]
+        handles = [matplotlib.patches.Patch(color=COLOURS[state],
+                                            label=f'{state} {100 * states.count(state) / len(states):.0f} %')
+                   for state in present]
+        self._band.legend(handles=handles, loc='lower right', bbox_to_anchor=(1, 1), ncol=len(handles), frameon=False,
+                          borderaxespad=.1, handlelength=1, columnspacing=1.2)
+
+    def _draw_panels(self, columns: Dict[str, np.ndarray]) -> None:
+        seconds = columns['seconds']
+        similarity, place, comparisons, sigma, times = self._panels
+
+        def line(axes, name: str, colour: str, label: Optional[str] = None) -> None:
+            marker = '.' if seconds.size < 2 else None
+            axes.plot(seconds, columns[name], color=colour, linewidth=1.2, label=label, marker=marker)
+
+        line(similarity, 'best_similarity', BLUE)
+        similarity.set_title('similarity of the best training image')
+        line(place, 'place_ratio', BLUE)
+        place.set_title('place ratio: the whole image here over the best anywhere')
+        line(comparisons, 'comparisons', BLUE)
+        comparisons.set_title('training images compared')
+        line(sigma, 'sigma_x', BLUE, 'x')
+        line(sigma, 'sigma_y', ORANGE, 'y')
+        sigma.set_title('sigma of the cloud [m]')
+        stages = [columns[name] for name in ('extract_ms', 'match_ms', 'update_ms')]
+        times.stackplot(seconds, *stages, labels=('extract', 'match', 'update'), colors=(BLUE, ORANGE, GREEN), alpha=.7)
+        line(times, 'latency_ms', GREY, 'latency')
+        times.set_title('time per image [ms]')
+        for axes in (similarity, comparisons, sigma, times):
+            axes.set_ylim(bottom=0)
+        for axes in (sigma, times):
+            axes.legend(loc='lower right', bbox_to_anchor=(1, 1), ncol=4, frameon=False, borderaxespad=.1,
+                        handlelength=1.2, columnspacing=1.2)
+
+    def save(self, path: Path) -> None:
+        """Whole or not at all: somebody may be looking at it."""
+        partial = path.with_name(f'.{path.name}.{os.getpid()}.partial')
+        try:
+            self.figure.savefig(partial, dpi=110, format=path.suffix[1:].lower())
+            os.replace(partial, path)
+        except OSError as error:
+            raise Failure(f'{path}: cannot be written: {error.strerror}') from error
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def statuses_of(bag: Path, topic: str) -> Iterable:
+    """The messages of a topic of a bag; the bag itself says what they look like."""
+    import rosbag
+    try:
+        with rosbag.Bag(str(bag)) as file:
+            for _, message, _ in file.read_messages([topic]):
+                if not hasattr(message, 'best_similarity'):
+                    raise Failure(f'{bag}: {topic} is not a LocalizationStatus')
+                yield message
+    except (OSError, rosbag.ROSBagException) as error:
+        raise Failure(f'{bag}: cannot be read: {error}') from error
+
+
+def plot_bag(args: argparse.Namespace) -> None:
+    """Of a recorded topic, once."""
+    history, topic = History(), f'{args.localizer}/status'
+    for status in statuses_of(args.bag, topic):
+        history.add(status)
+    if not history.states():
+        raise Failure(f'{args.bag}: holds no message of {topic}')
+    plot = Plot(f'{args.bag.name} {args.localizer}')
+    plot.draw(history)
+    if args.output:
+        plot.save(args.output)
+    else:
+        import matplotlib.pyplot as plt
+        plt.show()
+
+
+def listen(localizer: str, history: History) -> None:
+    """Fills the history from now on."""
+    import rospy
+    try:
+        from visual_localization.msg import LocalizationStatus
+    except ImportError as error:
+        raise Failure('source the devel/setup.bash of the workspace first: no messages of visual_localization') \
+            from error
+    rospy.init_node('plot_status', anonymous=True, disable_signals=True)
+    rospy.Subscriber(f'{localizer}/status', LocalizationStatus, history.add, queue_size=1000)
+
+
+def plot_live(args: argparse.Namespace) -> None:
+    """Until the node is shut down or the window is closed. By the wall's clock: a simulated one may stand still."""
+    import rospy
+    history, plot = History(args.seconds), Plot(args.localizer)
+    if args.output:
+        plot.save(args.output)  # rather fail now than in a while
+    listen(args.localizer, history)
+    try:
+        while not rospy.is_shutdown() and (args.output or is_open(plot)):
+            plot.draw(history)
+            if args.output:
+                plot.save(args.output)
+                wait(args.every)
+            else:
+                plot.figure.canvas.draw_idle()
+                plot.figure.canvas.start_event_loop(args.every)
+    finally:
+        if args.output:
+            plot.draw(history)
+            plot.save(args.output)
+
+
+def is_open(plot: Plot) -> bool:
+    """Whether the window is still there."""
+    import matplotlib.pyplot as plt
+    return plt.fignum_exists(plot.figure.number)
+
+
+def wait(seconds: float) -> None:
+    """Ends early when the node is shut down."""
+    import rospy
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and not rospy.is_shutdown():
+        time.sleep(min(.1, seconds))
+
+
+def choose_backend(output: Optional[Path]) -> None:
+    """A picture needs no display; a window needs one, and a toolkit."""
+    if output:
+        matplotlib.use('Agg')
+    elif not (os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY')):
+        raise Failure('there is no display: give --output FILE.png')
+    elif matplotlib.get_backend().lower() == 'agg':
+        raise Failure('matplotlib opens no window here: install python3-tk, or give --output FILE.png')
+
+
+def positive(text: str) -> float:
+    """A number above zero."""
+    number = float(text)
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} is not above 0')
+    return number
+
+
+def picture(text: str) -> Path:
+    """A path of a format that matplotlib writes."""
+    path = Path(text)
+    if path.suffix.lower() not in ('.png', '.svg', '.pdf'):
+        raise argparse.ArgumentTypeError(f'{text} does not end in .png, .svg or .pdf')
+    return path
+
+
+def parse_arguments() -> argparse.Namespace:
+    """Command line; what roslaunch appends to it is left out."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--localizer', default='/localizer', help='name of the node (default: %(default)s)')
+    parser.add_argument('--output', type=picture, help='write this PNG, SVG or PDF instead of opening a window')
+    parser.add_argument('--every', type=positive, default=1.0, metavar='SECONDS',
+                        help='renew window or picture so often (default: %(default)s)')
+    parser.add_argument('--seconds', type=positive, default=180.0, help='how much to show (default: %(default)s)')
+    parser.add_argument('--bag', type=Path, help='plot the status recorded in this bag, all of it')
+    return parser.parse_args([word for word in sys.argv[1:] if ':=' not in word])
+
+
+def main() -> int:
+    """Plots a bag or a running localizer."""
+    args = parse_arguments()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        choose_backend(args.output)
+        (plot_bag if args.bag else plot_live)(args)
+    except Failure as failure:
+        print(f'plot_status: {failure}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        pass
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
