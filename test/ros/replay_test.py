@@ -1,8 +1,13 @@
 #!/usr/bin/env python3
 """A recorded round through the running node: it finds its place and stays there; all topics agree."""
 import math
+import os
+import signal
+import subprocess
 import sys
+import tempfile
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
@@ -15,6 +20,7 @@ from visualization_msgs.msg import MarkerArray
 import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus, Swarm
 
+PLOT_STATUS = Path(__file__).resolve().parents[2] / 'scripts' / 'plot_status.py'
 NEAR_M = 5.0
 MOST = 0.8
 
@@ -28,6 +34,16 @@ class ReplayTest(unittest.TestCase):
             'map_path': Path, 'map_markers': MarkerArray, 'matches': Image, 'dashboard': Image}.items()}
         self.diagnostics = fixture.Recorder('/diagnostics', DiagnosticArray)
         self.localizer.wait_until_up()
+        self.start_plot()
+
+    def start_plot(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.picture = Path(folder.name) / 'status.svg'
+        self.plot = subprocess.Popen([sys.executable, str(PLOT_STATUS), '--output', str(self.picture), '--every', '5'],
+                                     env=dict(os.environ))
+        self.addCleanup(self.plot.wait)
+        self.addCleanup(self.plot.terminate)
 
     def test_a_round_is_followed(self):
         player = fixture.Player(self.bag, rate=rospy.get_param('~rate'), duration_s=rospy.get_param('~duration'))
@@ -41,6 +57,7 @@ class ReplayTest(unittest.TestCase):
         self.check_particles()
         self.check_map_and_pictures()
         self.check_diagnostics()
+        self.check_plot()
 
     def check_errors(self):
         tracking = {status.header.stamp.to_nsec() for status in self.localizer.status.messages()
@@ -78,6 +95,12 @@ class ReplayTest(unittest.TestCase):
         names = {status.name for array in self.diagnostics.messages() for status in array.status}
         for task in ('localization', 'images', 'map'):
             self.assertIn('localizer: ' + task, names)
+
+    def check_plot(self):
+        self.plot.send_signal(signal.SIGINT)
+        self.assertEqual(self.plot.wait(60), 0)
+        self.assertIn('TRACKING', self.picture.read_text(encoding='utf-8'))  # the heading, as a comment
+        self.assertEqual([path.name for path in self.picture.parent.iterdir()], ['status.svg'])
 
 
 if __name__ == '__main__':
