@@ -60,7 +60,7 @@ class History:
             return {}
         columns = {name: np.array([row[name] for row in rows]) for name in (*FIGURES, 'stamp')}
         columns['seconds'] = columns['stamp'] - columns['stamp'][0]
-        columns['latency_ms'][columns['latency_ms'] < 0] = math.nan  # the image has no stamp
+        columns['latency_ms'][columns['latency_ms'] == -1] = math.nan  # the image has no stamp
         return columns
 
     def states(self) -> List[str]:
@@ -154,6 +154,10 @@ class Plot:
         times.set_title('time per image [ms]')
         for axes in (similarity, comparisons, sigma, times):
             axes.set_ylim(bottom=0)
+        # Single outliers must not press the rest flat.
+        place.set_ylim(min(.95, float(np.quantile(columns['place_ratio'], .05))) - .005, 1.005)
+        longest = np.fmax(columns['latency_ms'], sum(stages))
+        times.set_ylim(top=max(1.0, min(float(longest.max()), 3 * float(np.quantile(longest, .95)))))
         for axes in (sigma, times):
             axes.legend(loc='lower right', bbox_to_anchor=(1, 1), ncol=4, frameon=False, borderaxespad=.1,
                         handlelength=1.2, columnspacing=1.2)

@@ -12,14 +12,14 @@
 namespace visual_localization {
 namespace {
 
-// The picture, in pixels: a header, rows of figures, a band of states. Twice the size at which it is mostly shown.
-constexpr int kWidth = 880;
-constexpr int kHeader = 96;
-constexpr int kRow = 66;
-constexpr int kBand = 40;
-constexpr int kMargin = 24;
-constexpr int kValueRight = 420;  ///< figures end here
-constexpr int kCurveLeft = 450;
+// The picture, in pixels: a header, rows of figures, a band of states.
+constexpr int kWidth = 640;
+constexpr int kHeader = 70;
+constexpr int kRow = 48;
+constexpr int kBand = 32;
+constexpr int kMargin = 18;
+constexpr int kValueRight = 318;  ///< figures end here
+constexpr int kCurveLeft = 342;
 constexpr int kCurveRight = kWidth - kMargin;
 
 const cv::Scalar kBackground(30, 26, 24);
@@ -47,7 +47,7 @@ std::string format(const char* pattern, double number) {
 /// Writes with the baseline at `y`; the text begins at `x`, or ends there.
 enum class Align { kLeft, kRight };
 void write(cv::Mat& canvas, const std::string& text, int x, int y, double scale, const cv::Scalar& colour,
-           Align align = Align::kLeft, int thickness = 2) {
+           Align align = Align::kLeft, int thickness = 1) {
   int baseline = 0;
   const int width = cv::getTextSize(text, cv::FONT_HERSHEY_DUPLEX, scale, thickness, &baseline).width;
   cv::putText(canvas, text, {align == Align::kLeft ? x : x - width, y}, cv::FONT_HERSHEY_DUPLEX, scale, colour,
@@ -60,8 +60,15 @@ int columnOf(std::size_t i, std::size_t count) {
   return cvRound(kCurveRight - age * (kCurveRight - kCurveLeft) / static_cast<double>(Dashboard::kShown - 1));
 }
 
+/// A clock that is played from a bag lags behind the stamps by a few milliseconds, which would only confuse; clocks
+/// that differ show.
+std::string latencyText(double latency_ms) {
+  constexpr double kSmallLag_ms = 50.0;
+  if (latency_ms == -1.0) return "-";  // the image has no stamp
+  return format("%.0f ms", latency_ms > -kSmallLag_ms ? std::max(0.0, latency_ms) : latency_ms);
+}
+
 std::vector<Row> rowsOf(const LocalizationStatus& now) {
-  const bool timed = now.latency_ms >= 0.0;
   return {
       {"similarity", format("%.2f", now.best_similarity), [](const auto& s) { return s.best_similarity; }},
       {"place ratio", format("%.3f", now.place_ratio), [](const auto& s) { return s.place_ratio; }},
@@ -69,25 +76,24 @@ std::vector<Row> rowsOf(const LocalizationStatus& now) {
        [](const auto& s) { return static_cast<double>(s.comparisons); }},
       {"sigma x, y", format("%.1f, ", now.sigma_x) + format("%.1f m", now.sigma_y),
        [](const auto& s) { return std::hypot(s.sigma_x, s.sigma_y); }},
-      {"latency", timed ? format("%.0f ms", now.latency_ms) : "-",
-       [](const auto& s) { return std::max(0.0, s.latency_ms); }},
+      {"latency", latencyText(now.latency_ms), [](const auto& s) { return std::max(0.0, s.latency_ms); }},
   };
 }
 
 void drawHeader(cv::Mat& canvas, const LocalizationStatus& now) {
   cv::rectangle(canvas, {0, 0, kWidth, kHeader}, colourOfState(now.state), cv::FILLED);
-  write(canvas, now.state_name, kMargin, 66, 1.7, kBright, Align::kLeft, 4);
+  write(canvas, now.state_name, kMargin, 48, 1.25, kBright, Align::kLeft, 3);
   const std::string lost =
       std::to_string(now.images_dropped) + " dropped, " + std::to_string(now.images_refused) + " refused";
-  write(canvas, "image " + std::to_string(now.images_processed), kCurveRight, 42, 0.85, kBright, Align::kRight);
-  write(canvas, lost, kCurveRight, 76, 0.7, kBright, Align::kRight);
+  write(canvas, "image " + std::to_string(now.images_processed), kCurveRight, 31, 0.65, kBright, Align::kRight);
+  write(canvas, lost, kCurveRight, 56, 0.55, kBright, Align::kRight);
 }
 
 /// From zero to the largest of the shown figures.
 void drawCurve(cv::Mat& canvas, const Statuses& statuses, const Figure& figure, int top, int bottom) {
   double largest = 0.0;
   for (const auto& status : statuses) largest = std::max(largest, figure(status));
-  cv::line(canvas, {kCurveLeft, bottom}, {kCurveRight, bottom}, kFaint, 1);
+  cv::line(canvas, {kCurveLeft, bottom}, {kCurveRight, bottom}, kFaint, 2);
   if (!(largest > 0.0) || !std::isfinite(largest)) return;
   std::vector<cv::Point> points;
   for (std::size_t i = 0; i < statuses.size(); ++i) {
@@ -96,24 +102,24 @@ void drawCurve(cv::Mat& canvas, const Statuses& statuses, const Figure& figure, 
     points.emplace_back(columnOf(i, statuses.size()), bottom - cvRound(height));
   }
   cv::polylines(canvas, points, false, kCurve, 2, cv::LINE_AA);
-  cv::circle(canvas, points.back(), 5, kBright, cv::FILLED, cv::LINE_AA);
+  cv::circle(canvas, points.back(), 4, kBright, cv::FILLED, cv::LINE_AA);
 }
 
 void drawRow(cv::Mat& canvas, const Statuses& statuses, const Row& row, int top) {
-  write(canvas, row.label, kMargin, top + 44, 0.85, kLabel);
-  write(canvas, row.value, kValueRight, top + 46, 1.1, kBright, Align::kRight);
-  drawCurve(canvas, statuses, row.figure, top + 14, top + kRow - 10);
+  write(canvas, row.label, kMargin, top + 33, 0.65, kLabel);
+  write(canvas, row.value, kValueRight, top + 33, 0.8, kBright, Align::kRight, 2);
+  drawCurve(canvas, statuses, row.figure, top + 9, top + kRow - 8);
 }
 
 void drawBand(cv::Mat& canvas, const Statuses& statuses, int top) {
-  write(canvas, "state, last " + std::to_string(Dashboard::kShown) + " images", kMargin, top + 26, 0.85, kLabel);
+  write(canvas, "state, last " + std::to_string(Dashboard::kShown) + " images", kMargin, top + 21, 0.65, kLabel);
   const auto edgeOf = [](std::size_t age) {
     return kCurveRight - cvRound(static_cast<double>(age) * (kCurveRight - kCurveLeft) / Dashboard::kShown);
   };
   for (std::size_t i = 0; i < statuses.size(); ++i) {
     const std::size_t age = statuses.size() - 1 - i;
-    const cv::Point top_left(edgeOf(age + 1), top + 8);
-    const cv::Point bottom_right(edgeOf(age), top + kBand - 11);
+    const cv::Point top_left(edgeOf(age + 1), top + 6);
+    const cv::Point bottom_right(edgeOf(age), top + kBand - 8);
     cv::rectangle(canvas, cv::Rect(top_left, bottom_right), colourOfState(statuses[i].state), cv::FILLED);
   }
 }
@@ -146,7 +152,7 @@ void Dashboard::add(const LocalizationStatus& status) {
 cv::Mat Dashboard::draw() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   constexpr int kRows = 5;
-  cv::Mat canvas(kHeader + kRows * kRow + kBand + 14, kWidth, CV_8UC3, kBackground);
+  cv::Mat canvas(kHeader + kRows * kRow + kBand + 10, kWidth, CV_8UC3, kBackground);
   if (statuses_.empty()) return canvas;
   drawHeader(canvas, statuses_.back());
   int top = kHeader + 4;
