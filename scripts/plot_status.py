@@ -40,7 +40,8 @@ class History:
 
     def add(self, status) -> None:
         """One more status; begins anew when time goes back, as it does when a bag is played again."""
-        row = {name: float(getattr(status, name)) for name in FIGURES}
+        answers_an_image = status.best_image >= 0
+        row = {name: float(getattr(status, name)) if answers_an_image else math.nan for name in FIGURES}
         row['stamp'] = status.header.stamp.to_sec()
         with self._lock:
             if self._rows and row['stamp'] < self._rows[-1]['stamp']:
@@ -155,12 +156,18 @@ class Plot:
         for axes in (similarity, comparisons, sigma, times):
             axes.set_ylim(bottom=0)
         # Single outliers must not press the rest flat.
-        place.set_ylim(min(.95, float(np.quantile(columns['place_ratio'], .05))) - .005, 1.005)
+        place.set_ylim(min(.95, self._quantile(columns['place_ratio'], .05, 1.0)) - .005, 1.005)
         longest = np.fmax(columns['latency_ms'], sum(stages))
-        times.set_ylim(top=max(1.0, min(float(longest.max()), 3 * float(np.quantile(longest, .95)))))
+        times.set_ylim(top=max(1.0, min(self._quantile(longest, 1.0, 1.0), 3 * self._quantile(longest, .95, 1.0))))
         for axes in (sigma, times):
             axes.legend(loc='lower right', bbox_to_anchor=(1, 1), ncol=4, frameon=False, borderaxespad=.1,
                         handlelength=1.2, columnspacing=1.2)
+
+    @staticmethod
+    def _quantile(figures: np.ndarray, share: float, otherwise: float) -> float:
+        """Of those that are numbers."""
+        finite = figures[np.isfinite(figures)]
+        return float(np.quantile(finite, share)) if finite.size else otherwise
 
     def save(self, path: Path) -> None:
         """Whole or not at all: somebody may be looking at it."""

@@ -69,7 +69,7 @@ std::string latencyText(double latency_ms) {
 }
 
 std::vector<Row> rowsOf(const LocalizationStatus& now) {
-  return {
+  std::vector<Row> rows{
       {"similarity", format("%.2f", now.best_similarity), [](const auto& s) { return s.best_similarity; }},
       {"place ratio", format("%.3f", now.place_ratio), [](const auto& s) { return s.place_ratio; }},
       {"images compared", std::to_string(now.comparisons),
@@ -78,6 +78,11 @@ std::vector<Row> rowsOf(const LocalizationStatus& now) {
        [](const auto& s) { return std::hypot(s.sigma_x, s.sigma_y); }},
       {"latency", latencyText(now.latency_ms), [](const auto& s) { return std::max(0.0, s.latency_ms); }},
   };
+  const bool answers_an_image = now.best_image >= 0;
+  if (!answers_an_image) {
+    for (Row& row : rows) row.value = "-";
+  }
+  return rows;
 }
 
 void drawHeader(cv::Mat& canvas, const LocalizationStatus& now) {

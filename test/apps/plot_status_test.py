@@ -1,4 +1,5 @@
 """plot_status.py on recorded statuses: what it remembers, what it draws, what it refuses. test/ros has the live one."""
+import math
 import os
 import subprocess
 import sys
@@ -25,8 +26,8 @@ Status = genpy.dynamic.generate_dynamic(TYPE, '\n'.join((
 
 def status_at(seconds: float, state: str = 'TRACKING', **figures: float):
     """A plausible status."""
-    status = Status(state=getattr(Status, state), state_name=state, best_similarity=.2, place_ratio=.99, comparisons=20,
-                    sigma_x=1.5, sigma_y=.8, extract_ms=9.0, match_ms=4.0, update_ms=.3, latency_ms=15.0)
+    status = Status(state=getattr(Status, state), state_name=state, best_image=7, best_similarity=.2, place_ratio=.99,
+                    comparisons=20, sigma_x=1.5, sigma_y=.8, extract_ms=9.0, match_ms=4.0, update_ms=.3, latency_ms=15.0)
     status.header.stamp = rospy.Time.from_sec(seconds)
     for name, figure in figures.items():
         setattr(status, name, figure)
@@ -66,7 +67,13 @@ class HistoryTest(unittest.TestCase):
     def test_an_unknown_latency_is_not_drawn(self):
         history = plot_status.History()
         history.add(status_at(1.0, latency_ms=-1.0))
-        self.assertNotEqual(history.columns()['latency_ms'][0], history.columns()['latency_ms'][0])  # not a number
+        self.assertTrue(math.isnan(history.columns()['latency_ms'][0]))
+
+    def test_a_status_that_answers_no_image_has_a_state_but_no_figures(self):
+        history = plot_status.History()
+        history.add(status_at(1.0, 'UNCERTAIN', best_image=-1))
+        self.assertTrue(math.isnan(history.columns()['comparisons'][0]))
+        self.assertEqual(history.states(), ['UNCERTAIN'])
 
     def test_nothing_came_yet(self):
         self.assertEqual(plot_status.History().columns(), {})
@@ -116,6 +123,12 @@ class PlotTest(unittest.TestCase):
         self.record(['OFF_MAP'])
         self.assertEqual(self.plot().returncode, 0)
         self.assertGreater(self.share_of('OFF_MAP'), 0.0)
+
+    def test_a_silent_camera_is_drawn(self):
+        with rosbag.Bag(str(self.bag), 'w') as bag:
+            bag.write(TOPIC, status_at(1000.0, 'UNCERTAIN', best_image=-1), rospy.Time(1000))
+        self.assertEqual(self.plot().returncode, 0)
+        self.assertGreater(self.share_of('UNCERTAIN'), 0.0)
 
     def test_other_names_and_formats(self):
         self.record(['TRACKING', 'UNCERTAIN'], '/front/status')

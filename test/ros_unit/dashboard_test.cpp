@@ -11,6 +11,7 @@ LocalizationStatus statusOf(std::uint8_t state, double similarity = 0.2) {
   LocalizationStatus status;
   status.state = state;
   status.state_name = "STATE";
+  status.best_image = 3;
   status.best_similarity = similarity;
   status.place_ratio = 1.0;
   status.latency_ms = 20.0;
@@ -44,6 +45,19 @@ TEST(Dashboard, BearsTheColourOfTheNewestState) {
     const cv::Mat picture = dashboard.draw();
     EXPECT_GT(pixelsOf(picture, state, topOf(picture)), topOf(picture).area() / 2) << static_cast<int>(state);
   }
+}
+
+TEST(Dashboard, ShowsNoFiguresOfAStatusThatAnswersNoImage) {
+  Dashboard dashboard;
+  LocalizationStatus status = statusOf(LocalizationStatus::UNCERTAIN);
+  status.best_image = -1;
+  dashboard.add(status);
+  const cv::Mat silent = dashboard.draw();
+  status.comparisons = 77777;
+  Dashboard other;
+  other.add(status);
+  const cv::Mat left_half = other.draw()(cv::Rect(0, 0, silent.cols / 2, silent.rows));
+  EXPECT_EQ(cv::norm(left_half, silent(cv::Rect(0, 0, silent.cols / 2, silent.rows))), 0.0);
 }
 
 TEST(Dashboard, StatesDifferInColour) {
