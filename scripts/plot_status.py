@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Deque, Dict, Iterable, List, Optional
 
 import matplotlib
+import matplotlib.patches
 import numpy as np
 
 COLOURS = {'NO_MAP': '#505050', 'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e',
@@ -210,8 +211,8 @@ def plot_bag(args: argparse.Namespace) -> None:
         plt.show()
 
 
-def listen(localizer: str, history: History) -> None:
-    """Fills the history from now on."""
+def listen(localizer: str, history: History, stop: threading.Event) -> None:
+    """Fills the history from now on; sets `stop` when the node is shut down from elsewhere."""
     import rospy
     try:
         from visual_localization.msg import LocalizationStatus
@@ -219,43 +220,40 @@ def listen(localizer: str, history: History) -> None:
         raise Failure('source the devel/setup.bash of the workspace first: no messages of visual_localization') \
             from error
     rospy.init_node('plot_status', anonymous=True, disable_signals=True)
+    rospy.on_shutdown(stop.set)
     rospy.Subscriber(f'{localizer}/status', LocalizationStatus, history.add, queue_size=1000)
 
 
 def plot_live(args: argparse.Namespace) -> None:
-    """Until the node is shut down or the window is closed. By the wall's clock: a simulated one may stand still."""
-    import rospy
-    history, plot = History(args.seconds), Plot(args.localizer)
+    """Until the node is told to end or the window is closed. By the wall's clock: a simulated one may stand still."""
+    import matplotlib.pyplot as plt
+    history, plot, stop = History(args.seconds), Plot(args.localizer), threading.Event()
     if args.output:
         plot.save(args.output)  # rather fail now than in a while
-    listen(args.localizer, history)
-    try:
-        while not rospy.is_shutdown() and (args.output or is_open(plot)):
-            plot.draw(history)
-            if args.output:
-                plot.save(args.output)
-                wait(args.every)
-            else:
-                plot.figure.canvas.draw_idle()
-                plot.figure.canvas.start_event_loop(args.every)
-    finally:
+    # An exception out of a signal's handler would be lost in the window's event loop.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    listen(args.localizer, history, stop)
+    if not args.output:
+        plt.show(block=False)
+    while not stop.is_set() and (args.output or plt.fignum_exists(plot.figure.number)):
+        plot.draw(history)
         if args.output:
-            plot.draw(history)
             plot.save(args.output)
+            stop.wait(args.every)
+        else:
+            show_for(args.every, plot, stop)
+    if args.output:
+        plot.draw(history)
+        plot.save(args.output)
 
 
-def is_open(plot: Plot) -> bool:
-    """Whether the window is still there."""
-    import matplotlib.pyplot as plt
-    return plt.fignum_exists(plot.figure.number)
-
-
-def wait(seconds: float) -> None:
-    """Ends early when the node is shut down."""
-    import rospy
+def show_for(seconds: float, plot: Plot, stop: threading.Event) -> None:
+    """Lets the window live for a while, in short turns so that it ends soon when it is told to."""
+    plot.figure.canvas.draw_idle()
     end = time.monotonic() + seconds
-    while time.monotonic() < end and not rospy.is_shutdown():
-        time.sleep(min(.1, seconds))
+    while time.monotonic() < end and not stop.is_set():
+        plot.figure.canvas.start_event_loop(min(.2, seconds))
 
 
 def choose_backend(output: Optional[Path]) -> None:
@@ -299,7 +297,6 @@ def parse_arguments() -> argparse.Namespace:
 def main() -> int:
     """Plots a bag or a running localizer."""
     args = parse_arguments()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         choose_backend(args.output)
         (plot_bag if args.bag else plot_live)(args)
