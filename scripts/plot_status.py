@@ -78,8 +78,9 @@ class Plot:
         import matplotlib.pyplot as plt  # after the backend has been chosen
         plt.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False,
                              'axes.edgecolor': '#909090', 'axes.titlelocation': 'left', 'axes.titlesize': 9})
-        self.figure, axes = plt.subplots(6, 1, sharex=True, figsize=(10, 7.6), constrained_layout=True,
-                                         gridspec_kw={'height_ratios': [.35, 1, 1, 1, 1, 1]})
+        self.figure, axes = plt.subplots(6, 1, sharex=True, figsize=(10, 7.6),
+                                         gridspec_kw={'height_ratios': [.35, 1, 1, 1, 1, 1], 'hspace': .38,
+                                                      'left': .055, 'right': .985, 'top': .93, 'bottom': .06})
         self._band, self._panels = axes[0], axes[1:]
         self._title = title
         if hasattr(self.figure.canvas.manager, 'set_window_title'):
@@ -92,9 +93,9 @@ class Plot:
         for axes in (self._band, *self._panels):
             axes.clear()
         if not states:
-            self.figure.suptitle(f'{self._title}: no status yet', x=.01, ha='left', fontsize=12)
+            self.figure.suptitle(f'{self._title}: no status yet', x=.01, y=.985, ha='left', fontsize=12)
             return
-        self.figure.suptitle(f'{self._title}: {states[-1]}', x=.01, ha='left', fontsize=12, fontweight='bold',
+        self.figure.suptitle(f'{self._title}: {states[-1]}', x=.01, y=.985, ha='left', fontsize=12, fontweight='bold',
                              color=COLOURS.get(states[-1], GREY))
         edges = self._edges(columns['seconds'])
         self._draw_band(edges, states)
@@ -159,7 +160,8 @@ class Plot:
         # Single outliers must not press the rest flat.
         place.set_ylim(min(.95, self._quantile(columns['place_ratio'], .05, 1.0)) - .005, 1.005)
         longest = np.fmax(columns['latency_ms'], sum(stages))
-        times.set_ylim(top=max(1.0, min(self._quantile(longest, 1.0, 1.0), 3 * self._quantile(longest, .95, 1.0))))
+        top = min(self._quantile(longest, 1.0, 1.0), 3 * self._quantile(longest, .95, 1.0))
+        times.set_ylim(top=1.05 * max(1.0, top))
         for axes in (sigma, times):
             axes.legend(loc='lower right', bbox_to_anchor=(1, 1), ncol=4, frameon=False, borderaxespad=.1,
                         handlelength=1.2, columnspacing=1.2)
