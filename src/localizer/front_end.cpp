@@ -28,7 +28,7 @@ void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   requireExtractable(grey);
   std::swap(previous_, current_);
-  if (!current_) current_.emplace();
+  if (!current_) current_ = Image{};
   current_->stamp_ns = stamp_ns;
   current_->has_sift = false;
   if (grey.size() == image_size_) {
