@@ -10,6 +10,7 @@
 #include "visual_localization/map/map_store.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/initial_pose.h"
+#include "visual_localization/ros/map_directory.h"
 #include "visual_localization/ros/message_conversions.h"
 #include "visual_localization/ros/parameter_server.h"
 
@@ -183,7 +184,8 @@ void LocalizerNodelet::watchCamera() {
 }
 
 std::size_t LocalizerNodelet::useMap(const std::string& path) {
-  const auto map = loadMap(path, parameters_.node.mapLoading([name = getName()](const std::string& reason) {
+  const std::string file = mapFileBelow(parameters_.node.map_directory, path);
+  const auto map = loadMap(file, parameters_.node.mapLoading([name = getName()](const std::string& reason) {
     ROS_WARN_STREAM_NAMED(name, "Map " << reason);  // the map may outlive the nodelet
   }));
   localizer_->setMap(map);

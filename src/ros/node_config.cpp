@@ -24,6 +24,9 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.integer(
       {"map_cache_mb", "MiB", "features of a larger map are read when needed and kept up to this", kAtStartOnly},
       map_cache_mb, 0, kLargestMapCache_mb);
+  visitor.text({"map_directory", "",
+                "only maps below this folder may be opened, and relative paths begin there; empty: all", kAtStartOnly},
+               map_directory);
   visitor.text(
       {"image_transport", "", "raw, compressed (decoded here) or another installed image transport", kAtStartOnly},
       image_transport);
@@ -44,6 +47,9 @@ std::vector<std::string> NodeConfig::violations() const {
   checkFrame("global_frame_id", global_frame_id, wrong);
   checkFrame("odom_frame_id", odom_frame_id, wrong);
   checkFrame("base_frame_id", base_frame_id, wrong);
+  if (!map_directory.empty() && map_directory.front() != '/') {
+    wrong.push_back("parameter 'map_directory' = '" + map_directory + "' is not allowed: must be an absolute path");
+  }
   if (global_frame_id == base_frame_id || global_frame_id == odom_frame_id) {
     wrong.push_back("parameter 'global_frame_id' = '" + global_frame_id +
                     "' is not allowed: must differ from odom_frame_id and base_frame_id");

@@ -14,6 +14,7 @@ namespace visual_localization {
 struct NodeConfig {
   std::string map;                         ///< path of the map file; empty: wait for ~load_map
   int map_cache_mb = kDefaultMapCache_mb;  ///< features of a larger map are read when needed and kept up to this
+  std::string map_directory;               ///< only maps below this folder may be opened; empty: all
   std::string image_transport = "raw";     ///< raw, compressed (decoded here), or another installed transport
   std::string tf_mode = "none";            ///< none, map_to_odom, map_to_base
   double transform_tolerance_s = 0.1;      ///< how far transforms are dated into the future
