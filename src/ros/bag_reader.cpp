@@ -14,17 +14,12 @@
 #include <sensor_msgs/NavSatFix.h>
 #include <sys/stat.h>
 
+#include "visual_localization/io/one_line.h"
 #include "visual_localization/ros/bag_validator.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
 namespace {
-
-std::string oneLine(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c >= 0 && c < 32; }, ' ');
-  return text.substr(0, 300);
-}
 
 /// Runs `read` and gives whatever it throws the path and one line.
 template <class Read>

@@ -6,6 +6,8 @@
 
 #include <Eigen/LU>
 
+#include "visual_localization/io/one_line.h"
+
 namespace visual_localization {
 namespace {
 
@@ -37,7 +39,7 @@ SharedLocalizer::Guess guessFrom(const geometry_msgs::PoseWithCovarianceStamped&
                                  const std::string& global_frame) {
   const std::string& frame = message.header.frame_id;
   refuseUnless(frame == global_frame || frame == "/" + global_frame,
-               "its frame is '" + frame + "' instead of '" + global_frame + "'");
+               "its frame is '" + oneLine(frame, 100) + "' instead of '" + global_frame + "'");
   refuseUnless(finite(message.pose.pose), "the pose is not finite");
   const auto& covariance = message.pose.covariance;
   refuseUnless(std::all_of(covariance.begin(), covariance.end(), [](double value) { return std::isfinite(value); }),

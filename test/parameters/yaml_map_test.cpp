@@ -88,6 +88,11 @@ TEST(YamlMap, RefusesAKeyThatIsNoText) {
   EXPECT_THAT(refusal("s: {? [1] : [3]}", [](YamlMap& map) { map.sweep("s"); }), HasSubstr("'s': has a key"));
 }
 
+TEST(YamlMap, RefusesInOneLineWhateverTheKeyIs) {
+  EXPECT_EQ(refusal("\"a\\nb\\e[2J\": 1").find_first_of("\n\033"), std::string::npos);
+  EXPECT_LE(refusal(std::string(100'000, 'k') + "x: {}\n\"" + std::string(100'000, 'y') + "\": 1").size(), 10'000U);
+}
+
 TEST(YamlMap, RefusesNumbersOutsideTheirRangeWithTheRange) {
   const auto real = [](YamlMap& map) { map.real("x", 1.0, 0.0, 2.5); };
   for (const char* value : {"3", "-0.1", ".nan", ".inf", "1e400", "two", "''"}) {

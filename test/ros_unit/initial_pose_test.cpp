@@ -56,6 +56,12 @@ TEST(InitialPose, AnotherFrameIsRefused) {
   EXPECT_NE(refusal([](Pose& pose) { pose.header.frame_id = ""; }), "");
 }
 
+TEST(InitialPose, AFrameOfSeveralLinesIsNamedInOne) {
+  const std::string reason = refusal([](Pose& pose) { pose.header.frame_id = "a\nb" + std::string(100'000, 'x'); });
+  EXPECT_EQ(reason.find('\n'), std::string::npos);
+  EXPECT_LT(reason.size(), 200U);
+}
+
 TEST(InitialPose, NumbersThatAreNotFiniteAreRefused) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -8,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "visual_localization/io/one_line.h"
 #include "visual_localization/parameters/parameter_visitor.h"
 
 namespace visual_localization {
@@ -21,7 +23,10 @@ using ParameterValues = std::map<std::string, ParameterValue>;
 /// value and what would be allowed, in one line.
 class ParameterError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit ParameterError(const std::string& text) : std::runtime_error(oneLine(text, kLongest)) {}
+
+ private:
+  static constexpr std::size_t kLongest = 10000;  ///< characters; with room for a list of all names
 };
 
 namespace parameters {
