@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <cv_bridge/cv_bridge.h>
@@ -121,10 +122,26 @@ void requireDecodable(const Bytes& data) {
   }
 }
 
+bool hasSwappedBytes(const sensor_msgs::Image& message) {
+  return message.is_bigendian != 0 && message.encoding == "mono16";
+}
+
+/// cv_bridge makes another kind of image when it swaps bytes itself.
+sensor_msgs::Image withBytesSwapped(sensor_msgs::Image message) {
+  for (std::size_t row = 0; row < message.data.size(); row += message.step) {
+    for (std::size_t at = row; at < row + 2 * std::size_t{message.width}; at += 2) {
+      std::swap(message.data[at], message.data[at + 1]);
+    }
+  }
+  message.is_bigendian = 0;
+  return message;
+}
+
 }  // namespace
 
 cv::Mat toGrey(const sensor_msgs::Image& message) {
   requireConsistent(message);
+  if (hasSwappedBytes(message)) return toGrey(withBytesSwapped(message));
   try {
     return cv_bridge::toCvCopy(message, "mono8")->image;
   } catch (const cv_bridge::Exception& error) {

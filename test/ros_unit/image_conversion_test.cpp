@@ -41,6 +41,18 @@ TEST(ImageConversion, SixteenBitsAreScaledByTheFullRange) {
   EXPECT_EQ(toGrey(image("mono16", 2, 255)).at<std::uint8_t>(0, 0), 255);
 }
 
+TEST(ImageConversion, SixteenBitsMayComeWithTheHighByteFirst) {
+  for (const bool bigendian : {false, true}) {
+    sensor_msgs::Image message = image("mono16", 2, 10);
+    message.is_bigendian = bigendian ? 1 : 0;
+    for (std::size_t i = bigendian ? 0 : 1; i < message.data.size(); i += 2) message.data[i] = 200;
+    const cv::Mat grey = toGrey(message);
+    EXPECT_EQ(grey.type(), CV_8UC1);
+    ASSERT_EQ(grey.size(), cv::Size(20, 10));
+    EXPECT_EQ(cv::countNonZero(grey != 199), 0) << grey;  // (200 * 256 + 10) / 257 = 199.3
+  }
+}
+
 TEST(ImageConversion, ResultIsGreyAndOwnsItsPixels) {
   cv::Mat grey;
   { grey = toGrey(image("rgb8", 3, 9)); }
