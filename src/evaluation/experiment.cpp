@@ -15,6 +15,8 @@ constexpr double kSlowest = 1.0 / 64.0;
 constexpr double kFastest = 64.0;
 constexpr std::size_t kMostStarts = 1000000;
 constexpr std::size_t kMostCombinations = 10000;
+constexpr std::size_t kMostMethods = 10000;
+constexpr std::size_t kLongestName = 1000;
 
 /// A name for tables and messages.
 std::string readName(YamlMap& yaml, const std::string& key) {
@@ -117,11 +119,13 @@ std::vector<std::vector<Setting>> combinationsOf(const Sweep& sweep) {
   return combinations;
 }
 
-std::string withValues(std::string name, const std::vector<Setting>& settings) {
+/// The name of a method with the sweep's values in it.
+std::string withValues(std::string name, const std::vector<Setting>& settings, const YamlMap& yaml) {
   for (const auto& [key, value] : settings) {
     const std::string placeholder = "{" + key + "}";
     for (auto at = name.find(placeholder); at != std::string::npos; at = name.find(placeholder, at + value.size())) {
       name.replace(at, placeholder.size(), value);
+      if (name.size() > kLongestName) yaml.refuse("name", "= '" + name.substr(0, 100) + "...' becomes too long");
     }
   }
   return name;
@@ -158,7 +162,7 @@ void applyParameters(MethodEntry& entry, const YamlMap& yaml) {
 
 MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const YamlMap& yaml) {
   MethodSpec& method = entry.method;
-  method.name = withValues(entry.name, swept);
+  method.name = withValues(entry.name, swept, yaml);
   for (const auto& [key, value] : swept) {
     if (key != "speed") {
       entry.parameters[key] = parameters::parseScalar(value);
@@ -218,6 +222,9 @@ std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) 
     for (MethodSpec& method : readMethod(entry, base)) {
       if (!names.insert(method.name).second) entry.refuse("name", "= '" + method.name + "' appears twice");
       methods.push_back(std::move(method));
+    }
+    if (methods.size() > kMostMethods) {
+      yaml.refuse("methods", "and their sweeps are more than " + std::to_string(kMostMethods) + " methods");
     }
   }
   return methods;

@@ -16,16 +16,24 @@ std::string keyOf(const YAML::Node& key, const std::string& where) {
   return key.Scalar();
 }
 
-/// `depth`: how many mappings more are accepted; an alias may refer to the mapping that it is in.
-void flattenInto(const YAML::Node& node, const std::string& prefix, const std::string& path, int depth,
+/// How much more is accepted: an alias may refer to the mapping that it is in, and aliases of mappings of aliases stand
+/// for more entries than any memory has.
+struct Allowance {
+  int mappings_deep = 8;
+  int entries = 10'000;  ///< of one mapping and all in it
+};
+
+void flattenInto(const YAML::Node& node, const std::string& prefix, const std::string& path, Allowance& left,
                  ParameterValues& out) {
-  if (depth == 0) throw ParameterError(path + ": key '" + prefix + "' is nested too deeply");
+  if (left.mappings_deep == 0) throw ParameterError(path + ": key '" + prefix + "' is nested too deeply");
+  --left.mappings_deep;
   for (const auto& entry : node) {
+    if (--left.entries < 0) throw ParameterError(path + ": has too many keys");
     const std::string key = keyOf(entry.first, path);
     const std::string name = prefix.empty() ? key : prefix + "/" + key;
     if (out.count(name) != 0) throw ParameterError(path + ": key '" + name + "' appears twice");
     if (entry.second.IsMap()) {
-      flattenInto(entry.second, name, path, depth - 1, out);
+      flattenInto(entry.second, name, path, left, out);
     } else if (entry.second.IsScalar()) {
       // A quoted scalar carries the tag "!": it stays a string even when it looks like a number.
       const std::string text = entry.second.Scalar();
@@ -34,6 +42,7 @@ void flattenInto(const YAML::Node& node, const std::string& prefix, const std::s
       throw ParameterError(path + ": key '" + name + "' must be a single value or a mapping");
     }
   }
+  ++left.mappings_deep;
 }
 
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
@@ -41,9 +50,9 @@ std::string quoted(const std::string& text) { return "'" + text + "'"; }
 }  // namespace
 
 ParameterValues flatten(const YAML::Node& mapping, const std::string& path) {
-  constexpr int kDeepestNesting = 8;
+  Allowance allowance;
   ParameterValues out;
-  flattenInto(mapping, "", path, kDeepestNesting, out);
+  flattenInto(mapping, "", path, allowance, out);
   return out;
 }
 

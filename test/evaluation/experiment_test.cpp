@@ -177,5 +177,12 @@ TEST(Experiment, RefusesSweepsThatCannotBeMeant) {
        {kBestMethod, many + "}}", "'methods[2]/sweep' has more than 10000 combinations"}});
 }
 
+TEST(Experiment, ANameThatASweepMakesTooLongIsRefused) {
+  std::string name;
+  for (int i = 0; i < 50; ++i) name += "{speed}";
+  const std::string swept = "{name: '" + name + "', sweep: {speed: [1." + std::string(50, '0') + "]}}";
+  expectRefused({{kBestMethod, swept, "becomes too long"}});
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -88,6 +88,18 @@ TEST(YamlMap, RefusesAKeyThatIsNoText) {
   EXPECT_THAT(refusal("s: {? [1] : [3]}", [](YamlMap& map) { map.sweep("s"); }), HasSubstr("'s': has a key"));
 }
 
+TEST(YamlMap, RefusesAliasesThatStandForMoreThanAnyMemoryHas) {
+  for (const std::string& innermost : {"{}", "{k: 1}"}) {
+    std::string text = "a0: &a0 " + innermost + "\n";
+    for (int i = 1; i < 7; ++i) {
+      text += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " {";
+      for (int j = 0; j < 50; ++j) text += "k" + std::to_string(j) + ": *a" + std::to_string(i - 1) + ", ";
+      text += "}\n";
+    }
+    EXPECT_THAT(refusal(text, [](YamlMap& map) { map.parameters("a6"); }), HasSubstr("too many keys"));
+  }
+}
+
 TEST(YamlMap, RefusesInOneLineWhateverTheKeyIs) {
   EXPECT_EQ(refusal("\"a\\nb\\e[2J\": 1").find_first_of("\n\033"), std::string::npos);
   EXPECT_LE(refusal(std::string(100'000, 'k') + "x: {}\n\"" + std::string(100'000, 'y') + "\": 1").size(), 10'000U);
