@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "map_file.h"
+#include "visual_localization/io/one_line.h"
 
 namespace visual_localization {
 namespace {
@@ -83,8 +84,9 @@ auto FileFeatureStore::read(std::size_t image, sqlite::Statement& row, const cha
 
 void FileFeatureStore::warnOnce(std::size_t image, const char* what, const std::string& reason) const {
   if (std::exchange(warned_, true) || !warn_) return;
-  warn_(path_ + ": " + what + " of " + map_file::imageName(static_cast<std::int64_t>(image)) + " cannot be used: " +
-        reason + "; it counts as without features, and so does any other such image from now on without a word");
+  warn_(path_ + ": " + what + " of " + map_file::imageName(static_cast<std::int64_t>(image)) +
+        " cannot be used: " + oneLine(reason) +
+        "; it counts as without features, and so does any other such image from now on without a word");
 }
 
 }  // namespace visual_localization

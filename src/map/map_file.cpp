@@ -29,6 +29,9 @@ class FileHeader {
   bool isSqlite() const { return complete_ && std::memcmp(bytes_.data(), "SQLite format 3", 16) == 0; }
   std::int64_t userVersion() const { return number(60, 4); }
   std::int64_t applicationId() const { return number(68, 4); }
+  /// Changes may wait in another file, the write-ahead log.
+  bool hasLog() const { return number(18, 1) > 1 || number(19, 1) > 1; }
+  bool isUtf8() const { return number(56, 4) == 1; }
   /// Bytes that the file must have.
   std::int64_t size() const {
     const std::int64_t page = number(16, 2);
@@ -56,22 +59,33 @@ void requireMapFile(const std::string& path, std::int64_t size) {
     throw Refusal("has map version " + std::to_string(header.userVersion()) + ", but only version " +
                   std::to_string(kMapSchemaVersion) + " can be read; build it again");
   }
+  if (header.hasLog()) throw Refusal("is damaged: it expects a write-ahead log, which no map has");
+  if (!header.isUtf8()) throw Refusal("is damaged: its text is not UTF-8");
   if (header.size() != size) {
     throw Refusal("is damaged: has " + std::to_string(size) + " bytes instead of " + std::to_string(header.size()));
   }
 }
 
+/// A row of sqlite_master: name, type, sql.
+using Definition = std::array<std::string, 3>;
+
 /// Refuses any schema but our own: no view or trigger, no other table, no other definition.
 void requireSchema(const sqlite::Database& database) {
-  Statement found(database, "SELECT type, name, sql FROM sqlite_master ORDER BY name");
-  for (const map_schema::Table& table : map_schema::kTables) {
-    if (!found.step()) throw Refusal(std::string("is damaged: table '") + table.name + "' is missing");
-    if (found.text(0) != "table" || found.text(1) != table.name || found.text(2) != table.sql) {
-      throw Refusal("is not a map: its schema has an unexpected " + found.text(0) + " '" + found.text(1) + "'");
-    }
+  std::vector<Definition> found;
+  // Not ordered by SQLite, which would read all of them first.
+  Statement row(database,
+                "SELECT name, type, sql FROM sqlite_master LIMIT " + std::to_string(map_schema::kTables.size() + 1));
+  while (row.step()) found.push_back({row.text(0), row.text(1), row.text(2)});
+  std::sort(found.begin(), found.end());
+  for (std::size_t i = 0; i < map_schema::kTables.size(); ++i) {
+    const map_schema::Table& table = map_schema::kTables[i];
+    if (i == found.size()) throw Refusal(std::string("is damaged: table '") + table.name + "' is missing");
+    if (found[i] == Definition{table.name, "table", table.sql}) continue;
+    throw Refusal("is not a map: its schema has an unexpected " + found[i][1] + " '" + found[i][0] + "'");
   }
-  if (found.step())
-    throw Refusal("is not a map: its schema has an unexpected " + found.text(0) + " '" + found.text(1) + "'");
+  if (found.size() > map_schema::kTables.size()) {
+    throw Refusal("is not a map: its schema has an unexpected " + found.back()[1] + " '" + found.back()[0] + "'");
+  }
 }
 
 void requireChecksum(std::int64_t computed, const Statement& row, int column, const char* what) {
@@ -97,6 +111,11 @@ sqlite::Database open(const std::string& path, std::int64_t size) {
   sqlite::Database database = sqlite::Database::openUntrusted(path, std::min(size, map_schema::kMaxRowBytes));
   requireSchema(database);
   return database;
+}
+
+void Budget::spend(std::uint64_t bytes) {
+  if (bytes > left_) throw Refusal("is damaged: its rows claim more bytes than the file has");
+  left_ -= bytes;
 }
 
 SiftFeatures siftOf(const Statement& row) {

@@ -28,6 +28,17 @@ std::int64_t fileSize(const std::string& path);
 /// Opens what is a complete map of our version, without any schema but our own. Throws Refusal or sqlite::Error.
 sqlite::Database open(const std::string& path, std::int64_t size);
 
+/// What may be read of a file: no more than it has. Rows of a damaged one may claim the same bytes again and again.
+class Budget {
+ public:
+  explicit Budget(std::int64_t file_size) : left_(static_cast<std::uint64_t>(file_size)) {}
+  /// Throws Refusal.
+  void spend(std::uint64_t bytes);
+
+ private:
+  std::uint64_t left_;
+};
+
 /// Statements that read the wide tables; the column of the image comes first.
 constexpr const char* kSelectSift = "SELECT image, keypoints, descriptors, crc32 FROM features";
 constexpr const char* kSelectGlobal = "SELECT image, wgoh, wgii, crc32 FROM globals";

@@ -7,6 +7,7 @@
 
 #include "file_feature_store.h"
 #include "map_file.h"
+#include "visual_localization/io/one_line.h"
 #include "visual_localization/map/map_schema.h"
 #include "visual_localization/map/map_store.h"
 #include "visual_localization/map/sqlite.h"
@@ -30,10 +31,18 @@ ParameterValue metaValue(const Statement& row) {
   }
 }
 
-ParameterValues readMeta(const sqlite::Database& database) {
+ParameterValues readMeta(const sqlite::Database& database, map_file::Budget& budget) {
   ParameterValues meta;
-  Statement row(database, "SELECT key, value FROM meta");
-  while (row.step()) meta[row.text(0)] = metaValue(row);
+  Statement row(database, "SELECT key, value FROM meta ORDER BY key");
+  while (row.step()) {
+    const std::string key = row.text(0);
+    // The pages of a damaged tree may lead to the same rows without end.
+    if (!meta.empty() && key <= meta.rbegin()->first) throw Refusal("is damaged: its meta values are not in order");
+    const ParameterValue value = metaValue(row);
+    const auto* text = std::get_if<std::string>(&value);
+    budget.spend(key.size() + (text == nullptr ? 0 : text->size()));
+    meta.emplace_hint(meta.end(), key, value);
+  }
   return meta;
 }
 
@@ -80,7 +89,8 @@ std::size_t expectedImages(const sqlite::Database& database, std::int64_t file_s
   constexpr std::int64_t kSmallestRow_bytes = 32;
   Statement last(database, "SELECT id FROM images ORDER BY id DESC LIMIT 1");
   if (!last.step()) return 0;
-  return static_cast<std::size_t>(std::clamp<std::int64_t>(last.integer(0), 0, file_size / kSmallestRow_bytes)) + 1;
+  const std::int64_t most = std::min(file_size / kSmallestRow_bytes, map_schema::kMaxImages);
+  return static_cast<std::size_t>(std::clamp<std::int64_t>(last.integer(0), 0, most)) + 1;
 }
 
 /// Where the images were taken, verified row by row.
@@ -104,13 +114,15 @@ TrainingPlaces readPlaces(const sqlite::Database& database, std::int64_t file_si
 struct Opened {
   MapHeader header;
   TrainingPlaces places;
+  map_file::Budget budget;  ///< for the rest
 };
 
 Opened readPlacesAndHeader(const sqlite::Database& database, std::int64_t file_size) {
-  ParameterValues meta = readMeta(database);
+  map_file::Budget budget(file_size);
+  ParameterValues meta = readMeta(database, budget);
   const std::int64_t expected = takeChecksum(meta);
   map_schema::Checksum checksum;
-  Opened opened{map_schema::toHeader(meta), {}};
+  Opened opened{map_schema::toHeader(meta), {}, budget};
   opened.places = readPlaces(database, file_size, opened.header.sessions.size(), checksum);
   checksum.add(meta);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
@@ -125,9 +137,14 @@ void stepTo(std::size_t image, Statement& row, const char* what) {
   }
 }
 
+std::uint64_t storedBytes(const TrainingImage& image) {
+  return image.sift.size() * (map_schema::kKeypointBytes + SiftFeatures::kDescriptorSize) +
+         2 * map_schema::kHistogramBytes + image.preview_jpeg.size();
+}
+
 /// Reads and verifies what all images looked like, one after the other.
-void forEachImage(const sqlite::Database& database, const TrainingPlaces& places,
-                  const std::function<void(TrainingImage&&)>& use) {
+void forEachImage(const sqlite::Database& database, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
+  const TrainingPlaces& places = opened.places;
   const std::string in_order = " ORDER BY image";
   Statement sift(database, map_file::kSelectSift + in_order);
   Statement global(database, map_file::kSelectGlobal + in_order);
@@ -145,6 +162,7 @@ void forEachImage(const sqlite::Database& database, const TrainingPlaces& places
                     std::to_string(image.sift.size()) + " features instead of " +
                     std::to_string(places.feature_counts[i]));
     }
+    opened.budget.spend(storedBytes(image));
     use(std::move(image));
   }
   if (sift.step() || global.step() || preview.step()) {
@@ -155,7 +173,7 @@ void forEachImage(const sqlite::Database& database, const TrainingPlaces& places
 std::shared_ptr<const TrainingMap> readWhole(const sqlite::Database& database, Opened opened) {
   std::vector<TrainingImage> images;
   images.reserve(opened.places.size());
-  forEachImage(database, opened.places, [&images](TrainingImage&& image) { images.push_back(std::move(image)); });
+  forEachImage(database, opened, [&images](TrainingImage&& image) { images.push_back(std::move(image)); });
   return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(images));
 }
 
@@ -172,11 +190,11 @@ auto withMapFile(const std::string& path, Read read) {
     const std::int64_t size = map_file::fileSize(path);
     return read(map_file::open(path, size), size);
   } catch (const Refusal& refusal) {
-    throw MapStoreError(path + ": " + refusal.what());
+    throw MapStoreError(path + ": " + oneLine(refusal.what()));
   } catch (const std::bad_alloc&) {
     throw MapStoreError(path + ": there is not enough memory for this map");
   } catch (const std::exception& error) {
-    throw MapStoreError(path + ": is damaged: " + error.what());
+    throw MapStoreError(path + ": is damaged: " + oneLine(error.what()));
   }
 }
 
@@ -195,7 +213,7 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
 void checkMap(const std::string& path) {
   withMapFile(path, [](const sqlite::Database& database, std::int64_t size) {
     Opened opened = readPlacesAndHeader(database, size);
-    forEachImage(database, opened.places, [](TrainingImage&&) {});
+    forEachImage(database, opened, [](TrainingImage&&) {});
     requireIntegrity(database);
     // What a map may not be besides.
     const TrainingMap map(std::move(opened.header), std::move(opened.places),
@@ -204,11 +222,12 @@ void checkMap(const std::string& path) {
 }
 
 std::string packageVersionOf(const std::string& path) {
-  return withMapFile(path, [](const sqlite::Database& database, std::int64_t) {
-    const ParameterValues meta = readMeta(database);
+  return withMapFile(path, [](const sqlite::Database& database, std::int64_t size) {
+    map_file::Budget budget(size);
+    const ParameterValues meta = readMeta(database, budget);
     const auto found = meta.find("package_version");
     if (found == meta.end()) throw Refusal("is damaged: it has no package version");
-    return parameters::toString(found->second);
+    return oneLine(parameters::toString(found->second));
   });
 }
 

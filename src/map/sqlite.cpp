@@ -58,12 +58,34 @@ void distrust(sqlite3* handle, std::int64_t max_value_bytes) {
   sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, limit);
   sqlite3_limit(handle, SQLITE_LIMIT_SQL_LENGTH, 100000);
   sqlite3_limit(handle, SQLITE_LIMIT_COLUMN, 100);
+  sqlite3_limit(handle, SQLITE_LIMIT_EXPR_DEPTH, 20);
+  sqlite3_limit(handle, SQLITE_LIMIT_COMPOUND_SELECT, 2);
+  sqlite3_limit(handle, SQLITE_LIMIT_VDBE_OP, 10000);
+  sqlite3_limit(handle, SQLITE_LIMIT_FUNCTION_ARG, 8);
+  sqlite3_limit(handle, SQLITE_LIMIT_TRIGGER_DEPTH, 1);
+  sqlite3_limit(handle, SQLITE_LIMIT_WORKER_THREADS, 0);
   sqlite3_limit(handle, SQLITE_LIMIT_ATTACHED, 0);
   check(sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr), handle);
 #ifdef SQLITE_DBCONFIG_TRUSTED_SCHEMA
   check(sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr), handle);
 #endif
   check(sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr), handle);
+#ifdef SQLITE_DBCONFIG_ENABLE_VIEW
+  check(sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr), handle);
+#endif
+  check(sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0, nullptr), handle);
+}
+
+/// Has the schema read, which SQLite does before it answers anything, and gives up when that takes long: the pages of a
+/// damaged tree may lead to the same rows without end.
+void readSchema(sqlite3* handle) {
+  constexpr int kMostSteps = 5000;  // of SQLite's virtual machine; a hundred do for five tables
+  sqlite3_progress_handler(
+      handle, kMostSteps, [](void*) { return 1; }, nullptr);
+  const int result = sqlite3_exec(handle, "SELECT 1 FROM sqlite_master LIMIT 1", nullptr, nullptr, nullptr);
+  sqlite3_progress_handler(handle, 0, nullptr, nullptr);
+  if (result == SQLITE_INTERRUPT) throw Error("its schema is too large");
+  check(result, handle);
 }
 
 }  // namespace
@@ -73,6 +95,8 @@ Database Database::openUntrusted(const std::string& path, std::int64_t max_value
   Database database(open(immutableUri(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI));
   distrust(database.handle_, max_value_bytes);
   database.execute("PRAGMA cell_size_check = ON");
+  database.execute("PRAGMA temp_store = MEMORY");
+  readSchema(database.handle_);
   return database;
 }
 

@@ -27,7 +27,7 @@ struct Bytes {
 class Database {
  public:
   /// For files that may come from anyone: nothing is written beside or into the file, nothing in its schema is
-  /// executed, and no value longer than `max_value_bytes` is read.
+  /// executed, and neither a large schema nor a value longer than `max_value_bytes` is read.
   static Database openUntrusted(const std::string& path, std::int64_t max_value_bytes);
   /// For filling a new file as fast as the disk takes it: without journal, so only for a file that is thrown
   /// away when anything fails. `path` is an empty file.
