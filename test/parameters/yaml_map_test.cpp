@@ -89,8 +89,8 @@ TEST(YamlMap, RefusesAKeyThatIsNoText) {
 }
 
 TEST(YamlMap, RefusesAliasesThatStandForMoreThanAnyMemoryHas) {
-  for (const std::string& innermost : {"{}", "{k: 1}"}) {
-    std::string text = "a0: &a0 " + innermost + "\n";
+  for (const char* innermost : {"{}", "{k: 1}"}) {
+    std::string text = std::string("a0: &a0 ") + innermost + "\n";
     for (int i = 1; i < 7; ++i) {
       text += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " {";
       for (int j = 0; j < 50; ++j) text += "k" + std::to_string(j) + ": *a" + std::to_string(i - 1) + ", ";
