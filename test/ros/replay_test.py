@@ -2,12 +2,12 @@
 """A recorded round through the running node: it finds its place and stays there; all topics agree."""
 import math
 import os
+import pathlib
 import signal
 import subprocess
 import sys
 import tempfile
 import unittest
-from pathlib import Path
 
 import rospy
 import rostest
@@ -20,7 +20,7 @@ from visualization_msgs.msg import MarkerArray
 import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus, Swarm
 
-PLOT_STATUS = Path(__file__).resolve().parents[2] / 'scripts' / 'plot_status.py'
+PLOT_STATUS = pathlib.Path(__file__).resolve().parents[2] / 'scripts' / 'plot_status.py'
 NEAR_M = 5.0
 MOST = 0.8
 
@@ -39,7 +39,7 @@ class ReplayTest(unittest.TestCase):
     def start_plot(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        self.picture = Path(folder.name) / 'status.svg'
+        self.picture = pathlib.Path(folder.name) / 'status.svg'
         self.plot = subprocess.Popen([sys.executable, str(PLOT_STATUS), '--output', str(self.picture), '--every', '5'],
                                      env=dict(os.environ))
         self.addCleanup(self.plot.wait)
