@@ -26,14 +26,16 @@ readonly CORE=(
 )
 readonly PLOTS=(python3-matplotlib python3-yaml python3-numpy python3-opencv)
 readonly LINT=(clang-format clang-tidy shellcheck)
+readonly CLANG=(clang libclang-rt-dev)
 readonly RVIZ=(rviz xvfb python3-tk)
 
 usage() {
   cat <<'USAGE'
-Usage: install_dependencies.sh [--with-lint] [--with-rviz] [--core-only] [--list]
+Usage: install_dependencies.sh [--with-lint] [--with-rviz] [--with-clang] [--core-only] [--list]
 Installs with apt what is missing; does nothing when everything is there. Needs root or sudo only to install.
   --with-lint   also clang-format, clang-tidy and shellcheck
   --with-rviz   also rviz, a virtual display and what the window of plot_status.py needs
+  --with-clang  also clang with its sanitizers and libFuzzer
   --core-only   only what the library without ROS needs
   --list        print the packages, one a line, and install nothing
 USAGE
@@ -80,6 +82,7 @@ main() {
   while (($#)); do
     case $1 in
       --with-lint) extra+=("${LINT[@]}") ;;
+      --with-clang) extra+=("${CLANG[@]}") ;;
       --with-rviz) extra+=("${RVIZ[@]}") ;;
       --core-only) packages=("${CORE[@]}") ;;
       --list) list=true ;;

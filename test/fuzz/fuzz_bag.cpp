@@ -1,0 +1,32 @@
+/// A bag file: its structure, its fixes and its images.
+#include <cstdint>
+#include <string>
+
+#include "test/fuzz/fuzz_support.h"
+#include "visual_localization/ros/bag_reader.h"
+#include "visual_localization/ros/image_conversion.h"
+
+namespace visual_localization {
+namespace {
+
+void readImages(const BagReader& bag, const std::string& topic) {
+  constexpr std::size_t kMost = 8;
+  const BagImages images = bag.images(topic);
+  for (std::size_t i = 0; i < images.size() && i < kMost; ++i) {
+    fuzz::expect<ImageError>([&] { images.read(i).decode(); });
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace visual_localization;
+  const std::string path = fuzz::inMemoryFile(data, size);
+  fuzz::expect<BagError>([&] {
+    const BagReader bag(path);
+    fuzz::expect<BagError>([&] { bag.fixes("/fix"); });
+    for (const char* topic : {"/raw", "/jpeg"}) fuzz::expect<BagError>([&] { readImages(bag, topic); });
+  });
+  return 0;
+}

@@ -1,0 +1,39 @@
+/// Parameter files and experiments: YAML that somebody wrote.
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include <yaml-cpp/yaml.h>
+
+#include "test/fuzz/fuzz_support.h"
+#include "visual_localization/evaluation/experiment.h"
+#include "visual_localization/localizer/localizer_config.h"
+#include "visual_localization/map/map_builder.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+namespace {
+
+void readParameters(const std::string& path) {
+  try {
+    const ParameterValues values = parameters::readYaml(path);
+    MapBuilderConfig builder;
+    fuzz::expect<ParameterError>([&] { assignParameters(builder, values); });
+    LocalizerConfig localizer;
+    assignParameters(localizer, values);
+    for (const auto& violation : localizer.violations()) fuzz::requireOneLine(violation);
+  } catch (const ParameterError& error) {
+    fuzz::requireOneLine(error.what());
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace visual_localization;
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  fuzz::expect<ParameterError>([&] { parseExperiment(text, "experiment.yaml"); });
+  readParameters(fuzz::inMemoryFile(data, size));
+  return 0;
+}

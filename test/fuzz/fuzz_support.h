@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include <unistd.h>
+
+/// What the fuzz targets share.
+namespace visual_localization::fuzz {
+
+/// Ends the program, as a sanitizer does: libFuzzer then keeps the input.
+[[noreturn]] inline void fail(const std::string& why) {
+  std::cerr << why << std::endl;
+  std::abort();
+}
+
+/// What is refused is refused in one line that a terminal shows as it is.
+inline void requireOneLine(const std::string& text) {
+  if (text.empty()) fail("a refusal says nothing");
+  if (text.size() > 20000) fail("a refusal of " + std::to_string(text.size()) + " characters");
+  for (const char c : text) {
+    if ((c >= 0 && c < 32) || c == 127) fail("a refusal of several lines: " + text);
+  }
+}
+
+/// Runs `read`. It may refuse its input by throwing a `Refusal`, and in no other way.
+template <class Refusal, class Read>
+bool expect(Read read) {
+  try {
+    read();
+    return true;
+  } catch (const Refusal& refusal) {
+    requireOneLine(refusal.what());
+    return false;
+  }
+}
+
+/// The bytes as a file, the same one every time; removed at the end of the program.
+inline std::string inMemoryFile(const std::uint8_t* data, std::size_t size) {
+  struct File {
+    File() {
+      const char* const memory = "/dev/shm";
+      const auto folder = std::filesystem::is_directory(memory) ? std::filesystem::path(memory)
+                                                                : std::filesystem::temp_directory_path();
+      path = (folder / ("visual_localization_fuzz_" + std::to_string(::getpid()))).string();
+    }
+    ~File() { ::unlink(path.c_str()); }
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    std::string path;
+  };
+  static const File file;
+  std::ofstream out(file.path, std::ios::binary | std::ios::trunc);
+  out.write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
+  if (!out.flush()) fail("cannot write " + file.path);
+  return file.path;
+}
+
+}  // namespace visual_localization::fuzz

@@ -1,0 +1,14 @@
+/// What an interrupted evaluation left on disk.
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include "test/fuzz/fuzz_support.h"
+#include "visual_localization/evaluation/unit_result.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace visual_localization;
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  fuzz::expect<std::runtime_error>([&] { parseUnit(serialise(parseUnit(text))); });
+  return 0;
+}

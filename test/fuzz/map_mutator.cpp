@@ -1,0 +1,233 @@
+/// Changes a map file as somebody would who knows its format, so that the fuzzer gets beyond header and checksums: by
+/// SQL, or byte by byte, and then all checksums may be made anew.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <sqlite3.h>
+
+#include "visual_localization/map/map_schema.h"
+#include "visual_localization/map/map_store.h"
+
+extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
+
+namespace visual_localization {
+namespace {
+
+using Random = std::minstd_rand;
+using Row = std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)>;
+
+template <std::size_t n>
+const char* oneOf(const std::array<const char*, n>& options, Random& random) {
+  return options.at(random() % n);
+}
+
+/// A map in memory that may be changed at will.
+class Editor {
+ public:
+  Editor(const std::uint8_t* bytes, std::size_t size) {
+    sqlite3_open(":memory:", &handle_);
+    auto* copy = static_cast<std::uint8_t*>(sqlite3_malloc64(size));
+    std::memcpy(copy, bytes, size);
+    constexpr unsigned kFlags = SQLITE_DESERIALIZE_RESIZEABLE | SQLITE_DESERIALIZE_FREEONCLOSE;
+    const auto count = static_cast<sqlite3_int64>(size);
+    sqlite3_deserialize(handle_, "main", copy, count, count, kFlags);
+    sqlite3_limit(handle_, SQLITE_LIMIT_LENGTH, 1 << 20);
+    sqlite3_progress_handler(
+        handle_, 100000, [](void*) { return 1; }, nullptr);
+    execute("PRAGMA writable_schema = ON; PRAGMA journal_mode = OFF");
+  }
+  ~Editor() { sqlite3_close_v2(handle_); }
+  Editor(const Editor&) = delete;
+  Editor& operator=(const Editor&) = delete;
+
+  void execute(const std::string& sql) { sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr); }
+
+  Row prepare(const char* sql) {
+    sqlite3_stmt* statement = nullptr;
+    sqlite3_prepare_v2(handle_, sql, -1, &statement, nullptr);
+    return {statement, sqlite3_finalize};
+  }
+
+  void repairRows(const char* select, int blobs, const char* update) {
+    std::vector<std::pair<std::int64_t, std::int64_t>> checksums;
+    const Row row = prepare(select);
+    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
+      const auto blob = [&row](int column) {
+        const void* data = sqlite3_column_blob(row.get(), column);
+        return sqlite::Bytes{static_cast<const std::uint8_t*>(data),
+                             static_cast<std::size_t>(sqlite3_column_bytes(row.get(), column))};
+      };
+      const std::int64_t image = sqlite3_column_int64(row.get(), 0);
+      checksums.emplace_back(image, blobs == 1 ? map_schema::rowChecksum(image, {blob(1)})
+                                               : map_schema::rowChecksum(image, {blob(1), blob(2)}));
+    }
+    const Row change = prepare(update);
+    for (const auto& [image, checksum] : checksums) {
+      sqlite3_bind_int64(change.get(), 1, checksum);
+      sqlite3_bind_int64(change.get(), 2, image);
+      sqlite3_step(change.get());
+      sqlite3_reset(change.get());
+    }
+  }
+
+  void repairChecksum() {
+    map_schema::Checksum checksum;
+    const Row row =
+        prepare("SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count FROM images ORDER BY id");
+    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
+      const auto integer = [&row](int column) { return std::int64_t{sqlite3_column_int64(row.get(), column)}; };
+      const auto real = [&row](int column) { return sqlite3_column_double(row.get(), column); };
+      map_schema::ImageRow{integer(0), integer(1), integer(2), real(3), real(4), real(5), integer(6)}.addTo(checksum);
+    }
+    checksum.add(meta());
+    const Row change = prepare("INSERT OR REPLACE INTO meta VALUES('checksum', ?)");
+    sqlite3_bind_int64(change.get(), 1, checksum.value());
+    sqlite3_step(change.get());
+  }
+
+  std::vector<std::uint8_t> bytes() {
+    sqlite3_int64 size = 0;
+    std::uint8_t* data = sqlite3_serialize(handle_, "main", &size, 0);
+    if (data == nullptr) return {};
+    std::vector<std::uint8_t> copy(data, data + size);
+    sqlite3_free(data);
+    return copy;
+  }
+
+ private:
+  ParameterValues meta() {
+    ParameterValues values;
+    const Row row = prepare("SELECT key, value FROM meta WHERE key <> 'checksum'");
+    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
+      const auto text = [&row](int column) {
+        const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(row.get(), column));
+        return std::string(data == nullptr ? "" : data,
+                           static_cast<std::size_t>(sqlite3_column_bytes(row.get(), column)));
+      };
+      const int type = sqlite3_column_type(row.get(), 1);
+      ParameterValue& value = values[text(0)];
+      if (type == SQLITE_INTEGER) {
+        value = std::int64_t{sqlite3_column_int64(row.get(), 1)};
+      } else if (type == SQLITE_FLOAT) {
+        value = sqlite3_column_double(row.get(), 1);
+      } else {
+        value = text(1);
+      }
+    }
+    return values;
+  }
+
+  sqlite3* handle_ = nullptr;
+};
+
+std::string anySql(Random& random) {
+  static const std::array<const char*, 16> kColumns{
+      "images.id",      "images.session",       "images.stamp_ns",    "images.east_m",        "images.north_m",
+      "images.yaw_rad", "images.feature_count", "features.keypoints", "features.descriptors", "features.image",
+      "globals.wgoh",   "globals.wgii",         "previews.jpeg",      "previews.image",       "meta.key",
+      "meta.value"};
+  static const std::array<const char*, 18> kValues{"0",
+                                                   "1",
+                                                   "-1",
+                                                   "9223372036854775807",
+                                                   "-9223372036854775808",
+                                                   "4294967296",
+                                                   "1e308",
+                                                   "-1e308",
+                                                   "9e999",
+                                                   "0.5",
+                                                   "'text'",
+                                                   "x''",
+                                                   "x'00'",
+                                                   "zeroblob(16)",
+                                                   "zeroblob(512)",
+                                                   "zeroblob(100000)",
+                                                   "randomblob(128)",
+                                                   "1e5"};
+  static const std::array<const char*, 16> kOthers{
+      "CREATE VIEW v AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) SELECT i FROM n",
+      "CREATE TRIGGER t AFTER INSERT ON images BEGIN DELETE FROM meta; END",
+      "CREATE INDEX i ON images(abs(session))",
+      "CREATE VIRTUAL TABLE f USING fts5(a)",
+      "CREATE TABLE g(a, b AS (a * 2))",
+      "UPDATE sqlite_master SET rootpage = (SELECT abs(random()) % 12)",
+      "UPDATE sqlite_master SET name = name || char(10)",
+      "UPDATE sqlite_master SET sql = sql || char(10)",
+      "UPDATE sqlite_master SET type = 'view'",
+      "INSERT INTO meta VALUES('session/2' || char(10), 'x')",
+      "DELETE FROM images WHERE id = (SELECT max(id) FROM images)",
+      "DELETE FROM features",
+      "DROP TABLE previews",
+      "PRAGMA page_size = 1024; VACUUM",
+      "PRAGMA auto_vacuum = FULL; VACUUM",
+      "PRAGMA encoding = 'UTF-16'; VACUUM"};
+  if (random() % 6 == 0) return oneOf(kOthers, random);
+  const std::string column = oneOf(kColumns, random);
+  const std::size_t dot = column.find('.');
+  const std::string table = column.substr(0, dot);
+  const std::string where = random() % 4 == 0 ? "" : " WHERE rowid = " + std::to_string(random() % 4);
+  const std::string which = table == "meta" ? " WHERE random() % 5 = 0" : where;
+  return "UPDATE OR REPLACE " + table + " SET " + column.substr(dot + 1) + " = " + oneOf(kValues, random) + which;
+}
+
+void putBigEndian(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint64_t value) {
+  for (std::size_t i = 0; i < 4; ++i) bytes.at(at + i) = static_cast<std::uint8_t>(value >> (24 - 8 * i));
+}
+
+/// What tells a map from another file, and the number of its pages.
+void repairHeader(std::vector<std::uint8_t>& bytes) {
+  if (bytes.size() < 512) return;
+  const std::size_t declared = bytes[16] * 256U + bytes[17];
+  const std::size_t page = declared == 1 ? 65536 : std::max<std::size_t>(declared, 512);
+  bytes.resize((bytes.size() + page - 1) / page * page);
+  putBigEndian(bytes, 28, bytes.size() / page);
+  putBigEndian(bytes, 60, kMapSchemaVersion);
+  putBigEndian(bytes, 68, static_cast<std::uint64_t>(map_schema::kApplicationId));
+}
+
+void mutateBytes(std::vector<std::uint8_t>& bytes, std::size_t max_size, Random& random) {
+  if (bytes.size() < 64 || random() % 4 == 0) {
+    const std::size_t size = bytes.size();
+    bytes.resize(max_size);
+    bytes.resize(LLVMFuzzerMutate(bytes.data(), size, max_size));
+    return;
+  }
+  const std::size_t length = 1 + random() % 64;
+  const std::size_t at = random() % (bytes.size() - length + 1);
+  LLVMFuzzerMutate(&bytes[at], length, length);  // in place: everything else stays where it is
+}
+
+}  // namespace
+}  // namespace visual_localization
+
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
+                                               unsigned int seed) {
+  using namespace visual_localization;
+  Random random(seed);
+  std::vector<std::uint8_t> bytes(data, data + size);
+  const bool by_sql = size >= 512 && random() % 2 == 0;
+  if (!by_sql) mutateBytes(bytes, max_size, random);
+  if (random() % 8 != 0) repairHeader(bytes);
+  if (bytes.size() >= 512 && (by_sql || random() % 2 == 0)) {
+    Editor editor(bytes.data(), bytes.size());
+    for (std::size_t i = 0; by_sql && i <= random() % 3; ++i) editor.execute(anySql(random));
+    if (random() % 8 != 0) {
+      editor.repairRows("SELECT image, keypoints, descriptors FROM features", 2,
+                        "UPDATE features SET crc32 = ? WHERE image = ?");
+      editor.repairRows("SELECT image, wgoh, wgii FROM globals", 2, "UPDATE globals SET crc32 = ? WHERE image = ?");
+      editor.repairRows("SELECT image, jpeg FROM previews", 1, "UPDATE previews SET crc32 = ? WHERE image = ?");
+      editor.repairChecksum();
+    }
+    if (std::vector<std::uint8_t> changed = editor.bytes(); !changed.empty()) bytes = std::move(changed);
+    if (random() % 8 != 0) repairHeader(bytes);
+  }
+  if (bytes.size() > max_size) return 0;
+  std::copy(bytes.begin(), bytes.end(), data);
+  return bytes.size();
+}
