@@ -173,7 +173,7 @@ TEST_F(HostileMap, AWriteAheadLogAndOtherEncodingsAreRefused) {
 
 TEST_F(HostileMap, OddPageSizesAreRefused) {
   const std::string good = test::readAll(path_);
-  for (const std::size_t size : {0, 1, 2, 511, 512, 1000, 4095, 8192, 65535}) {
+  for (const std::size_t size : {0U, 1U, 2U, 511U, 512U, 1000U, 4095U, 8192U, 65535U}) {
     std::string bytes = good;
     putBigEndian(bytes, 16, size, 2);
     const std::size_t real = size == 1 ? 65536 : size;
