@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
+
+#include <yaml-cpp/eventhandler.h>
 
 #include "visual_localization/io/partial_file.h"
 #include "visual_localization/io/read_file.h"
@@ -45,6 +48,28 @@ void flattenInto(const YAML::Node& node, const std::string& prefix, const std::s
   ++left.mappings_deep;
 }
 
+/// Passes over a document.
+struct Skipper : YAML::EventHandler {
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+/// Not YAML::LoadAll(): of a text that goes on with a stray "," it makes documents until no memory is left
+/// (yaml-cpp 0.7, issue 1040).
+bool hasMoreThanOneDocument(const std::string& text) {
+  std::istringstream in(text);
+  YAML::Parser parser(in);
+  Skipper skipper;
+  return parser.HandleNextDocument(skipper) && static_cast<bool>(parser);
+}
+
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
 
 }  // namespace
@@ -75,10 +100,10 @@ YamlMap YamlMap::load(const std::string& path) {
 
 YamlMap YamlMap::parse(const std::string& text, const std::string& path) {
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1) throw ParameterError(path + ": holds several documents, must be one mapping");
-    if (documents.empty() || !documents.front().IsMap()) throw ParameterError(path + ": must be a mapping");
-    return {documents.front(), path, ""};
+    if (hasMoreThanOneDocument(text)) throw ParameterError(path + ": holds several documents, must be one mapping");
+    const YAML::Node document = YAML::Load(text);
+    if (!document.IsMap()) throw ParameterError(path + ": must be a mapping");
+    return {document, path, ""};
   } catch (const YAML::Exception& error) {
     throw ParameterError(path + ": not valid YAML: " + error.what());
   }

@@ -140,6 +140,12 @@ TEST(YamlMap, RefusesValuesOfTheWrongKind) {
   }
 }
 
+TEST(YamlMap, RefusesATextThatTheParserWouldMakeDocumentsOfForEver) {
+  for (const char* text : {",", ")", "]", "}", "{a: 1}\n}", "{a: 1}\n,", "a: 1\n]", ",: &a {x: 1}:\n? [ |\n  t\n"}) {
+    EXPECT_THAT(refusal(text), StartsWith("f.yaml: ")) << text;
+  }
+}
+
 TEST(YamlMap, RefusesATextThatIsNoMapping) {
   for (const char* text : {"", "# nothing\n", "[1, 2]", "words", "42"})
     EXPECT_EQ(refusal(text), "f.yaml: must be a mapping") << text;
