@@ -20,6 +20,7 @@ RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimi
     const Score score = sift.compare(image.sift, *map.sift(i));
     row[i].sift = score.similarity;
     row[i].matches = static_cast<std::uint32_t>(score.matches);
+    row[i].scale = static_cast<float>(score.scale);
   }
   times.sift_ms = sift_watch.elapsed_ms();
   const CpuStopwatch global_watch;
@@ -61,7 +62,7 @@ Score RecordedImage::compare(FeatureKind kind, std::size_t training_image) {
   const ScoreTable::Entry& known = entry(training_image);
   if (kind == FeatureKind::kSift) {
     ++sift_comparisons_;
-    return sift_.scoreOf(known.sift, known.matches);
+    return sift_.scoreOf(known.sift, known.matches, static_cast<double>(known.scale));
   }
   ++global_comparisons_;
   return global_.scoreOf(known.global);

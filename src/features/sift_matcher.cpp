@@ -1,5 +1,8 @@
 #include "visual_localization/features/sift_matcher.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "visual_localization/features/angle_ratio_test.h"
 #include "visual_localization/features/nearest_descriptors.h"
 
@@ -61,13 +64,13 @@ void MatchConfig::declare(ParameterVisitor& visitor) {
 
 std::vector<FeatureMatch> matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
   std::vector<FeatureMatch> matches;
-  forEachOneWay(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
+  matchOneWay(a, b, max_angle_ratio, matches);
   return matches;
 }
 
 std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
   std::vector<FeatureMatch> matches;
-  forEachSymmetric(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
+  matchSymmetric(a, b, max_angle_ratio, matches);
   return matches;
 }
 
@@ -77,16 +80,29 @@ void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_
   forEachOneWay(a, b, max_angle_ratio, [&matched](const FeatureMatch& match) { matched.push_back(match.a); });
 }
 
-std::size_t countOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
-  std::size_t count = 0;
-  forEachOneWay(a, b, max_angle_ratio, [&count](const FeatureMatch&) { ++count; });
-  return count;
+void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+                 std::vector<FeatureMatch>& matches) {
+  matches.clear();
+  forEachOneWay(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
 }
 
-std::size_t countSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
-  std::size_t count = 0;
-  forEachSymmetric(a, b, max_angle_ratio, [&count](const FeatureMatch&) { ++count; });
-  return count;
+void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+                    std::vector<FeatureMatch>& matches) {
+  matches.clear();
+  forEachSymmetric(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
+}
+
+double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vector<FeatureMatch>& matches) {
+  static thread_local std::vector<float> scales;
+  scales.clear();
+  for (const FeatureMatch& match : matches) {
+    const float scale = a.keypoints()[match.a].size_px / b.keypoints()[match.b].size_px;
+    if (std::isfinite(scale) && scale > 0.0F) scales.push_back(scale);  // a map may claim any size
+  }
+  if (scales.empty()) return 1.0;
+  const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
+  std::nth_element(scales.begin(), middle, scales.end());
+  return static_cast<double>(*middle);
 }
 
 }  // namespace visual_localization

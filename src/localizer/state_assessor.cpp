@@ -23,6 +23,10 @@ void StateConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"state/min_matches", "1", "fewer matched SIFT features are no evidence, whatever their share"},
                   min_matches, 0, 10000);
   visitor.real(
+      {"state/max_scale", "1",
+       "matched SIFT features that look so many times larger or smaller are seen from too far away to confirm"},
+      max_scale, 1.0, 100.0);
+  visitor.real(
       {"state/min_global_similarity", "1", "a weaker best match by global features does not confirm a position"},
       min_global_similarity, 0.0, 1.0);
   visitor.real({"state/max_distance", "m", "a best match farther from the estimate does not confirm it"},
@@ -44,8 +48,9 @@ void StateConfig::declare(ParameterVisitor& visitor) {
                   course_length, 2, 1000);
   visitor.real({"state/max_course_residual", "m", "up to this root mean square distance from it"},
                max_course_residual_m, 0.0, 10000.0);
-  visitor.integer({"state/off_map_images", "1", "so many images in a row without TRACKING mean OFF_MAP"},
-                  off_map_images, 1, 100000);
+  visitor.integer(
+      {"state/off_map_images", "1", "so many images that confirm nothing, with no TRACKING in between, mean OFF_MAP"},
+      off_map_images, 1, 100000);
   visitor.integer(
       {"state/min_features", "1", "images with fewer SIFT features are blind and say nothing about OFF_MAP"},
       min_features, 0, 10000);
@@ -73,8 +78,10 @@ LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, const E
   remember(estimate, evidence);
   const bool certain = isCertain();
   ever_confirmed_ = ever_confirmed_ || certain;
+  // Matched local features are of a mapped place, even while the position is not certain.
+  const bool sees_map = lastConfirms() && evidence.features == FeatureKind::kSift;
   if (certain) unconfirmed_ = 0;
-  if (!certain && !evidence.blind) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
+  if (!certain && !evidence.blind && !sees_map) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
   return stateOf(certain, evidence.recovering);
 }
 
@@ -118,7 +125,8 @@ bool StateAssessor::confirms(const TrackerEstimate& estimate, FeatureKind featur
   if (estimate.best_distance_m > config_.max_distance_m) return false;
   if (features == FeatureKind::kGlobal) return estimate.best.similarity >= config_.min_global_similarity;
   return estimate.best.similarity >= config_.min_similarity &&
-         estimate.best.matches >= static_cast<std::size_t>(config_.min_matches);
+         estimate.best.matches >= static_cast<std::size_t>(config_.min_matches) &&
+         estimate.best.scale <= config_.max_scale && estimate.best.scale * config_.max_scale >= 1.0;
 }
 
 }  // namespace visual_localization

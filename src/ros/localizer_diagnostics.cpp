@@ -88,6 +88,7 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
   if (!estimate_) return;
   status.add("Best similarity", estimate_->best.similarity);
   status.add("Matched features", estimate_->best.matches);
+  status.addf("They look so many times larger", "%.2f", estimate_->best.scale);
   status.add("Features kept", estimate_->features_kept);
   status.addf("Looks like here, of the best anywhere", "%.3f", estimate_->place_ratio);
   status.addf("Residual of the course (m)", "%.2f", estimate_->course_residual_m);

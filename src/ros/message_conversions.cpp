@@ -92,6 +92,7 @@ LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& he
   message.state_name = toString(estimate.state);
   message.best_similarity = estimate.best.similarity;
   message.best_matches = count(estimate.best.matches);
+  message.best_scale = estimate.best.scale;
   message.best_image = estimate.comparisons > 0 ? static_cast<std::int64_t>(estimate.best_image) : -1;
   message.features = static_cast<std::uint8_t>(estimate.features);
   message.comparisons = count(estimate.comparisons);

@@ -1,6 +1,7 @@
 #include "visual_localization/similarity/sift_similarity.h"
 
 #include <algorithm>
+#include <vector>
 
 namespace visual_localization {
 
@@ -11,14 +12,19 @@ SiftSimilarity::SiftSimilarity(const MatchConfig& match, const SimilarityConfig&
 
 Score SiftSimilarity::compare(const SiftFeatures& current, const SiftFeatures& training) const {
   if (current.size() < 2 || training.size() < 2) return {};
-  const std::size_t matches = symmetric_ ? countSymmetric(current, training, max_angle_ratio_)
-                                         : countOneWay(current, training, max_angle_ratio_);
+  static thread_local std::vector<FeatureMatch> matches;
+  if (symmetric_) {
+    matchSymmetric(current, training, max_angle_ratio_, matches);
+  } else {
+    matchOneWay(current, training, max_angle_ratio_, matches);
+  }
   const std::size_t possible = symmetric_ ? std::min(current.size(), training.size()) : current.size();
-  return scoreOf(static_cast<double>(matches) / static_cast<double>(possible), matches);
+  return scoreOf(static_cast<double>(matches.size()) / static_cast<double>(possible), matches.size(),
+                 medianScale(current, training, matches));
 }
 
-Score SiftSimilarity::scoreOf(double similarity, std::size_t matches) const {
-  return {similarity, similarity, matches, similarity >= recognised_};
+Score SiftSimilarity::scoreOf(double similarity, std::size_t matches, double scale) const {
+  return {similarity, similarity, matches, similarity >= recognised_, scale};
 }
 
 }  // namespace visual_localization

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -116,6 +118,31 @@ TEST(SiftMatcher, SymmetricIsTheIntersectionOfBothDirections) {
   std::size_t expected = 0;
   for (const FeatureMatch& match : a_to_b) expected += contains(b_to_a, match.b, match.a) ? 1 : 0;
   EXPECT_EQ(matchSymmetric(a, b, 0.8).size(), expected);
+}
+
+/// One keypoint of each size.
+SiftFeatures ofSizes(const std::vector<float>& sizes_px) {
+  std::vector<SiftKeypoint> keypoints;
+  for (const float size_px : sizes_px) keypoints.push_back({0.0F, 0.0F, size_px, 0.0F});
+  return {keypoints, std::vector<std::uint8_t>(sizes_px.size() * SiftFeatures::kDescriptorSize)};
+}
+
+TEST(SiftMatcher, MedianScaleIsThatOfTheMatchedFeatures) {
+  const SiftFeatures near = ofSizes({6.0F, 100.0F, 9.0F, 5.0F});
+  const SiftFeatures far = ofSizes({3.0F, 3.0F, 3.0F, 1.0F});
+  const std::vector<FeatureMatch> matches{{0, 0}, {2, 1}, {3, 2}};  // 2, 3 and 5/3; the large one has no partner
+  EXPECT_FLOAT_EQ(static_cast<float>(medianScale(near, far, matches)), 2.0F);
+  EXPECT_FLOAT_EQ(static_cast<float>(medianScale(far, near, {{0, 0}, {1, 2}, {2, 3}})), 0.5F);
+  EXPECT_EQ(medianScale(near, far, {}), 1.0);
+}
+
+TEST(SiftMatcher, MedianScaleLeavesOutSizesThatAreNone) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const SiftFeatures live = ofSizes({4.0F, 4.0F, 4.0F, 4.0F, 4.0F});
+  const SiftFeatures hostile = ofSizes({0.0F, -1.0F, kNan, kInfinity, 8.0F});
+  EXPECT_EQ(medianScale(live, hostile, {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {4, 4}}), 0.5);
+  EXPECT_EQ(medianScale(live, hostile, {{0, 0}, {1, 1}, {2, 2}, {3, 3}}), 1.0);
 }
 
 TEST(Pruning, KeepsWhatAtLeastOneNeighbourShows) {

@@ -60,6 +60,29 @@ TEST(StateAssessor, AShareOfFewFeaturesIsNoEvidence) {
   for (int i = 0; i < 9; ++i) EXPECT_EQ(assessor.assess(seen(0.5, 2), sift()), LocalizationState::kInitializing);
 }
 
+TEST(StateAssessor, WhatLooksMuchLargerOrSmallerIsSeenFromElsewhere) {
+  const auto stateAt = [](double scale) {
+    StateAssessor assessor{StateConfig()};
+    TrackerEstimate estimate = kGood;
+    estimate.best.scale = scale;
+    LocalizationState state = LocalizationState::kNoMap;
+    for (int i = 0; i < 9; ++i) state = assessor.assess(estimate, sift());
+    return state;
+  };
+  for (const double scale : {0.84, 1.0, 1.19}) EXPECT_EQ(stateAt(scale), LocalizationState::kTracking) << scale;
+  for (const double scale : {0.5, 0.83, 1.21, 3.0})
+    EXPECT_EQ(stateAt(scale), LocalizationState::kInitializing) << scale;
+}
+
+TEST(StateAssessor, AMatchedPlaceIsNotOffTheMap) {
+  StateAssessor assessor{StateConfig()};
+  // Every second image matches: too few for TRACKING, but a robot off the map would see nothing it knows.
+  for (int i = 0; i < 18; ++i) {
+    EXPECT_EQ(assessor.assess(i % 2 == 0 ? kGood : kBad, sift()), LocalizationState::kInitializing) << i;
+  }
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kOffMap) << "ten of them matched nothing";
+}
+
 /// After nine images of this similarity by global features, which count no matches.
 LocalizationState afterGlobal(double similarity, double best_distance_m = 0.0) {
   StateAssessor assessor{StateConfig()};

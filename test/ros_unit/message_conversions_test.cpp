@@ -27,7 +27,7 @@ Estimate someEstimate() {
   estimate.pose.covariance_m2 << 4.0, 0.5, 0.5, 1.0;
   estimate.pose.yaw_variance_rad2 = 0.04;
   estimate.pose.geodetic = {48.5, 9.05, 340.0};
-  estimate.best = {0.25, 0.25, 31, true};
+  estimate.best = {0.25, 0.25, 31, true, 1.25};
   estimate.best_image = 7;
   estimate.comparisons = 12;
   estimate.spread_m = {3.0, 2.0};
@@ -94,6 +94,7 @@ TEST(MessageConversions, StatusNamesTheStateAndTheEvidence) {
   EXPECT_EQ(message.state, LocalizationStatus::TRACKING);
   EXPECT_EQ(message.state_name, "TRACKING");
   EXPECT_EQ(message.best_matches, 31U);
+  EXPECT_EQ(message.best_scale, 1.25);
   EXPECT_EQ(message.best_image, 7);
   EXPECT_EQ(message.sigma_x, 3.0);
   EXPECT_EQ(message.sigma_y, 2.0);

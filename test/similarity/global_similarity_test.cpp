@@ -71,12 +71,13 @@ TEST(SiftSimilarity, AKnownSimilarityMeansTheSameAsAComparedOne) {
   config.sift_recognised = 0.25;
   config.global_recognised = 0.9;  // none of its business
   const SiftSimilarity similarity(MatchConfig(), config);
-  const Score good = similarity.scoreOf(0.25, 12);
+  const Score good = similarity.scoreOf(0.25, 12, 1.5);
   EXPECT_EQ(good.similarity, 0.25);
   EXPECT_EQ(good.weight, 0.25);
   EXPECT_EQ(good.matches, 12U);
+  EXPECT_EQ(good.scale, 1.5);
   EXPECT_TRUE(good.recognised);
-  EXPECT_FALSE(similarity.scoreOf(std::nextafter(0.25, 0.0), 12).recognised);
+  EXPECT_FALSE(similarity.scoreOf(std::nextafter(0.25, 0.0), 12, 1.5).recognised);
 }
 
 TEST(SimilarityConfig, IsInRangeByDefaultAndSaysWhatIsNot) {

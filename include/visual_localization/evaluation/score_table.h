@@ -18,6 +18,7 @@ class ScoreTable {
     double sift = 0.0;  ///< similarity by SIFT
     double global = 0.0;
     std::uint32_t matches = 0;  ///< behind `sift`
+    float scale = 1.0F;         ///< of these matches
   };
 
   ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads);

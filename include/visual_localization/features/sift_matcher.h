@@ -35,8 +35,15 @@ std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatur
 /// Into `matched`: the features of `a` that matchOneWay matches, in order; without memory of its own.
 void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
                  std::vector<std::size_t>& matched);
-/// How many matches there are.
-std::size_t countOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
-std::size_t countSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
+/// The same as above into `matches`; without memory of their own.
+void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+                 std::vector<FeatureMatch>& matches);
+void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+                    std::vector<FeatureMatch>& matches);
+
+/// Median size of the matched features of `a` as a share of their partners' in `b`: how much larger the same things
+/// look, and so how much nearer they are, seen from a. 1 without matches of
+/// sizes above 0.
+double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vector<FeatureMatch>& matches);
 
 }  // namespace visual_localization

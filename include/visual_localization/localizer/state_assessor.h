@@ -17,6 +17,7 @@ namespace visual_localization {
 struct StateConfig {
   double min_similarity = 0.08;         ///< a weaker best SIFT match does not confirm a position
   int min_matches = 5;                  ///< fewer matched SIFT features are no evidence, whatever their share
+  double max_scale = 1.2;               ///< a best match seen this much larger or smaller does not confirm a position
   double min_global_similarity = 0.65;  ///< a weaker best match by global features does not confirm a position
   double max_distance_m = 5.0;          ///< a best match farther from the estimate does not confirm it
   int window = 5;                       ///< so many of the last images are looked at
@@ -28,7 +29,7 @@ struct StateConfig {
   int place_check_images = 1000;        ///< of a larger map only so many images are asked per image
   int course_length = 10;               ///< so many of the last estimates must follow a steady motion
   double max_course_residual_m = 2.5;   ///< up to this root mean square distance from it
-  int off_map_images = 10;              ///< so many images in a row without confirmation: off the map
+  int off_map_images = 10;              ///< so many images that confirm nothing: off the map
   int min_features = 10;                ///< images with fewer SIFT features are blind: they say nothing either way
 
   void declare(ParameterVisitor& visitor);
@@ -58,6 +59,8 @@ class StateAssessor {
   LocalizationState doubt(bool recovering);
   /// The state after one more image.
   LocalizationState assess(const TrackerEstimate& estimate, const Evidence& evidence);
+  /// Whether the last image confirms the position.
+  bool lastConfirms() const { return !confirmations_.empty() && confirmations_.back() != 0; }
   /// Whether the last images look more like another place.
   bool isDoubtful() const;
   double courseResidual_m() const { return course_.residual_m(); }
@@ -73,7 +76,7 @@ class StateAssessor {
   std::vector<char> confirmations_;  ///< of the last images, newest at the back
   std::vector<double> place_ratios_;
   Course course_;
-  int unconfirmed_ = 0;          ///< images in a row after which the position was not certain, blind ones not counted
+  int unconfirmed_ = 0;  ///< images since the last certain position, without those that are blind or see the map
   bool ever_confirmed_ = false;  ///< since the last reset
   std::optional<Eigen::Vector2d> last_position_m_;
 };

@@ -17,7 +17,7 @@ class SiftSimilarity {
   /// 0 when either image has fewer than two features.
   Score compare(const SiftFeatures& current, const SiftFeatures& training) const;
   /// What a similarity that is known already means.
-  Score scoreOf(double similarity, std::size_t matches) const;
+  Score scoreOf(double similarity, std::size_t matches, double scale) const;
 
  private:
   double max_angle_ratio_;
