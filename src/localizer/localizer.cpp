@@ -61,7 +61,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, ComparableImage& image) {
   estimate.features = features;
   estimate.tuning = tracker_->tuning();
   estimate.state = assessor_.assess(tracked, evidence);
-  choice_.update(tracked.spread_m, assessor_.isDoubtful());
+  choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
   estimate.place_ratio = evidence.place_ratio;
   estimate.course_residual_m = assessor_.courseResidual_m();
   estimate.pose = poseOf(tracked, estimate.state);

@@ -10,6 +10,10 @@ void HybridConfig::declare(ParameterVisitor& visitor) {
                global_above_m, 0.0, 10000.0);
   visitor.flag({"hybrid/sift_in_doubt", "", "SIFT also as long as the images look more like another place"},
                sift_in_doubt);
+  visitor.integer(
+      {"hybrid/sift_every", "1",
+       "SIFT at least for every so many images, and until an image confirms the position; 0: no such check"},
+      sift_every, 0, 1000000);
 }
 
 FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& config)
@@ -20,15 +24,22 @@ FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& co
 
 void FeatureChoice::configure(const std::string& features, const HybridConfig& config) {
   FeatureChoice changed(features, config);
-  if (changed.hybrid_ == hybrid_ && changed.first_ == first_) changed.next_ = next_;
+  if (changed.hybrid_ == hybrid_ && changed.first_ == first_) {
+    changed.next_ = next_;
+    changed.since_sift_ = since_sift_;
+  }
   *this = changed;
 }
 
-void FeatureChoice::reset() { next_ = first_; }
+void FeatureChoice::reset() {
+  next_ = first_;
+  since_sift_ = 0;
+}
 
-void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool doubtful) {
+void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool confirmed, bool doubtful) {
   if (!hybrid_) return;
-  if (doubtful && config_.sift_in_doubt) {
+  since_sift_ = next_ == FeatureKind::kSift ? 0 : since_sift_ + 1;
+  if (isSiftDue(confirmed) || (doubtful && config_.sift_in_doubt)) {
     next_ = FeatureKind::kSift;
     return;
   }
@@ -38,6 +49,11 @@ void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool doubtful) {
   } else if (next_ == FeatureKind::kGlobal && largest_m > config_.global_above_m) {
     next_ = FeatureKind::kSift;
   }
+}
+
+bool FeatureChoice::isSiftDue(bool confirmed) const {
+  if (config_.sift_every == 0) return false;
+  return next_ == FeatureKind::kSift ? !confirmed : since_sift_ + 1 >= config_.sift_every;
 }
 
 }  // namespace visual_localization

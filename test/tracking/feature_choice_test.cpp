@@ -1,5 +1,7 @@
 #include "visual_localization/tracking/feature_choice.h"
 
+#include <string>
+
 #include <gtest/gtest.h>
 
 namespace visual_localization {
@@ -9,14 +11,14 @@ constexpr FeatureKind kSift = FeatureKind::kSift;
 constexpr FeatureKind kGlobal = FeatureKind::kGlobal;
 
 FeatureKind after(FeatureChoice& choice, double sigma_x, double sigma_y) {
-  choice.update({sigma_x, sigma_y}, false);
+  choice.update({sigma_x, sigma_y}, true, false);
   return choice.next();
 }
 
 /// A hybrid choice whose next image is compared by `kind`.
 FeatureChoice hybridAt(FeatureKind kind, const HybridConfig& config = {}) {
   FeatureChoice choice("hybrid", config);
-  if (kind == kGlobal) choice.update({0.0, 0.0}, false);
+  if (kind == kGlobal) choice.update({0.0, 0.0}, true, false);
   EXPECT_EQ(choice.next(), kind);
   return choice;
 }
@@ -71,7 +73,7 @@ TEST(FeatureChoice, AChoiceThatIsFixedNeverChanges) {
     FeatureChoice choice(kind == kSift ? "sift" : "global", HybridConfig());
     EXPECT_EQ(choice.next(), kind);
     for (const double sigma : {0.0, 6.0, 100.0, 6.0, 0.0}) EXPECT_EQ(after(choice, sigma, sigma), kind);
-    choice.update({0.0, 0.0}, true);
+    choice.update({0.0, 0.0}, false, true);
     EXPECT_EQ(choice.next(), kind);
     choice.reset();
     EXPECT_EQ(choice.next(), kind);
@@ -81,15 +83,38 @@ TEST(FeatureChoice, AChoiceThatIsFixedNeverChanges) {
 TEST(FeatureChoice, InDoubtASmallCloudIsNoReasonForGlobalFeatures) {
   for (const FeatureKind kind : {kSift, kGlobal}) {
     FeatureChoice choice = hybridAt(kind);
-    choice.update({1.0, 1.0}, true);
+    choice.update({1.0, 1.0}, true, true);
     EXPECT_EQ(choice.next(), kSift);
     EXPECT_EQ(after(choice, 1.0, 1.0), kGlobal) << "no longer in doubt";
   }
   HybridConfig paper;
   paper.sift_in_doubt = false;
   FeatureChoice choice = hybridAt(kGlobal, paper);
-  choice.update({1.0, 1.0}, true);
+  choice.update({1.0, 1.0}, true, true);
   EXPECT_EQ(choice.next(), kGlobal);
+}
+
+/// The kinds of features of the next images, whose evidence is `confirmed`.
+std::string kindsOf(FeatureChoice& choice, int images, bool confirmed) {
+  std::string kinds;
+  for (int i = 0; i < images; ++i) {
+    kinds += choice.next() == kSift ? 'S' : 'g';
+    choice.update({1.0, 1.0}, confirmed, false);
+  }
+  return kinds;
+}
+
+TEST(FeatureChoice, SiftLooksAfterASmallCloudEverySoManyImages) {
+  HybridConfig config;
+  config.sift_every = 4;
+  FeatureChoice choice("hybrid", config);
+  EXPECT_EQ(kindsOf(choice, 10, true), "SgggSgggSg");
+  EXPECT_EQ(kindsOf(choice, 6, false), "ggSSSS") << "nothing confirms the position";
+  EXPECT_EQ(kindsOf(choice, 3, true), "Sgg");
+
+  config.sift_every = 0;
+  choice.configure("hybrid", config);
+  EXPECT_EQ(kindsOf(choice, 10, false), "gggggggggg") << "as in the paper";
 }
 
 TEST(FeatureChoice, ResetBeginsWithSiftAgain) {
