@@ -9,12 +9,12 @@
 
 #include "visual_localization/features/pruning.h"
 #include "visual_localization/map/map_writer.h"
+#include "visual_localization/map/pruning_neighbours.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kNeighbours = 2;  ///< Weiss et al., section III
 constexpr int kSmallestSide_px = 16;
 constexpr std::size_t kWaitingPerThread = 4;  ///< images: so that no thread waits long for the slowest
 
@@ -60,13 +60,12 @@ cv::Mat resized(const cv::Mat& grey, cv::Size size) {
   return result;
 }
 
-/// The unpruned features of the images nearest to image `i`.
-std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, const TrainingMap& unpruned) {
-  std::vector<std::shared_ptr<const SiftFeatures>> neighbours;
-  for (const Neighbour& neighbour : unpruned.nearest(unpruned.position_m(i), kNeighbours + 1)) {
-    if (neighbour.image != i && neighbours.size() < kNeighbours) neighbours.push_back(unpruned.sift(neighbour.image));
-  }
-  return neighbours;
+/// The unpruned features of the images that tell what is noise in image `i`.
+std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, const PruningNeighbours& neighbours,
+                                                              const TrainingMap& unpruned) {
+  std::vector<std::shared_ptr<const SiftFeatures>> features;
+  for (const std::size_t neighbour : neighbours.of(i)) features.push_back(unpruned.sift(neighbour));
+  return features;
 }
 
 std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<const SiftFeatures>>& owned) {
@@ -86,8 +85,9 @@ MapBuilderConfig validated(const MapBuilderConfig& config) {
 void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"map/min_spacing", "m", "skip an image closer than this to the last kept one of its round"},
                min_spacing_m, 0.0, 1000.0);
-  visitor.flag({"map/prune", "", "keep only features that one of the two nearest training images shows as well"},
-               prune);
+  visitor.flag(
+      {"map/prune", "", "keep only features that one of the two nearest training images of its round shows too"},
+      prune);
   visitor.integer({"map/preview_width", "px", "width of the stored previews; 0 stores none"}, preview_width_px, 0, 640);
   visitor.choice(
       {"map/sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any localizer"},
@@ -177,11 +177,12 @@ void MapBuilder::prune(const Sink& sink, const BuildProgress& progress) {
   if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
   extractWaiting();
   const std::shared_ptr<const TrainingMap> unpruned = spool_.finish(header_);
+  const PruningNeighbours neighbours_of(*unpruned);
   report_.features_kept = 0;
   for (std::size_t i = 0; i < unpruned->size(); ++i) {
     TrainingImage image = unpruned->image(i);
-    const auto neighbours = neighboursOf(i, *unpruned);
-    // A map of one image has nothing to compare with: it keeps all its features.
+    const auto neighbours = neighboursOf(i, neighbours_of, *unpruned);
+    // An image on its own has nothing to be compared with: it keeps all its features.
     if (config_.prune && !neighbours.empty()) {
       image.sift = keepSeenIn(image.sift, pointersTo(neighbours), config_.match.max_angle_ratio);
     }

@@ -1,0 +1,68 @@
+#include "visual_localization/map/pruning_neighbours.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "visual_localization/geo/angles.h"
+
+namespace visual_localization {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+struct Place {
+  double east_m;
+  double yaw_rad;
+  int session;
+};
+
+std::shared_ptr<const TrainingMap> mapOf(const std::vector<Place>& places) {
+  std::vector<TrainingImage> images(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    images[i].position_m = {places[i].east_m, 0.0};
+    images[i].yaw_rad = places[i].yaw_rad;
+    images[i].session = places[i].session;
+  }
+  MapHeader header;
+  header.datum = {48.5, 9.05, 0.0};
+  header.image_size = {320, 240};
+  header.sessions = {"a", "b", "unused"};
+  return std::make_shared<const TrainingMap>(header, std::move(images));
+}
+
+TEST(PruningNeighbours, AreTheTwoNearest) {
+  const auto map = mapOf({{0, 0, 0}, {1, 0, 0}, {2.5, 0, 0}, {3, 0, 0}, {9, 0, 0}});
+  const PruningNeighbours neighbours(*map);
+  EXPECT_THAT(neighbours.of(0), ElementsAre(1U, 2U));
+  EXPECT_THAT(neighbours.of(2), ElementsAre(3U, 1U));
+  EXPECT_THAT(neighbours.of(4), ElementsAre(3U, 2U));
+}
+
+TEST(PruningNeighbours, AreOfTheSameSession) {
+  const auto map = mapOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 0, 1}, {1, 0, 1}, {2, 0, 1}});
+  const PruningNeighbours neighbours(*map);
+  EXPECT_THAT(neighbours.of(0), ElementsAre(1U, 2U));
+  EXPECT_THAT(neighbours.of(4), ElementsAre(3U, 5U));
+}
+
+TEST(PruningNeighbours, FaceTheSameWay) {
+  // There and back again; beyond the first dozens all others face the other way.
+  std::vector<Place> places{{0, 0, 0}, {100, 0, 0}, {101, 0.3, 0}};
+  for (int i = 0; i < 60; ++i) places.push_back({0.1 * i, kPi, 0});
+  const auto map = mapOf(places);
+  const PruningNeighbours neighbours(*map);
+  EXPECT_THAT(neighbours.of(0), ElementsAre(1U, 2U));
+  EXPECT_THAT(neighbours.of(1), ElementsAre(2U, 0U));
+  EXPECT_THAT(neighbours.of(3), ElementsAre(4U, 5U));
+}
+
+TEST(PruningNeighbours, AnImageOnItsOwnHasNone) {
+  const auto map = mapOf({{0, 0, 0}, {0.5, 0, 1}, {1, 0, 1}});
+  const PruningNeighbours neighbours(*map);
+  EXPECT_THAT(neighbours.of(0), IsEmpty());
+  EXPECT_THAT(neighbours.of(1), ElementsAre(2U));
+}
+
+}  // namespace
+}  // namespace visual_localization
