@@ -15,7 +15,7 @@ void PlaceCheck::configure(std::size_t max_images, double near_m) {
 }
 
 double PlaceCheck::ratio(ComparableImage& image, const Eigen::Vector2d& position_m) {
-  constexpr std::size_t kNeighbours = 32;  // in a denser map the nearest ones speak for the others
+  constexpr std::size_t kNeighbours = 32;  // these are always asked; more of them when their turn comes below
   const auto similarity = [&image](std::size_t i) { return image.compare(FeatureKind::kGlobal, i).similarity; };
   double here = 0.0;
   map_.nearest(position_m, kNeighbours, neighbours_);
@@ -24,8 +24,12 @@ double PlaceCheck::ratio(ComparableImage& image, const Eigen::Vector2d& position
   }
   double anywhere = here;
   round_ = (round_ + 1) % rounds_;
-  for (std::size_t i = round_ * stride_ / rounds_; i < map_.size(); i += stride_)
-    anywhere = std::max(anywhere, similarity(i));
+  for (std::size_t i = round_ * stride_ / rounds_; i < map_.size(); i += stride_) {
+    const double value = similarity(i);
+    anywhere = std::max(anywhere, value);
+    // With several sessions there are more than kNeighbours here, and those are no rivals.
+    if ((map_.position_m(i) - position_m).norm() <= near_m_) here = std::max(here, value);
+  }
   return anywhere > 0.0 ? here / anywhere : 1.0;
 }
 

@@ -53,6 +53,19 @@ TEST_F(PlaceCheckTest, HereEndsAtTheGivenDistance) {
   EXPECT_DOUBLE_EQ(check.ratio(image, at(26)), 0.125) << "5.6 m";
 }
 
+TEST(PlaceCheck, AnImageHereIsNoRivalHoweverManyAreNearer) {
+  // Eight sessions along one street, 0.6 m from image to image: 32 images lie within 1.5 m.
+  std::vector<Eigen::Vector2d> positions_m;
+  for (int session = 0; session < 8; ++session) {
+    for (const Eigen::Vector2d& place_m : test::street(60, 0.6)) positions_m.push_back(place_m);
+  }
+  const auto map = test::mapAt(positions_m);
+  PlaceCheck check(*map, 1000, 5.0);
+  TwoPlaces image(5 * 60 + 20, 0.8, 2 * 60 + 50, 0.4);
+  EXPECT_DOUBLE_EQ(check.ratio(image, {12.0 + 3.6, 0.0}), 1.0) << "the best lies 3.6 m behind";
+  EXPECT_DOUBLE_EQ(check.ratio(image, {30.0, 0.0}), 0.5);
+}
+
 TEST_F(PlaceCheckTest, NothingAlikeAnywhereIsNoReasonToDoubt) {
   PlaceCheck check(*map_, 1000, 5.0);
   class Blank final : public ComparableImage {
