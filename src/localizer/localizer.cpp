@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "visual_localization/geo/angles.h"
+#include "visual_localization/localizer/heading.h"
 #include "visual_localization/localizer/live_image.h"
 #include "visual_localization/localizer/stopwatch.h"
 #include "visual_localization/parameters/parameters.h"
@@ -135,23 +135,12 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
   pose.position_m = tracked.position_m;
   pose.covariance_m2 = state == LocalizationState::kTracking ? tracked.mode_covariance_m2 : tracked.cloud_covariance_m2;
   pose.covariance_m2 += floor_m2 * Eigen::Matrix2d::Identity();
-  pose.yaw_rad = map_->yaw_rad(tracked.training_image);
-  pose.yaw_variance_rad2 = yawVariance(tracked);
+  const bool recognised = tracked.best.recognised && tracked.best_distance_m <= config_.state.max_distance_m;
+  const Heading heading = headingOf(*map_, tracked, recognised, neighbours_);
+  pose.yaw_rad = heading.yaw_rad;
+  pose.yaw_variance_rad2 = heading.variance_rad2 + config_.min_yaw_std_rad * config_.min_yaw_std_rad;
   pose.geodetic = map_->frame().toGeodetic(tracked.position_m);
   return pose;
-}
-
-/// How much the headings of the training images around the position differ from the one that is reported.
-double Localizer::yawVariance(const TrackerEstimate& tracked) {
-  constexpr std::size_t kNeighbours = 5;
-  map_->nearest(tracked.position_m, kNeighbours, neighbours_);
-  double squares = 0.0;
-  for (const Neighbour& neighbour : neighbours_) {
-    const double difference = angleDifference(map_->yaw_rad(tracked.training_image), map_->yaw_rad(neighbour.image));
-    squares += difference * difference;
-  }
-  const double floor_rad2 = config_.min_yaw_std_rad * config_.min_yaw_std_rad;
-  return floor_rad2 + squares / static_cast<double>(neighbours_.size());
 }
 
 }  // namespace visual_localization

@@ -61,7 +61,6 @@ class Localizer {
   Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
                       ComparableImage& image);
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
-  double yawVariance(const TrackerEstimate& tracked);
 
   std::shared_ptr<const TrainingMap> map_;
   LocalizerConfig config_;

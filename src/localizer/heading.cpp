@@ -1,0 +1,33 @@
+#include "visual_localization/localizer/heading.h"
+
+#include <cmath>
+#include <cstddef>
+
+#include "visual_localization/geo/angles.h"
+
+namespace visual_localization {
+
+Heading headingOf(const TrainingMap& map, const TrackerEstimate& tracked, bool recognised,
+                  std::vector<Neighbour>& neighbours) {
+  constexpr std::size_t kNeighbours = 5;
+  // A robot that comes round a corner has images of both its sides; one that comes back is turned by about pi.
+  constexpr double kFacesAway_rad = 2.0 / 3.0 * kPi;
+  const auto faces_away = [&](std::size_t image) {
+    return recognised &&
+           std::abs(angleDifference(map.yaw_rad(tracked.best_image), map.yaw_rad(image))) > kFacesAway_rad;
+  };
+  Heading heading;
+  heading.yaw_rad = map.yaw_rad(faces_away(tracked.training_image) ? tracked.best_image : tracked.training_image);
+  map.nearest(tracked.position_m, kNeighbours, neighbours);
+  std::size_t counted = 0;
+  for (const Neighbour& neighbour : neighbours) {
+    if (faces_away(neighbour.image)) continue;
+    const double difference = angleDifference(heading.yaw_rad, map.yaw_rad(neighbour.image));
+    heading.variance_rad2 += difference * difference;
+    ++counted;
+  }
+  if (counted > 0) heading.variance_rad2 /= static_cast<double>(counted);
+  return heading;
+}
+
+}  // namespace visual_localization
