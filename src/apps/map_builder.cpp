@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
@@ -88,6 +89,18 @@ std::string sessionName(const std::string& bag, const std::vector<apps::PlottedR
   }
 }
 
+/// Every image of a round would be its own neighbour, and the map twice as large for nothing.
+void requireDifferent(const std::vector<std::string>& bags) {
+  for (std::size_t i = 0; i < bags.size(); ++i) {
+    for (std::size_t earlier = 0; earlier < i; ++earlier) {
+      std::error_code none;
+      if (std::filesystem::equivalent(bags[i], bags[earlier], none)) {
+        throw apps::UsageError("--bag " + bags[i] + " is the same file as --bag " + bags[earlier]);
+      }
+    }
+  }
+}
+
 /// An image that cannot be decoded is worth one line the first time, and is counted.
 cv::Mat decode(const BagImage& image, const std::string& where, bool& warned) {
   try {
@@ -138,9 +151,37 @@ void printFixes(const apps::PlottedRound& round) {
             << " s; path " << round.cleaned.trajectory.length() << " m\n";
 }
 
+/// How much wider than in the recording an image is shown in the map, in relation to its height.
+double stretchOf(cv::Size recorded, cv::Size in_map) {
+  return static_cast<double>(in_map.width) / recorded.width * recorded.height / in_map.height;
+}
+
+/// What one round brought, and whether its images had to be bent into shape.
+void printImages(const SessionImages& session, cv::Size in_map) {
+  std::cout << session.name << ": " << session.kept << " images";
+  if (session.kept != 0) std::cout << " of " << session.recorded.width << 'x' << session.recorded.height << " px";
+  if (session.kept != 0 && session.recorded != in_map) {
+    std::cout << ", resized to " << in_map.width << 'x' << in_map.height;
+    const double stretch = stretchOf(session.recorded, in_map);
+    constexpr double kHarmless = 0.02;
+    if (std::abs(stretch - 1.0) > kHarmless) {
+      std::cout << "; that distorts them (width by " << std::setprecision(2) << stretch << std::setprecision(1)
+                << "): only the same camera will recognise them";
+    }
+  }
+  std::cout << '\n';
+}
+
+/// The size of the map's images is that of the first.
+void printSessionImages(const std::vector<SessionImages>& sessions) {
+  const auto first = std::find_if(sessions.begin(), sessions.end(), [](const auto& session) { return session.kept; });
+  for (const SessionImages& session : sessions) printImages(session, first->recorded);
+}
+
 void printReport(const MapBuildReport& report, const std::vector<apps::PlottedRound>& rounds) {
   std::cout << std::fixed << std::setprecision(1);
   for (const apps::PlottedRound& round : rounds) printFixes(round);
+  if (rounds.size() > 1) printSessionImages(report.session_images);
   std::cout << "images: " << report.images_kept << " kept, " << report.images_without_position << " without position, "
             << report.images_too_close << " too close, " << report.images_disordered << " disordered, "
             << report.images_unusable << " unusable\n";
@@ -182,6 +223,7 @@ void buildMap(const Options& options) {
   const MapBuilderConfig config = readConfig(options);
   std::vector<std::string> inputs = options.bags;
   inputs.push_back(options.config);
+  requireDifferent(options.bags);
   apps::requireNoInput("--output", options.output, inputs);
   inputs.push_back(options.output);
   if (!options.plot.empty()) apps::requireNoInput("--plot", options.plot, inputs);

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include <GeographicLib/Geodesic.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "visual_localization/features/pruning.h"
@@ -47,6 +48,17 @@ LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig
   const auto first = std::find(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
   if (first == cleaned.verdicts.end()) throw std::runtime_error("none of its fixes is believable");
   return LocalFrame(datumAt(fixes[static_cast<std::size_t>(first - cleaned.verdicts.begin())].position));
+}
+
+/// On the earth, since a tangent plane shows its far side near the datum again.
+void requireNear(const GeodeticPoint& place, const GeodeticPoint& datum) {
+  double distance_m = 0.0;
+  GeographicLib::Geodesic::WGS84().Inverse(datum.latitude_deg, datum.longitude_deg, place.latitude_deg,
+                                           place.longitude_deg, distance_m);
+  if (distance_m <= kFarthestSession_m) return;
+  throw std::runtime_error("is " + std::to_string(std::llround(1e-3 * distance_m)) +
+                           " km away from where the map begins, and one map reaches " +
+                           std::to_string(std::llround(1e-3 * kFarthestSession_m)) + " km: build two maps");
 }
 
 bool isUsable(const cv::Mat& grey) {
@@ -118,12 +130,14 @@ MapBuilder::~MapBuilder() = default;
 void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& fixes) {
   try {
     if (!frame_) frame_ = frameFor(fixes, config_.trajectory);
+    requireNear(middleOf(fixes), frame_->datum());
     report_.sessions.push_back(cleanTrajectory(fixes, *frame_, config_.trajectory));
   } catch (const std::exception& error) {
     throw std::runtime_error("session '" + name + "': " + error.what());
   }
   header_.datum = frame_->datum();
   header_.sessions.push_back(name);
+  report_.session_images.push_back({name, 0, {}, {}});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
 }
@@ -161,6 +175,10 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   image.grey = grey.size() == header_.image_size ? grey.clone() : resized(grey, header_.image_size);
   waiting_.push_back(std::move(image));
   last_kept_m_ = place->position_m;
+  SessionImages& session = report_.session_images.back();
+  if (session.kept == 0) session.recorded = grey.size();
+  ++session.kept;
+  session.positions_m.push_back(place->position_m);
   ++report_.images_kept;
   if (waiting_.size() >= most_waiting_) extractWaiting();
 }

@@ -139,6 +139,79 @@ TEST(MapBuilder, RoundsBecomeSessionsOfOneMap) {
   EXPECT_EQ(map->place(3).session, 1);
 }
 
+TEST(MapBuilder, ARoundIsPrunedAsIfItWereAlone) {
+  const auto add = [](MapBuilder& builder, const char* name, std::uint64_t seed) {
+    builder.beginSession(name, straightRound());
+    for (int i = 0; i < 7; ++i) builder.addImage(i * kSecond_ns, scene(seed, 4 * i));
+  };
+  MapBuilder alone({});
+  add(alone, "sunny", 1);
+  MapBuilder together({});
+  add(together, "sunny", 1);
+  add(together, "cloudy", 2);       // shows nothing of the same
+  add(together, "sunny again", 1);  // shows exactly the same
+  const auto one = alone.build();
+  const auto three = together.build();
+  ASSERT_EQ(three->size(), 3 * one->size());
+  for (std::size_t i = 0; i < one->size(); ++i) {
+    EXPECT_EQ(three->sift(i)->descriptors(), one->sift(i)->descriptors());
+    EXPECT_EQ(three->featureCount(2 * one->size() + i), one->featureCount(i));
+  }
+}
+
+TEST(MapBuilder, RoundsShareTheFrameOfTheFirst) {
+  // The second one begins 2.8 m farther east, so with another first fix.
+  const std::vector<Fix> fixes = straightRound();
+  std::vector<Fix> second(fixes.begin() + 20, fixes.end());
+  MapBuilder builder({});
+  builder.beginSession("first", fixes);
+  builder.addImage(6 * kSecond_ns, scene(1, 0));
+  builder.beginSession("second", second);
+  builder.addImage(6 * kSecond_ns, scene(1, 0));
+  const auto map = builder.build();
+  EXPECT_NEAR((map->position_m(0) - map->position_m(1)).norm(), 0.0, 0.05);
+  EXPECT_NEAR(map->position_m(1).x(), 4.2, 0.05);
+}
+
+TEST(MapBuilder, CountsTheImagesOfEachRound) {
+  MapBuilder builder({});
+  builder.beginSession("first", straightRound());
+  builder.addImage(1 * kSecond_ns, scene(1, 0));
+  builder.addImage(2 * kSecond_ns, scene(1, 3));
+  builder.beginSession("second", straightRound());
+  cv::Mat wide;
+  cv::resize(scene(1, 0), wide, {640, 200});
+  builder.addImage(1 * kSecond_ns, wide);
+  const auto& sessions = builder.report().session_images;
+  ASSERT_EQ(sessions.size(), 2U);
+  EXPECT_EQ(sessions[0].kept, 2U);
+  EXPECT_EQ(sessions[0].positions_m.size(), 2U);
+  EXPECT_EQ(sessions[0].recorded, cv::Size(320, 240));
+  EXPECT_EQ(sessions[1].name, "second");
+  EXPECT_EQ(sessions[1].recorded, cv::Size(640, 200));
+}
+
+TEST(MapBuilder, ARoundOfAnotherCityIsRefused) {
+  // The other side of the earth lies at the datum again for a tangent plane.
+  for (const GeodeticPoint& city : {GeodeticPoint{52.5, 13.4, 30.0}, GeodeticPoint{-48.5, 9.05 - 180.0, 0.0}}) {
+    const LocalFrame frame(city);
+    std::vector<Fix> fixes = straightRound();
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      fixes[i].position = frame.toGeodetic({0.14 * static_cast<double>(i), 0.0});
+    }
+    MapBuilder builder({});
+    builder.beginSession("here", straightRound());
+    builder.addImage(kSecond_ns, scene(1, 0));
+    try {
+      builder.beginSession("there", fixes);
+      ADD_FAILURE() << "accepted";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("'there'"), testing::HasSubstr(" km away")));
+    }
+    EXPECT_EQ(builder.build()->size(), 1U) << "what came before stays";
+  }
+}
+
 /// Two rounds along the same street, made with these resources.
 std::string mapFile(const MapBuilderResources& resources, const std::string& path, MapBuildReport* report = nullptr) {
   MapBuilder builder({}, resources);

@@ -33,6 +33,17 @@ struct MapBuilderConfig {
   std::vector<std::string> violations() const;
 };
 
+/// What one recorded round brought.
+struct SessionImages {
+  std::string name;
+  std::size_t kept = 0;
+  std::vector<Eigen::Vector2d> positions_m;  ///< of those kept
+  cv::Size recorded;  ///< size of its first image, pixels; the map's is that of the first session
+};
+
+/// A map is flat: farther from its datum north and lengths are wrong by more than a degree and a part in 8000.
+constexpr double kFarthestSession_m = 1e5;
+
 /// What was kept and why the rest was dropped.
 struct MapBuildReport {
   std::size_t images_kept = 0;
@@ -41,8 +52,9 @@ struct MapBuildReport {
   std::size_t images_disordered = 0;        ///< stamp not after the one before
   std::size_t images_unusable = 0;          ///< could not be decoded, or too small
   std::size_t features_extracted = 0;
-  std::size_t features_kept = 0;            ///< after pruning
-  std::vector<CleanedTrajectory> sessions;  ///< one per recorded round
+  std::size_t features_kept = 0;              ///< after pruning
+  std::vector<CleanedTrajectory> sessions;    ///< one per recorded round
+  std::vector<SessionImages> session_images;  ///< the same
 };
 
 /// What a builder may use.
@@ -62,7 +74,8 @@ class MapBuilder {
   ~MapBuilder();
 
   /// Starts a round: cleans its fixes. The first believable fix ever given becomes the datum. Throws
-  /// std::runtime_error naming the session when the fixes are not enough for a path.
+  /// std::runtime_error naming the session when the fixes are not enough for a path, or when it lies farther than
+  /// kFarthestSession_m from the datum.
   void beginSession(const std::string& name, const std::vector<Fix>& fixes);
   /// True when the image at `stamp_ns` has a position and is far enough from the last one: only then is it
   /// worth decoding and giving to addImage. Counts the reasons otherwise.
