@@ -1,0 +1,63 @@
+#include "visual_localization/map/sight_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "visual_localization/geo/angles.h"
+
+namespace visual_localization {
+namespace {
+
+/// Of the cell `dx`, `dy` beside the one at `position_m`. A map reaches 10^6 m, so each index fits into 32 bits.
+std::uint64_t keyAt(const Eigen::Vector2d& position_m, int dx, int dy) {
+  const auto column = static_cast<std::int32_t>(std::floor(position_m.x() / SightGrid::kCell_m)) + dx;
+  const auto row = static_cast<std::int32_t>(std::floor(position_m.y() / SightGrid::kCell_m)) + dy;
+  return std::uint64_t{static_cast<std::uint32_t>(column)} << 32U | static_cast<std::uint32_t>(row);
+}
+
+}  // namespace
+
+int octantOf(double yaw_rad) {
+  const auto octant = static_cast<int>(std::lround(std::remainder(yaw_rad, 2.0 * kPi) / (kPi / 4.0)));
+  return (octant + kOctants) % kOctants;
+}
+
+void SightGrid::add(const Eigen::Vector2d& position_m, double yaw_rad, int session) {
+  TwoSessions& seen = cells_[keyAt(position_m, 0, 0)][static_cast<std::size_t>(octantOf(yaw_rad))];
+  if (seen.first == -1 || session < seen.first) {
+    if (seen.first != -1) seen.second = seen.first;
+    seen.first = session;
+  } else if (session != seen.first) {
+    seen.second = session;
+  }
+}
+
+template <class Predicate>
+bool SightGrid::anyHere(const Eigen::Vector2d& position_m, int octant, Predicate holds) const {
+  for (int dx = -1; dx <= 1; ++dx) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      const auto cell = cells_.find(keyAt(position_m, dx, dy));
+      if (cell == cells_.end()) continue;
+      for (int turn = -1; turn <= 1; ++turn) {
+        const TwoSessions& seen = cell->second[static_cast<std::size_t>((octant + turn + kOctants) % kOctants)];
+        if (seen.first != -1 && holds(seen)) return true;
+      }
+    }
+  }
+  return false;
+}
+
+bool SightGrid::otherSession(const Eigen::Vector2d& position_m, double yaw_rad, int session) const {
+  return anyHere(position_m, octantOf(yaw_rad),
+                 [session](const TwoSessions& seen) { return seen.first != session || seen.second != -1; });
+}
+
+bool SightGrid::earlierSession(const Eigen::Vector2d& position_m, double yaw_rad, int session) const {
+  return anyHere(position_m, octantOf(yaw_rad), [session](const TwoSessions& seen) { return seen.first < session; });
+}
+
+bool SightGrid::oppositeWay(const Eigen::Vector2d& position_m, double yaw_rad) const {
+  return anyHere(position_m, (octantOf(yaw_rad) + kOctants / 2) % kOctants, [](const TwoSessions&) { return true; });
+}
+
+}  // namespace visual_localization

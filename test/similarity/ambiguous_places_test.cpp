@@ -1,0 +1,112 @@
+#include "visual_localization/similarity/ambiguous_places.h"
+
+#include <gtest/gtest.h>
+
+#include "test/support/example_map.h"
+
+namespace visual_localization {
+namespace {
+
+/// Replaces the features `first` to `last` of an image by others.
+SiftFeatures withOthers(const SiftFeatures& features, std::size_t first, std::size_t last, unsigned seed) {
+  std::mt19937 random(seed);
+  const SiftFeatures others = test::randomFeatures(features.size(), random);
+  std::vector<std::uint8_t> descriptors = features.descriptors();
+  const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i * SiftFeatures::kDescriptorSize); };
+  std::copy(others.descriptors().begin() + at(first), others.descriptors().begin() + at(last),
+            descriptors.begin() + at(first));
+  return SiftFeatures(features.keypoints(), descriptors);
+}
+
+/// A street of 60 m with an image a metre, each with half its features from the one before. `twins`: so many images
+/// from 40 on look like the ones from 5 on.
+std::vector<TrainingImage> street(std::size_t twins) {
+  std::mt19937 random(7);
+  std::vector<TrainingImage> images(60);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    images[i].stamp_ns = static_cast<std::int64_t>(i) * 1'000'000'000;
+    images[i].position_m = {static_cast<double>(i), 0.0};
+    const auto seed = static_cast<unsigned>(i);
+    images[i].sift = i == 0 ? test::randomFeatures(60, random)
+                            : withOthers(images[i - 1].sift, i % 2 == 0 ? 0 : 30, i % 2 == 0 ? 30 : 60, seed);
+    images[i].global.wgoh = test::randomHistogram(random);
+    images[i].global.wgii = test::randomHistogram(random);
+  }
+  for (std::size_t t = 0; t < twins; ++t) {
+    images[40 + t].sift = withOthers(images[5 + t].sift, 0, 15, 1000 + static_cast<unsigned>(t));
+    images[40 + t].global = images[5 + t].global;
+  }
+  return images;
+}
+
+TrainingMap mapOf(std::vector<TrainingImage> images) { return {test::exampleHeader(), std::move(images)}; }
+
+TEST(AmbiguousPlaces, AStreetWithoutTwinsHasNone) {
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(street(0)));
+  EXPECT_EQ(found.asked, 60U);
+  EXPECT_EQ(found.stride, 1U);
+  EXPECT_TRUE(found.images.empty());
+  EXPECT_TRUE(found.stretches.empty());
+}
+
+TEST(AmbiguousPlaces, FindsBothOfTwoPlacesThatLookAlike) {
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(street(4)));
+  ASSERT_EQ(found.images.size(), 8U);
+  EXPECT_EQ(found.images[0].image, 5U);
+  EXPECT_EQ(found.images[0].twin, 40U);
+  EXPECT_GE(found.images[0].similarity, 0.7 * found.images[0].near_similarity);
+  EXPECT_EQ(found.images[4].image, 40U);
+  EXPECT_EQ(found.images[4].twin, 5U);
+  ASSERT_EQ(found.stretches.size(), 2U);
+  EXPECT_EQ(found.stretches[0].first, 5U);
+  EXPECT_EQ(found.stretches[0].last, 8U);
+  EXPECT_DOUBLE_EQ(found.stretches[0].length_m, 3.0);
+  EXPECT_GE(found.global_only, 8U);
+}
+
+TEST(AmbiguousPlaces, ATwinOfAnotherSessionAtTheSamePlaceIsNoRival) {
+  std::vector<TrainingImage> images = street(0);
+  std::vector<TrainingImage> again = images;
+  for (TrainingImage& image : again) {
+    image.session = 1;
+    image.position_m.y() = 1.0;
+  }
+  images.insert(images.end(), again.begin(), again.end());
+  EXPECT_TRUE(findAmbiguousPlaces(mapOf(std::move(images))).images.empty());
+}
+
+TEST(AmbiguousPlaces, OfALargeMapOnlySoManyAreAsked) {
+  AmbiguityConfig config;
+  config.most_images = 20;
+  std::size_t calls = 0;
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(street(0)), config, [&](std::size_t done, std::size_t total) {
+    EXPECT_EQ(done, ++calls);
+    EXPECT_EQ(total, 20U);
+  });
+  EXPECT_EQ(found.stride, 3U);
+  EXPECT_EQ(found.asked, 20U);
+  EXPECT_EQ(calls, 20U);
+}
+
+TEST(AmbiguousPlaces, EndsWhenThereIsNoWorkLeft) {
+  AmbiguityConfig config;
+  config.most_work = 200'000;
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(street(0)), config);
+  EXPECT_GT(found.asked, 0U);
+  EXPECT_GT(found.unasked, 40U);
+  EXPECT_EQ(found.asked + found.unasked, 60U);
+}
+
+TEST(AmbiguousPlaces, ImagesWithoutFeaturesAreNotAmbiguous) {
+  std::vector<TrainingImage> images = street(4);
+  for (TrainingImage& image : images) {
+    image.sift = {};
+    image.global = {};
+  }
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(std::move(images)));
+  EXPECT_TRUE(found.images.empty());
+  EXPECT_EQ(found.global_only, 0U);
+}
+
+}  // namespace
+}  // namespace visual_localization
