@@ -128,7 +128,7 @@ void addImages(MapBuilder& builder, const BagReader& bag, const std::string& top
 void addRound(MapBuilder& builder, const std::string& path, const Options& options,
               std::vector<apps::PlottedRound>& rounds) {
   const BagReader bag(path);
-  apps::PlottedRound round{sessionName(path, rounds), bag.fixes(options.fix_topic), {}};
+  apps::PlottedRound round{sessionName(path, rounds), bag.fixes(options.fix_topic), {}, {}};
   try {
     builder.beginSession(round.name, round.fixes);
   } catch (const std::exception& error) {
@@ -235,6 +235,9 @@ void buildMap(const Options& options) {
   {
     apps::ProgressBar bar("pruning features");
     builder.save(options.output, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
+  }
+  for (std::size_t r = 0; r < rounds.size(); ++r) {
+    rounds[r].images_m = builder.report().session_images[r].positions_m;
   }
   if (!options.plot.empty()) writeFile(options.plot, apps::plotTrajectories(rounds, builder.frame()));
   printReport(builder.report(), rounds);

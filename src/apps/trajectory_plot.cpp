@@ -2,154 +2,229 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <iomanip>
+#include <optional>
 #include <sstream>
+
+#include "svg_panel.h"
 
 namespace visual_localization::apps {
 namespace {
 
-constexpr double kWidth_px = 900.0;
-constexpr double kMargin_px = 40.0;
-constexpr double kLegend_px = 130.0;
+constexpr double kPanel_px = 620.0;
+constexpr double kLeft_px = 60.0;
+constexpr double kAbove_px = 34.0;  ///< of a panel, for its title
+constexpr double kBelow_px = 50.0;
+constexpr double kLegend_px = 256.0;
+constexpr double kLegendLine_px = 21.0;
+constexpr double kRoundLegend_px = 250.0;  ///< height
 
+/// How the fixes of one verdict are drawn; `shape` is a relative SVG path about the position.
 struct Style {
   FixVerdict verdict;
-  const char* colour;
-  double radius_px;
+  const char* meaning;
+  const char* paint;
+  const char* shape;
 };
 
-// kNoFix comes without usable coordinates and is only counted.
-constexpr std::array<Style, 4> kStyles{{{FixVerdict::kKept, "#9ecae1", 1.6},
-                                        {FixVerdict::kBend, "#e6550d", 2.6},
-                                        {FixVerdict::kSpike, "#d62728", 3.0},
-                                        {FixVerdict::kDisordered, "#756bb1", 3.0}}};
+constexpr std::array<Style, 5> kStyles{
+    {{FixVerdict::kKept, "kept", "fill=\"#c4c4c4\"", "m-3 0a3 3 0 1 0 6 0a3 3 0 1 0 -6 0z"},
+     {FixVerdict::kBend, "multipath (a bend)", "fill=\"#e69f00\"", "m0 -3.2l3 5.2h-6z"},
+     {FixVerdict::kNoFix, "no fix, drawn on the path", "fill=\"none\" stroke=\"black\" stroke-width=\"0.7\"",
+      "m-3.4 0a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0z"},
+     {FixVerdict::kDisordered, "out of order", "fill=\"#9467bd\"", "m-3 -3h6v6h-6z"},
+     {FixVerdict::kSpike, "spike (one outlier)", "fill=\"none\" stroke=\"#d62728\" stroke-width=\"2.2\"",
+      "m-4 -4l8 8m-8 0l8 -8"}}};
 
-/// Metres of the map frame to pixels of the picture: one scale on both axes, north up.
-class Canvas {
- public:
-  explicit Canvas(const std::vector<PlottedRound>& rounds) {
-    bool first = true;
-    for (const PlottedRound& round : rounds) {
-      for (const TrajectoryPoint& point : round.cleaned.trajectory.points()) {
-        min_m_ = first ? point.position_m : min_m_.cwiseMin(point.position_m).eval();
-        max_m_ = first ? point.position_m : max_m_.cwiseMax(point.position_m).eval();
-        first = false;
-      }
-    }
-    // Room for outliers near the path; farther ones are drawn at the border.
-    const double extent_m = std::max((max_m_ - min_m_).maxCoeff(), 1.0);
-    min_m_.array() -= 0.08 * extent_m;
-    max_m_.array() += 0.08 * extent_m;
-    scale_ = (kWidth_px - 2.0 * kMargin_px) / (max_m_ - min_m_).maxCoeff();
-  }
+constexpr const char* kRing = "m-1.5 0a1.5 1.5 0 1 0 3 0a1.5 1.5 0 1 0 -3 0z";  ///< a kept image
 
-  double height() const { return kLegend_px + 2.0 * kMargin_px + scale_ * (max_m_ - min_m_).y(); }
-  double pixelsPerMetre() const { return scale_; }
-  std::string at(const Eigen::Vector2d& position_m, const char* between) const {
-    const Eigen::Vector2d inside = position_m.cwiseMax(min_m_).cwiseMin(max_m_);
-    std::ostringstream text;
-    text << std::fixed << std::setprecision(1) << kMargin_px + scale_ * (inside.x() - min_m_.x()) << between
-         << kLegend_px + kMargin_px + scale_ * (max_m_.y() - inside.y());
-    return text.str();
-  }
+/// One a round, as in the rviz layout (Okabe and Ito).
+constexpr std::array<const char*, 6> kColours{"#0073b2", "#d65e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e8"};
 
- private:
-  Eigen::Vector2d min_m_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d max_m_ = Eigen::Vector2d::Zero();
-  double scale_ = 1.0;
-};
+const char* colourOf(std::size_t round) { return kColours[round % kColours.size()]; }
 
-std::string escaped(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    if (c == '&')
-      safe += "&amp;";
-    else if (c == '<')
-      safe += "&lt;";
-    else if (c == '>')
-      safe += "&gt;";
-    else
-      safe += c >= 0 && c < 32 ? '?' : c;
-  }
-  return safe;
+/// Where a fix is drawn. One without usable coordinates is drawn where the robot was.
+std::optional<Eigen::Vector2d> placeOf(const Fix& fix, FixVerdict verdict, const PlottedRound& round,
+                                       const LocalFrame& frame) {
+  if (verdict != FixVerdict::kNoFix && isValid(fix.position)) return frame.toEastNorth(fix.position);
+  const auto place = round.cleaned.trajectory.at(fix.stamp_ns);
+  return place ? std::optional<Eigen::Vector2d>(place->position_m) : std::nullopt;
 }
 
-void drawFixes(std::ostream& out, const PlottedRound& round, const LocalFrame& frame, const Canvas& canvas) {
-  for (const Style& style : kStyles) {
-    out << "<g fill=\"" << style.colour << "\">\n";
+void include(const Eigen::Vector2d& position_m, Area& area) {
+  area.min_m = area.min_m.cwiseMin(position_m);
+  area.max_m = area.max_m.cwiseMax(position_m);
+}
+
+/// All paths, with room for bends beside them; what lies farther off is drawn at the border.
+Area areaOf(const std::vector<PlottedRound>& rounds, const LocalFrame& frame) {
+  Area paths;
+  bool first = true;
+  for (const PlottedRound& round : rounds) {
+    for (const TrajectoryPoint& point : round.cleaned.trajectory.points()) {
+      if (first) paths = {point.position_m, point.position_m};
+      first = false;
+      include(point.position_m, paths);
+    }
+  }
+  const double extent_m = std::max(paths.range().maxCoeff(), 5.0);
+  const Eigen::Vector2d room_m = Eigen::Vector2d::Constant(0.2 * extent_m);
+  Area shown = paths;
+  for (const PlottedRound& round : rounds) {
     for (std::size_t i = 0; i < round.fixes.size(); ++i) {
-      if (round.cleaned.verdicts[i] != style.verdict || !isValid(round.fixes[i].position)) continue;
-      out << "<circle cx=\"" << canvas.at(frame.toEastNorth(round.fixes[i].position), "\" cy=\"") << "\" r=\""
-          << style.radius_px << "\"/>\n";
+      if (round.cleaned.verdicts[i] != FixVerdict::kBend) continue;
+      const Eigen::Vector2d bend_m = frame.toEastNorth(round.fixes[i].position);
+      include(bend_m.cwiseMax(paths.min_m - room_m).cwiseMin(paths.max_m + room_m), shown);
     }
-    out << "</g>\n";
   }
+  shown.min_m.array() -= 0.06 * extent_m;
+  shown.max_m.array() += 0.06 * extent_m;
+  // A street that runs due east is no strip, and one that runs due north no tower.
+  const Eigen::Vector2d least_m(1.1 * shown.range().y(), 0.35 * shown.range().x());
+  const Eigen::Vector2d missing_m = (least_m - shown.range()).cwiseMax(0.0);
+  shown.min_m -= 0.5 * missing_m;
+  shown.max_m += 0.5 * missing_m;
+  return shown;
 }
 
-void drawPath(std::ostream& out, const PlottedRound& round, const Canvas& canvas) {
-  out << "<polyline fill=\"none\" stroke=\"#08306b\" stroke-width=\"1.2\" points=\"";
-  for (const TrajectoryPoint& point : round.cleaned.trajectory.points()) out << canvas.at(point.position_m, ",") << ' ';
+/// Rounds of one place are shown alike; where they lie far apart each has its own part of the map.
+Area areaFor(const PlottedRound& round, const Area& together, const LocalFrame& frame) {
+  constexpr double kFarApart = 4.0;
+  const Area alone = areaOf({round}, frame);
+  return together.range().maxCoeff() > kFarApart * alone.range().maxCoeff() ? alone : together;
+}
+
+/// Of a long name the end: that is where rounds of one place differ.
+std::string shortened(const std::string& name, std::size_t most) {
+  return name.size() <= most ? name : "..." + name.substr(name.size() - most + 3);
+}
+
+void drawText(std::ostream& out, double x, double y, const std::string& text, const char* attributes = "") {
+  out << "<text x=\"" << svgNumber(x) << "\" y=\"" << svgNumber(y) << "\" " << attributes << '>' << escapedForXml(text)
+      << "</text>\n";
+}
+
+void drawShape(std::ostream& out, const Style& style, const std::string& where) {
+  out << "<path " << style.paint << " d=\"" << where << "\"/>\n";
+}
+
+std::string shapeAt(const Style& style, const Eigen::Vector2d& at_px) {
+  return "M" + svgNumber(at_px.x()) + " " + svgNumber(at_px.y()) + style.shape;
+}
+
+void drawFixes(std::ostream& out, const Style& style, const PlottedRound& round, const LocalFrame& frame,
+               const SvgPanel& panel) {
+  std::string shapes;
+  for (std::size_t i = 0; i < round.fixes.size(); ++i) {
+    if (round.cleaned.verdicts[i] != style.verdict) continue;
+    if (const auto place = placeOf(round.fixes[i], style.verdict, round, frame)) {
+      shapes += shapeAt(style, panel.at(*place));
+    }
+  }
+  if (!shapes.empty()) drawShape(out, style, shapes);
+}
+
+/// A line for each stretch: where the path was left open, nothing was driven as far as the map knows.
+void drawPath(std::ostream& out, const PlottedRound& round, const char* colour, const SvgPanel& panel) {
+  const std::vector<TrajectoryPoint>& points = round.cleaned.trajectory.points();
+  out << "<path fill=\"none\" stroke=\"" << colour << "\" stroke-width=\"1.4\" d=\"";
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const bool joined = i > 0 && round.cleaned.trajectory.at(points[i - 1].stamp_ns +
+                                                             (points[i].stamp_ns - points[i - 1].stamp_ns) / 2);
+    out << (joined ? 'L' : 'M') << panel.pointAt(points[i].position_m);
+  }
   out << "\"/>\n";
 }
 
-void drawText(std::ostream& out, double x, double y, const std::string& text) {
-  out << "<text x=\"" << x << "\" y=\"" << y << "\">" << escaped(text) << "</text>\n";
-}
-
-std::size_t countOf(const std::vector<PlottedRound>& rounds, FixVerdict verdict) {
-  std::size_t count = 0;
-  for (const PlottedRound& round : rounds) {
-    count +=
-        static_cast<std::size_t>(std::count(round.cleaned.verdicts.begin(), round.cleaned.verdicts.end(), verdict));
+void drawImages(std::ostream& out, const PlottedRound& round, const char* colour, const SvgPanel& panel) {
+  out << "<path fill=\"white\" stroke=\"" << colour << "\" stroke-width=\"0.8\" d=\"";
+  for (const Eigen::Vector2d& position_m : round.images_m) {
+    const Eigen::Vector2d at = panel.at(position_m);
+    out << 'M' << svgNumber(at.x()) << ' ' << svgNumber(at.y()) << kRing;
   }
-  return count;
+  out << "\"/>\n";
 }
 
-void drawLegend(std::ostream& out, const std::vector<PlottedRound>& rounds) {
-  double y = 30.0;
+/// Reasons with their counts, and what the line and the rings are; from `y` down.
+void drawLegend(std::ostream& out, const PlottedRound& round, const char* colour, double y) {
+  const double x = kLeft_px + kPanel_px + 24.0;
+  drawText(out, x - 6.0, y, std::to_string(round.fixes.size()) + " fixes", "font-weight=\"bold\"");
   for (const Style& style : kStyles) {
-    out << "<circle cx=\"50\" cy=\"" << y - 4.0 << "\" r=\"5\" fill=\"" << style.colour << "\"/>\n";
-    drawText(out, 62.0, y,
-             "fix: " + toString(style.verdict) + " (" + std::to_string(countOf(rounds, style.verdict)) + ")");
-    y += 20.0;
+    y += kLegendLine_px;
+    const auto count = std::count(round.cleaned.verdicts.begin(), round.cleaned.verdicts.end(), style.verdict);
+    drawShape(out, style, shapeAt(style, {x, y - 4.0}));
+    drawText(out, x + 14.0, y, std::to_string(count) + " " + style.meaning,
+             count == 0 ? "fill=\"#999999\"" : "fill=\"#000000\"");
   }
-  drawText(
-      out, 62.0, y,
-      "not drawn: " + toString(FixVerdict::kNoFix) + " (" + std::to_string(countOf(rounds, FixVerdict::kNoFix)) + ")");
-  out << "<line x1=\"40\" x2=\"60\" y1=\"" << y + 16.0 << "\" y2=\"" << y + 16.0
-      << "\" stroke=\"#08306b\" stroke-width=\"2\"/>\n";
-  std::string names;
-  for (const PlottedRound& round : rounds) names += (names.empty() ? "" : ", ") + round.name;
-  drawText(out, 66.0, y + 20.0, "cleaned path: " + names);
+  y += 34.0;
+  std::ostringstream path;
+  path << std::fixed << std::setprecision(0) << "cleaned path, " << round.cleaned.trajectory.length() << " m";
+  out << "<path stroke=\"" << colour << "\" stroke-width=\"2\" d=\"M" << x - 6.0 << ' ' << y - 4.0 << "h14\"/>\n";
+  drawText(out, x + 14.0, y, path.str());
+  y += kLegendLine_px;
+  out << "<path fill=\"white\" stroke=\"" << colour << "\" stroke-width=\"0.8\" d=\"M" << x << ' ' << y - 4.0 << kRing
+      << "\"/>\n";
+  drawText(out, x + 14.0, y, std::to_string(round.images_m.size()) + " kept images");
+  y += kLegendLine_px;
+  drawText(out, x + 14.0, y, std::to_string(round.cleaned.gaps_closed) + " gaps closed");
+  y += 34.0;
+  drawText(out, x - 6.0, y, "A mark on the frame lies farther off.", "fill=\"#555555\" font-size=\"11\"");
 }
 
-/// A bar of 1, 2 or 5 times a power of ten metres, at most 200 pixels long.
-void drawScale(std::ostream& out, const Canvas& canvas) {
-  const double longest_m = 200.0 / canvas.pixelsPerMetre();
-  const double power = std::pow(10.0, std::floor(std::log10(longest_m)));
-  const double length_m = power * (longest_m / power >= 5.0 ? 5.0 : longest_m / power >= 2.0 ? 2.0 : 1.0);
-  const double right = kWidth_px - kMargin_px;
-  const double left = right - length_m * canvas.pixelsPerMetre();
-  out << "<path fill=\"none\" stroke=\"black\" d=\"M" << left << " 34v8H" << right << "v-8\"/>\n";
-  std::ostringstream text;
-  text << length_m << " m";
-  drawText(out, left, 28.0, text.str());
+void drawRound(std::ostream& out, const PlottedRound& round, const LocalFrame& frame, const char* colour,
+               const SvgPanel& panel, double top_px) {
+  panel.drawAxes(out);
+  drawText(out, kLeft_px, top_px - 10.0, shortened(round.name, 70), "font-size=\"15\" font-weight=\"bold\"");
+  drawFixes(out, kStyles.front(), round, frame, panel);
+  drawPath(out, round, colour, panel);
+  drawImages(out, round, colour, panel);
+  for (std::size_t s = 1; s < kStyles.size(); ++s) drawFixes(out, kStyles[s], round, frame, panel);
+  drawLegend(out, round, colour, top_px + 14.0);
+}
+
+void drawTogether(std::ostream& out, const std::vector<PlottedRound>& rounds, const SvgPanel& panel, double top_px) {
+  panel.drawAxes(out);
+  drawText(out, kLeft_px, top_px - 10.0, "all rounds, cleaned paths", "font-size=\"15\" font-weight=\"bold\"");
+  const double x = kLeft_px + kPanel_px + 24.0;
+  double y = top_px + 14.0;
+  for (std::size_t r = 0; r < rounds.size(); ++r) {
+    drawPath(out, rounds[r], colourOf(r), panel);
+    const Eigen::Vector2d start = panel.at(rounds[r].cleaned.trajectory.points().front().position_m);
+    out << "<circle fill=\"" << colourOf(r) << "\" cx=\"" << svgNumber(start.x()) << "\" cy=\"" << svgNumber(start.y())
+        << "\" r=\"3.5\"/>\n";
+    out << "<path stroke=\"" << colourOf(r) << "\" stroke-width=\"3\" d=\"M" << x - 6.0 << ' ' << y - 4.0
+        << "h14\"/>\n";
+    drawText(out, x + 14.0, y, shortened(rounds[r].name, 28));
+    y += kLegendLine_px;
+  }
+  drawText(out, x - 6.0, y + 12.0, "A dot is where a path begins.", "fill=\"#555555\" font-size=\"11\"");
 }
 
 }  // namespace
 
 std::string plotTrajectories(const std::vector<PlottedRound>& rounds, const LocalFrame& frame) {
-  const Canvas canvas(rounds);
+  std::ostringstream panels;
+  double top_px = kAbove_px;
+  const auto below = [&top_px](const SvgPanel& panel, double legend_px) {
+    top_px += std::max(legend_px, panel.height() + kBelow_px) + kAbove_px;
+  };
+  const Area together = areaOf(rounds, frame);
+  for (std::size_t r = 0; r < rounds.size(); ++r) {
+    const SvgPanel panel({kLeft_px, top_px}, kPanel_px, areaFor(rounds[r], together, frame));
+    drawRound(panels, rounds[r], frame, colourOf(r), panel, top_px);
+    below(panel, kRoundLegend_px);
+  }
+  if (rounds.size() > 1) {
+    const SvgPanel panel({kLeft_px, top_px}, kPanel_px, together);
+    drawTogether(panels, rounds, panel, top_px);
+    below(panel, kLegendLine_px * static_cast<double>(rounds.size() + 2));
+  }
   std::ostringstream out;
-  out << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << kWidth_px << "\" height=\"" << canvas.height()
-      << "\" font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
-  for (const PlottedRound& round : rounds) drawFixes(out, round, frame, canvas);
-  for (const PlottedRound& round : rounds) drawPath(out, round, canvas);
-  drawLegend(out, rounds);
-  drawScale(out, canvas);
-  out << "</svg>\n";
+  out << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << kLeft_px + kPanel_px + kLegend_px << "\" height=\""
+      << svgNumber(top_px - kAbove_px)
+      << "\" font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+      << panels.str() << "</svg>\n";
   return out.str();
 }
 
