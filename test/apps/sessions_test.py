@@ -1,0 +1,139 @@
+"""Several rounds in one map, as a user meets them: map_builder, its plot, and what map_info tells."""
+import csv
+import json
+import os
+import re
+import shutil
+import sys
+import time
+import unittest
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+from program_runner import ProgramTest, run
+
+SUNNY, CLOUDY = (Path(argument) for argument in sys.argv[2:4])
+SVG = '{http://www.w3.org/2000/svg}'
+
+
+class SessionsTest(ProgramTest):
+    """A map of a sunny and a cloudy round."""
+
+    def build(self, *bags, **options) -> str:
+        """Makes `self.map` and `self.plot`; what the builder says."""
+        self.map, self.plot = self.folder / 'both.map', self.folder / 'both.svg'
+        arguments = [word for bag in bags for word in ('--bag', bag)]
+        result = run('map_builder', *arguments, '--output', self.map, '--plot', self.plot, '--min-spacing',
+                     options.get('spacing', 1.2))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def info(self, *arguments) -> str:
+        """What map_info says of the map."""
+        result = run('map_info', self.map, *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def test_two_rounds_become_sessions(self):
+        said = self.build(SUNNY, CLOUDY)
+        kept = [int(number) for number in re.findall(r'^campus_\w+: (\d+) images of 320x240 px$', said, re.M)]
+        self.assertEqual(len(kept), 2, said)
+        self.assertIn(f'images: {sum(kept)} kept', said)
+        shown = self.info('--check', '--ambiguity')
+        self.assertRegex(shown, rf'0  campus_sunny_1 +{kept[0]} images +\d+ m   \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d to')
+        self.assertRegex(shown, rf'1  campus_cloudy_1 +{kept[1]} images')
+        route, driven = (float(number) for number in re.search(r'route (\d+) m.*; (\d+) m driven', shown).groups())
+        self.assertAlmostEqual(driven, 2 * route, delta=0.1 * driven)
+        shared = float(re.search(r'\((\d+) %\) seen by more than one session', shown).group(1))
+        self.assertGreater(shared, 95)
+        self.assertIn('(100 %) driven in one direction only', shown)
+        for heading in ('headings:', 'weak:', 'density:', 'coverage:'):
+            self.assertIn('\n' + heading, shown)
+        self.assertRegex(shown, rf'ambiguous: +\d+ of {sum(kept)} images')
+        self.assertIn('check:       ok', shown)
+
+    def test_the_exports_carry_session_and_weakness(self):
+        self.build(SUNNY, CLOUDY)
+        table, geojson = self.folder / 'map.csv', self.folder / 'map.geojson'
+        self.info('--few-features', 90, '--ambiguity', '--export-csv', table, '--export-geojson', geojson)
+        with open(table, newline='', encoding='utf-8') as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual({row['session'] for row in rows}, {'campus_sunny_1', 'campus_cloudy_1'})
+        for row in rows:
+            self.assertEqual(row['weak'], '1' if int(row['features']) < 90 else '0')
+            self.assertIn(row['ambiguous'], ('0', '1'))
+        weak = [row for row in rows if row['weak'] == '1']
+        self.assertGreater(len(weak), 0)
+        features = json.loads(geojson.read_text(encoding='utf-8'))['features']
+        stretches = [one for one in features if one['properties'].get('weak') == 'few features']
+        self.assertEqual(sum(one['properties']['images'] for one in stretches), len(weak))
+        for one in stretches:
+            points = one['geometry']['coordinates']
+            self.assertEqual(len(points), max(2, one['properties']['images']))
+            self.assertLess(one['properties']['least_features'], 90)
+        self.info('--export-csv', table)
+        with open(table, newline='', encoding='utf-8') as file:
+            self.assertEqual({row['ambiguous'] for row in csv.DictReader(file)}, {''})
+
+    def test_the_plot_names_each_reason_with_its_count(self):
+        said = self.build(SUNNY, CLOUDY)
+        root = ElementTree.parse(self.plot).getroot()
+        texts = [text.text for text in root.iter(SVG + 'text')]
+        for name in ('campus_sunny_1', 'campus_cloudy_1'):
+            self.assertIn(name, texts)
+            fixes = re.search(rf'^{name}: (\d+) fixes: (\d+) kept, (\d+) no fix, (\d+) out of order, (\d+) spike, '
+                              r'(\d+) multipath', said, re.M).groups()
+            for count, meaning in zip(fixes, (' fixes', ' kept', ' no fix', ' out of order', ' spike', ' multipath')):
+                self.assertTrue(any(text.startswith(count + meaning) for text in texts), (count + meaning, texts))
+        self.assertIn('all rounds, cleaned paths', texts)
+        self.assertEqual(texts.count('N'), 3)
+        self.assertEqual(texts.count('20 m'), 3)
+        self.assertNotIn('nan', self.plot.read_text(encoding='utf-8'))
+        shapes = [path.get('d') for path in root.iter(SVG + 'path') if path.get('fill') == '#e69f00']
+        drawn = sum(shape.count('M') for shape in shapes) - 2  # the legends' own
+        self.assertEqual(drawn, sum(int(number) for number in re.findall(r'(\d+) multipath', said)))
+
+    def test_a_round_given_twice_is_refused(self):
+        output = self.folder / 'twice.map'
+        result = run('map_builder', '--bag', SUNNY, '--bag', SUNNY.parent / '.' / SUNNY.name, '--output', output)
+        self.assert_refused(result, 2, 'is the same file')
+        self.assertFalse(output.exists())
+
+    def test_a_copy_gets_a_name_of_its_own(self):
+        copy = self.folder / SUNNY.name
+        shutil.copy(SUNNY, copy)
+        self.build(SUNNY, copy, spacing=10)
+        self.assertIn('campus_sunny_1_2', self.info())
+
+    def test_a_round_without_fixes_is_named(self):
+        broken = self.folder / 'broken.bag'
+        broken.write_bytes(CLOUDY.read_bytes().replace(b'/gps/fix', b'/gps/nix'))
+        result = run('map_builder', '--bag', SUNNY, '--bag', broken, '--output', self.folder / 'out.map',
+                     '--min-spacing', 10)
+        self.assert_refused(result, 1, 'broken.bag', '/gps/fix')
+        self.assertFalse((self.folder / 'out.map').exists())
+
+    def test_whatever_a_round_is_called_it_stays_in_its_line(self):
+        copy = self.folder / ('x\n\x1b[31mcheck: ok' + 'y' * 200 + '.bag')
+        shutil.copy(CLOUDY, copy)
+        self.build(SUNNY, spacing=10)
+        lines = len(self.info().splitlines())
+        self.build(SUNNY, copy, spacing=10)
+        shown = self.info()
+        self.assertNotIn('\x1b', shown)
+        self.assertLessEqual(len(shown.splitlines()), lines + 1)
+        self.assertLess(max(len(line) for line in shown.splitlines()), 180)
+        ElementTree.parse(self.plot)
+
+    def test_a_map_is_described_in_a_moment(self):
+        self.build(SUNNY, CLOUDY)
+        start = time.monotonic()
+        shown = self.info()
+        self.assertLess(time.monotonic() - start, 20.0)
+        self.assertLess(len(shown.splitlines()), 60)
+        self.assertLess(max(len(line) for line in shown.splitlines()), 160)
+
+
+if __name__ == '__main__':
+    os.environ.pop('ROS_MASTER_URI', None)
+    unittest.main(argv=sys.argv[:1], verbosity=2)
