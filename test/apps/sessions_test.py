@@ -118,6 +118,7 @@ class SessionsTest(ProgramTest):
         shutil.copy(CLOUDY, copy)
         self.build(SUNNY, spacing=10)
         lines = len(self.info().splitlines())
+        self.assertNotIn('all rounds', self.plot.read_text(encoding='utf-8'))
         self.build(SUNNY, copy, spacing=10)
         shown = self.info()
         self.assertNotIn('\x1b', shown)
