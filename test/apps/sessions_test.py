@@ -40,7 +40,8 @@ class SessionsTest(ProgramTest):
         self.assertEqual(len(kept), 2, said)
         self.assertIn(f'images: {sum(kept)} kept', said)
         shown = self.info('--check', '--ambiguity')
-        self.assertRegex(shown, rf'0  campus_sunny_1 +{kept[0]} images +\d+ m   \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d to')
+        self.assertRegex(shown, rf'0  campus_sunny_1 +{kept[0]} images +\d+ m +\d+ % shared with others   '
+                         r'\d{4}-\d\d-\d\d \d\d:\d\d:\d\d to')
         self.assertRegex(shown, rf'1  campus_cloudy_1 +{kept[1]} images')
         route, driven = (float(number) for number in re.search(r'route (\d+) m.*; (\d+) m driven', shown).groups())
         self.assertAlmostEqual(driven, 2 * route, delta=0.1 * driven)
