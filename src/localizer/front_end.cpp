@@ -27,18 +27,29 @@ void FrontEnd::configure(const MatchConfig& match, bool prune, double max_image_
 void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   requireExtractable(grey);
+  const cv::Mat& fitting = fitted(grey);
+  is_repeated_ = current_ && areIdentical(fitting, current_->grey);
+  if (!is_repeated_) takeImage(fitting);
+  current_->stamp_ns = stamp_ns;
+  look_.stretch =
+      static_cast<double>(grey.cols) * image_size_.height / (static_cast<double>(grey.rows) * image_size_.width);
+  extract_ms_ = stopwatch.elapsed_ms();
+}
+
+const cv::Mat& FrontEnd::fitted(const cv::Mat& grey) {
+  if (grey.size() == image_size_) return grey;
+  cv::resize(grey, resized_, image_size_, 0.0, 0.0, cv::INTER_AREA);
+  return resized_;
+}
+
+void FrontEnd::takeImage(const cv::Mat& fitting) {
   std::swap(previous_, current_);
   if (!current_) current_ = Image{};
-  current_->stamp_ns = stamp_ns;
+  fitting.copyTo(current_->grey);
   current_->has_sift = false;
-  if (grey.size() == image_size_) {
-    grey.copyTo(current_->grey);
-  } else {
-    cv::resize(grey, current_->grey, image_size_, 0.0, 0.0, cv::INTER_AREA);
-  }
   has_pruned_ = false;
   global_.reset();
-  extract_ms_ = stopwatch.elapsed_ms();
+  look_ = lookOf(fitting);
 }
 
 const SiftFeatures& FrontEnd::sift() {

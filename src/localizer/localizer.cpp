@@ -40,20 +40,54 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
 Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   front_end_.setImage(stamp_ns, grey);
+  repeats_ = front_end_.isRepeated() ? repeats_ + 1 : 0;
+  Estimate estimate = isNews(stamp_ns) ? look(stamp_ns) : lastAgain(stamp_ns);
+  estimate.look = front_end_.look();
+  estimate.repeats = repeats_;
+  distrustFrozen(estimate);
+  estimate.times.extract_ms = front_end_.extract_ms();
+  estimate.times.update_ms = stopwatch.elapsed_ms() - estimate.times.extract_ms - estimate.times.match_ms;
+  last_ = estimate;
+  return estimate;
+}
+
+/// The same stamp with the same pixels is the same image, come twice.
+bool Localizer::isNews(std::int64_t stamp_ns) const {
+  if (!last_ || !front_end_.isRepeated()) return true;
+  return config_.state.frozen_images == 0 && last_->stamp_ns != stamp_ns;
+}
+
+Estimate Localizer::look(std::int64_t stamp_ns) {
   LiveImage image(front_end_, *map_, sift_similarity_, global_similarity_);
   Estimate estimate = process(stamp_ns, image);
   estimate.features_extracted = front_end_.siftExtracted();
   if (const SiftFeatures* sift = front_end_.siftIfExtracted()) estimate.features_kept = sift->size();
-  const double extract_ms = front_end_.extract_ms();
-  estimate.times = {extract_ms, image.match_ms(), stopwatch.elapsed_ms() - extract_ms - image.match_ms()};
+  estimate.times.match_ms = image.match_ms();
   return estimate;
+}
+
+Estimate Localizer::lastAgain(std::int64_t stamp_ns) const {
+  Estimate estimate = *last_;
+  estimate.stamp_ns = stamp_ns;
+  estimate.times = {};
+  return estimate;
+}
+
+/// Even a camera that stands still has noise: it says nothing about where the robot is by now.
+void Localizer::distrustFrozen(Estimate& estimate) {
+  const auto most = static_cast<std::size_t>(config_.state.frozen_images);
+  estimate.frozen = most > 0 && repeats_ >= most;
+  if (!estimate.frozen) return;
+  estimate.state = doubt();
+  estimate.pose = poseOf(tracked_, estimate.state);
 }
 
 Estimate Localizer::process(std::int64_t stamp_ns, ComparableImage& image) {
   const FeatureKind features = choice_.next();
   scores_.startImage([&](std::size_t i) { return image.compare(features, i); });
   places_.startImage([&](std::size_t i) { return image.compare(FeatureKind::kGlobal, i).weight; });
-  const TrackerEstimate tracked = tracker_->update({scores_, places_});
+  tracked_ = tracker_->update({scores_, places_});
+  const TrackerEstimate& tracked = tracked_;
   const Evidence evidence = evidenceOf(stamp_ns, tracked, features, image);
 
   Estimate estimate;
@@ -63,6 +97,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, ComparableImage& image) {
   estimate.state = assessor_.assess(tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
   estimate.place_ratio = evidence.place_ratio;
+  estimate.blind = evidence.blind;
   estimate.course_residual_m = assessor_.courseResidual_m();
   estimate.pose = poseOf(tracked, estimate.state);
   estimate.best = tracked.best;
@@ -100,6 +135,7 @@ void Localizer::configure(const LocalizerConfig& config) {
   choice_.configure(config_.features, config_.hybrid);
   assessor_.configure(config_.state);
   configureTracker(before.tracker);
+  last_.reset();
 }
 
 void Localizer::configureTracker(const std::string& tracker_before) {
@@ -117,15 +153,21 @@ void Localizer::relocalize() {
   tracker_->reset();
   choice_.reset();
   assessor_.reset();
+  last_.reset();
 }
 
 void Localizer::relocalize(const Prior& prior) {
   tracker_->reset(prior);
   choice_.reset();
   assessor_.reset();
+  last_.reset();
 }
 
-LocalizationState Localizer::doubt() { return assessor_.doubt(tracker_->tuning().recovering); }
+LocalizationState Localizer::doubt() {
+  const LocalizationState state = assessor_.doubt(tracker_->tuning().recovering);
+  if (last_) last_->state = state;
+  return state;
+}
 
 /// While the images confirm the position the covariance is that of its mode; otherwise that of the whole cloud
 /// about it, so that nothing downstream trusts a guess.

@@ -54,6 +54,10 @@ void StateConfig::declare(ParameterVisitor& visitor) {
   visitor.integer(
       {"state/min_features", "1", "images with fewer SIFT features are blind and say nothing about OFF_MAP"},
       min_features, 0, 10000);
+  visitor.integer(
+      {"state/frozen_images", "1",
+       "so many repetitions of an image to the last bit end TRACKING; 0: never, for a simulated camera without noise"},
+      frozen_images, 0, 100000);
 }
 
 std::vector<std::string> StateConfig::violations() const {

@@ -53,8 +53,10 @@ void LocalizerPublisher::publishState(LocalizationState state, const ImageCounts
 void LocalizerPublisher::publish(const SharedLocalizer::Result& result, const ros::Time& stamp, double latency_ms,
                                  const ImageCounts& counts) {
   const std_msgs::Header header = headerOf(config_.global_frame_id, stamp);
-  pose_.publish(toPose(result.estimate, header));
-  fix_.publish(toFix(result.estimate, headerOf(config_.base_frame_id, stamp)));
+  if (!result.estimate.frozen) {
+    pose_.publish(toPose(result.estimate, header));
+    fix_.publish(toFix(result.estimate, headerOf(config_.base_frame_id, stamp)));
+  }
   publishParticles(result.particles, header);
   publishStatus(toStatus(result.estimate, header), latency_ms, counts);
 }

@@ -27,7 +27,6 @@ void SharedLocalizer::configure(const LocalizerConfig& config) {
   const auto wrong = config.violations();
   if (!wrong.empty()) throw ParameterError(wrong.front());
   const std::lock_guard<std::mutex> lock(mutex_);
-  last_result_.reset();
   if (localizer_) localizer_->configure(config);
   config_ = config;
 }
@@ -43,7 +42,6 @@ void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
   localizer->configure(config_);  // it may have changed just now
   if (waiting_guess_) localizer->relocalize(normallyDistributed(waiting_guess_->mean_m, waiting_guess_->covariance_m2));
   waiting_guess_.reset();
-  last_result_.reset();
   // The old localizer and map now end with this function, when the lock is free again.
   localizer_.swap(localizer);
   map_.swap(map);
@@ -58,30 +56,18 @@ std::shared_ptr<const TrainingMap> SharedLocalizer::map() const {
 std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return std::nullopt;
-  if (isRepeated(stamp_ns, grey)) return last_result_;
-  last_result_.reset();
   const Estimate estimate = localizer_->process(stamp_ns, grey);
-  last_result_ = Result{estimate, localizer_->particles(), localizer_->lastSift(), config_.match, map_};
-  grey.copyTo(last_image_);
-  return last_result_;
-}
-
-bool SharedLocalizer::isRepeated(std::int64_t stamp_ns, const cv::Mat& grey) const {
-  if (!last_result_ || last_result_->estimate.stamp_ns != stamp_ns) return false;
-  if (grey.size() != last_image_.size() || grey.type() != last_image_.type()) return false;
-  return cv::norm(grey, last_image_, cv::NORM_INF) == 0.0;
+  return Result{estimate, localizer_->particles(), localizer_->lastSift(), config_.match, map_};
 }
 
 std::optional<LocalizationState> SharedLocalizer::doubt() {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return std::nullopt;
-  last_result_.reset();
   return localizer_->doubt();
 }
 
 bool SharedLocalizer::relocalizeAnywhere() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  last_result_.reset();
   if (localizer_) localizer_->relocalize();
   return localizer_ != nullptr;
 }
@@ -91,7 +77,6 @@ bool SharedLocalizer::relocalizeAround(const Eigen::Vector2d& centre_m, double r
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return false;
   requireOnMap(centre_m, radius_m, localizer_->map().area());
-  last_result_.reset();
   localizer_->relocalize(prior);
   return true;
 }
@@ -99,7 +84,6 @@ bool SharedLocalizer::relocalizeAround(const Eigen::Vector2d& centre_m, double r
 bool SharedLocalizer::relocalizeAt(const Guess& guess) {
   const Prior prior = normallyDistributed(guess.mean_m, guess.covariance_m2);
   const std::lock_guard<std::mutex> lock(mutex_);
-  last_result_.reset();
   if (localizer_) {
     localizer_->relocalize(prior);
   } else {

@@ -18,8 +18,9 @@ class FrontEndTest : public test::WallStreet {
 
 TEST_F(FrontEndTest, OnlyAnImageThatFollowsIsPruned) {
   FrontEnd front_end = makeFrontEnd();
+  double along_m = 10.0;
   const auto pruned = [&](std::int64_t stamp_ns) {
-    front_end.setImage(stamp_ns, viewAt(10.0 + 1e-9 * static_cast<double>(stamp_ns)));
+    front_end.setImage(stamp_ns, viewAt(along_m += 0.6));
     return front_end.sift().size() < front_end.siftExtracted();
   };
   EXPECT_FALSE(pruned(0)) << "the first image has none before it";
@@ -76,6 +77,53 @@ TEST_F(FrontEndTest, KeepsThePreviousImageWhenTheCamerasBufferIsUsedAgain) {
   EXPECT_GT(own_buffers.sift().size(), 50U);
   EXPECT_EQ(shared_buffer.sift().descriptors(), own_buffers.sift().descriptors());
   EXPECT_EQ(shared_buffer.global().wgii, own_buffers.global().wgii);
+}
+
+TEST_F(FrontEndTest, AnImageThatRepeatsTheOneBeforeIsThatOneSeenLonger) {
+  FrontEnd front_end = makeFrontEnd();
+  FrontEnd undisturbed = makeFrontEnd();
+  for (FrontEnd* each : {&front_end, &undisturbed}) {
+    each->setImage(0, viewAt(10.0));
+    EXPECT_FALSE(each->isRepeated()) << "the first image";
+    each->setImage(kSecond, viewAt(10.6));
+    EXPECT_FALSE(each->isRepeated());
+  }
+  const SiftFeatures before = front_end.sift();
+  for (int i = 2; i < 4; ++i) {
+    front_end.setImage(i * kSecond, viewAt(10.6));
+    EXPECT_TRUE(front_end.isRepeated());
+    EXPECT_EQ(front_end.sift().descriptors(), before.descriptors()) << "not pruned by itself";
+  }
+  cv::Mat other_bit = viewAt(10.6);
+  other_bit.at<std::uint8_t>(239, 319) ^= 1;
+  for (FrontEnd* each : {&front_end, &undisturbed}) each->setImage(4 * kSecond, other_bit);
+  EXPECT_FALSE(front_end.isRepeated());
+  EXPECT_EQ(front_end.sift().descriptors(), undisturbed.sift().descriptors());
+}
+
+TEST_F(FrontEndTest, AnImageOfAnotherSizeIsARepetitionWhenItIsResizedToTheSame) {
+  FrontEnd front_end = makeFrontEnd();
+  cv::Mat large;
+  cv::resize(viewAt(10.0), large, cv::Size(640, 480), 0, 0, cv::INTER_CUBIC);
+  front_end.setImage(0, large);
+  front_end.setImage(kSecond, large);
+  EXPECT_TRUE(front_end.isRepeated());
+  EXPECT_EQ(front_end.look().stretch, 1.0);
+  front_end.setImage(2 * kSecond, large(cv::Rect(0, 60, 640, 360)));
+  EXPECT_FALSE(front_end.isRepeated());
+  EXPECT_NEAR(front_end.look().stretch, 4.0 / 3.0, 1e-9);
+}
+
+TEST_F(FrontEndTest, SaysWhatTheImageIsLike) {
+  FrontEnd front_end = makeFrontEnd();
+  cv::Mat halves(240, 320, CV_8UC1, cv::Scalar(10));
+  halves.colRange(0, 160).setTo(50);
+  front_end.setImage(0, halves);
+  EXPECT_DOUBLE_EQ(front_end.look().mean_grey, 30.0);
+  EXPECT_DOUBLE_EQ(front_end.look().contrast, 20.0);
+  front_end.setImage(kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(255)));
+  EXPECT_DOUBLE_EQ(front_end.look().mean_grey, 255.0);
+  EXPECT_DOUBLE_EQ(front_end.look().contrast, 0.0);
 }
 
 TEST_F(FrontEndTest, WithoutPruningAllFeaturesAreKept) {

@@ -74,7 +74,7 @@ TEST_P(EveryCombination, FogIsNeverATrackedPosition) {
   Localizer localizer(map(), config);
   const cv::Mat fog(240, 320, CV_8UC1, cv::Scalar(90));
   for (int i = 0; i < 20; ++i) {
-    const Estimate estimate = localizer.process(i * kSecond, fog);
+    const Estimate estimate = localizer.process(i * kSecond, noisy(fog, i));
     EXPECT_NE(estimate.state, LocalizationState::kTracking);
     EXPECT_TRUE(estimate.pose.position_m.allFinite());
     EXPECT_TRUE(estimate.pose.covariance_m2.allFinite());
@@ -105,13 +105,13 @@ TEST_F(LocalizerTest, AnotherPlaceIsNeverATrackedPosition) {
 
 TEST_F(LocalizerTest, RelocalizeForgetsAndFindsAgain) {
   Localizer localizer(map(), LocalizerConfig());
-  for (int i = 0; i < 20; ++i) localizer.process(i * kSecond, viewAt(5.0));
+  for (int i = 0; i < 20; ++i) localizer.process(i * kSecond, noisy(viewAt(5.0), i));
   localizer.relocalize(around({30.0, 0.0}, 3.0));
-  const Estimate first = localizer.process(20 * kSecond, viewAt(30.0));
+  const Estimate first = localizer.process(20 * kSecond, noisy(viewAt(30.0), 20));
   EXPECT_EQ(first.state, LocalizationState::kInitializing);
   EXPECT_NEAR(first.pose.position_m.x(), 30.0, 3.0);
   Estimate last = first;
-  for (int i = 21; i < 40; ++i) last = localizer.process(i * kSecond, viewAt(30.0));
+  for (int i = 21; i < 40; ++i) last = localizer.process(i * kSecond, noisy(viewAt(30.0), i));
   EXPECT_EQ(last.state, LocalizationState::kTracking);
   EXPECT_NEAR(last.pose.position_m.x(), 30.0, 1.5);
 }
@@ -120,8 +120,11 @@ TEST_F(LocalizerTest, HybridBeginsWithSiftWheneverThePositionIsUnknown) {
   LocalizerConfig config;
   config.features = "hybrid";
   Localizer localizer(map(), config);
-  std::int64_t stamp_ns = 0;
-  const auto next = [&] { return localizer.process(stamp_ns += kSecond, viewAt(12.0)); };
+  int shown = 0;
+  const auto next = [&] {
+    ++shown;
+    return localizer.process(shown * kSecond, noisy(viewAt(12.0), shown));
+  };
   for (const bool with_prior : {false, true}) {
     EXPECT_EQ(next().features, FeatureKind::kSift);
     Estimate estimate;
@@ -189,7 +192,7 @@ TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {
   cv::Mat large;
   Estimate estimate;
   for (int i = 0; i < 30; ++i) {
-    cv::resize(viewAt(10.0), large, cv::Size(640, 480), 0, 0, cv::INTER_CUBIC);
+    cv::resize(noisy(viewAt(10.0), i), large, cv::Size(640, 480), 0, 0, cv::INTER_CUBIC);
     estimate = localizer.process(i * kSecond, large);
   }
   EXPECT_EQ(estimate.state, LocalizationState::kTracking);

@@ -23,7 +23,7 @@ class MapCache : public test::WallStreet {
     Localizer localizer(map, config);
     std::vector<double> numbers;
     for (int i = 0; i < 16; ++i) {
-      const Estimate estimate = localizer.process(i * test::kSecond, viewAt(i < 8 ? 0.6 * i : 20.0));
+      const Estimate estimate = localizer.process(i * test::kSecond, noisy(viewAt(i < 8 ? 0.6 * i : 20.0), i));
       numbers.insert(numbers.end(),
                      {estimate.pose.position_m.x(), estimate.pose.position_m.y(), estimate.best.similarity,
                       static_cast<double>(estimate.comparisons), estimate.pose.covariance_m2(0, 0)});

@@ -29,6 +29,16 @@ class WallStreet : public ::testing::Test {
     return viewOf(all, static_cast<int>(metres / kMetresPerImage * kPixelsPerImage));
   }
 
+  /// As a camera shows it that has noise: no two images are the same, even if it stands still.
+  static cv::Mat noisy(const cv::Mat& view, int number, double sigma = 1.0) {
+    cv::Mat noise(view.size(), CV_16SC1);
+    cv::RNG random(static_cast<std::uint64_t>(number) + 1);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, sigma);
+    cv::Mat image;
+    cv::add(view, noise, image, cv::noArray(), CV_8U);
+    return image;
+  }
+
   /// Made when first asked for, since not every test needs it.
   static const std::shared_ptr<const TrainingMap>& map() {
     static const std::shared_ptr<const TrainingMap> made = makeMap();

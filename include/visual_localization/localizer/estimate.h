@@ -9,6 +9,7 @@
 
 #include "visual_localization/features/feature_kind.h"
 #include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/localizer/image_look.h"
 #include "visual_localization/similarity/score.h"
 #include "visual_localization/tracking/tracker.h"
 
@@ -57,6 +58,10 @@ struct Estimate {
   std::size_t features_kept = 0;              ///< after pruning
   double place_ratio = 1.0;                   ///< see PlaceCheck; 1 when there was no need to ask
   double course_residual_m = 0.0;             ///< see Course; of the last estimates
+  ImageLook look;                             ///< of the image
+  bool blind = false;                         ///< there was hardly anything to see in the image
+  std::size_t repeats = 0;                    ///< images in a row, this one included, that repeated the one before
+  bool frozen = false;                        ///< so many of them that the camera must be broken
   TrackerTuning tuning;
   Eigen::Vector2d spread_m = Eigen::Vector2d::Zero();  ///< sigma x, y of the cloud
   StageTimes times;

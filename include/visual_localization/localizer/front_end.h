@@ -11,13 +11,15 @@
 #include "visual_localization/features/global_extractor.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/localizer/image_look.h"
 
 namespace visual_localization {
 
 /// Live image in, features out: resizes to the map's size and extracts either kind of features when it is first
 /// asked for. SIFT features are kept only if the image directly before shows them as well (Weiss et al., section
 /// III); its features too are extracted only then. The first image, or one after a gap or after an image without
-/// features, is not pruned. Takes no memory from the heap once it has seen a few images.
+/// features, is not pruned. An image that repeats the one before to the last bit is that one, seen longer. Takes no
+/// memory from the heap once it has seen a few images.
 class FrontEnd {
  public:
   FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s,
@@ -33,6 +35,9 @@ class FrontEnd {
   /// Global features of the image.
   const GlobalFeatures& global();
 
+  /// Whether the image repeats the one before to the last bit, at the map's size.
+  bool isRepeated() const { return is_repeated_; }
+  const ImageLook& look() const { return look_; }
   /// The pruned SIFT features if they were asked for.
   const SiftFeatures* siftIfExtracted() const { return has_pruned_ ? &pruned_ : nullptr; }
   /// Number of SIFT features before pruning; 0 unless they were asked for.
@@ -48,6 +53,9 @@ class FrontEnd {
     bool has_sift = false;
   };
 
+  /// Of the map's size; holds until the next call.
+  const cv::Mat& fitted(const cv::Mat& grey);
+  void takeImage(const cv::Mat& fitting);
   const SiftFeatures& unprunedSift(Image& image);
   bool previousIsClose() const;
 
@@ -59,6 +67,9 @@ class FrontEnd {
   GlobalExtractor global_extractor_;
   std::optional<Image> previous_;
   std::optional<Image> current_;
+  cv::Mat resized_;
+  bool is_repeated_ = false;
+  ImageLook look_;
   SiftFeatures pruned_;  ///< like those of the images kept when it no longer holds, for the sake of its memory
   bool has_pruned_ = false;
   std::optional<GlobalFeatures> global_;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,9 @@ class Localizer {
   Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config);
 
   /// `grey`: 8-bit, one channel, at least 16 x 16; resized to the map's size. Throws std::invalid_argument for
-  /// anything else, and then nothing has changed.
+  /// anything else, and then nothing has changed. An image that repeats the one before to the last bit is no new
+  /// evidence: it gets the same answer, unless the localizer was told something meanwhile. After some of them in a row
+  /// (state/frozen_images) the camera counts as frozen, and the position must be confirmed anew.
   Estimate process(std::int64_t stamp_ns, const cv::Mat& grey);
   /// The same for an image that knows by itself how to compare: its times and counts of features stay zero.
   Estimate process(std::int64_t stamp_ns, ComparableImage& image);
@@ -57,6 +60,10 @@ class Localizer {
   }
 
  private:
+  bool isNews(std::int64_t stamp_ns) const;
+  Estimate look(std::int64_t stamp_ns);
+  Estimate lastAgain(std::int64_t stamp_ns) const;
+  void distrustFrozen(Estimate& estimate);
   void configureTracker(const std::string& tracker_before);
   Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
                       ComparableImage& image);
@@ -74,6 +81,9 @@ class Localizer {
   PlaceCheck place_check_;
   StateAssessor assessor_;
   std::vector<Neighbour> neighbours_;  ///< of the last estimate
+  TrackerEstimate tracked_;            ///< after the last image
+  std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again
+  std::size_t repeats_ = 0;            ///< of the last image, in a row
 };
 
 }  // namespace visual_localization

@@ -31,6 +31,7 @@ struct StateConfig {
   double max_course_residual_m = 2.5;   ///< up to this root mean square distance from it
   int off_map_images = 10;              ///< so many images that confirm nothing: off the map
   int min_features = 10;                ///< images with fewer SIFT features are blind: they say nothing either way
+  int frozen_images = 3;                ///< so many images in a row without any change: the camera is frozen; 0: never
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const;

@@ -23,7 +23,8 @@ class LocalizerPublisher {
   void publishMap(const TrainingMap& map);
   /// What is known without an image: that there is no map, or that none comes. Stamped with the present.
   void publishState(LocalizationState state, const ImageCounts& counts);
-  /// Everything that is known after an image but the drawing. `result` must be finite.
+  /// Everything that is known after an image but the drawing: no pose after one of a frozen camera. `result` must be
+  /// finite.
   void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, double latency_ms,
                const ImageCounts& counts);
   /// Draws and publishes the matches with the best training image if somebody looks.

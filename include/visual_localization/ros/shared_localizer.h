@@ -45,9 +45,7 @@ class SharedLocalizer {
   /// Never waits, unlike map(), which waits for the end of the image that is being processed.
   bool hasMap() const { return has_map_; }
 
-  /// An image that comes again, with the same stamp and the same pixels, is no new evidence: it gets the same answer as
-  /// before, unless the localizer was told something meanwhile. Nothing without a map. Throws std::invalid_argument for
-  /// an unusable image.
+  /// See Localizer::process. Nothing without a map. Throws std::invalid_argument for an unusable image.
   std::optional<Result> process(std::int64_t stamp_ns, const cv::Mat& grey);
 
   /// See Localizer::doubt. Nothing without a map.
@@ -61,15 +59,12 @@ class SharedLocalizer {
 
  private:
   LocalizerConfig configuration() const;
-  bool isRepeated(std::int64_t stamp_ns, const cv::Mat& grey) const;
 
   mutable std::mutex mutex_;
   LocalizerConfig config_;
   std::shared_ptr<const TrainingMap> map_;
   std::unique_ptr<Localizer> localizer_;
   std::optional<Guess> waiting_guess_;
-  std::optional<Result> last_result_;  ///< of `last_image_`, while it would come out the same again
-  cv::Mat last_image_;
   std::atomic<bool> has_map_{false};
 };
 
