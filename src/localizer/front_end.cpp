@@ -27,7 +27,7 @@ void FrontEnd::configure(const MatchConfig& match, bool prune, double max_image_
 void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   requireExtractable(grey);
-  const cv::Mat& fitting = fitted(grey);
+  const cv::Mat& fitting = spread(fitted(grey));
   is_repeated_ = current_ && areIdentical(fitting, current_->grey);
   if (!is_repeated_) takeImage(fitting);
   current_->stamp_ns = stamp_ns;
@@ -42,6 +42,19 @@ const cv::Mat& FrontEnd::fitted(const cv::Mat& grey) {
   return resized_;
 }
 
+/// The extractor looks for a contrast in grey levels, and finds nothing in a dark or foggy image that shows all it
+/// needs.
+const cv::Mat& FrontEnd::spread(const cv::Mat& fitting) {
+  constexpr double kDull = 15.0;
+  constexpr double kNothing = 4.0;  // but noise
+  constexpr double kUsual = 40.0;
+  look_ = lookOf(fitting);
+  if (look_.contrast < kNothing || look_.contrast >= kDull) return fitting;
+  const double gain = kUsual / look_.contrast;
+  fitting.convertTo(spread_, CV_8U, gain, 128.0 - gain * look_.mean_grey);
+  return spread_;
+}
+
 void FrontEnd::takeImage(const cv::Mat& fitting) {
   std::swap(previous_, current_);
   if (!current_) current_ = Image{};
@@ -49,7 +62,6 @@ void FrontEnd::takeImage(const cv::Mat& fitting) {
   current_->has_sift = false;
   has_pruned_ = false;
   global_.reset();
-  look_ = lookOf(fitting);
 }
 
 const SiftFeatures& FrontEnd::sift() {

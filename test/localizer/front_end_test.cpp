@@ -114,6 +114,26 @@ TEST_F(FrontEndTest, AnImageOfAnotherSizeIsARepetitionWhenItIsResizedToTheSame) 
   EXPECT_NEAR(front_end.look().stretch, 4.0 / 3.0, 1e-9);
 }
 
+TEST_F(FrontEndTest, ADullImageShowsWhatABrightOneDoes) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, viewAt(10.0));
+  const std::size_t bright = front_end.sift().size();
+  cv::Mat dull;
+  viewAt(10.0).convertTo(dull, CV_8U, 0.15, 30.0);
+  for (int i = 1; i < 3; ++i) {
+    front_end.setImage(i * 100 * kSecond, dull);
+    EXPECT_GT(static_cast<double>(front_end.sift().size()), 0.8 * static_cast<double>(bright));
+    EXPECT_LT(front_end.look().contrast, 15.0) << "as it was";
+    EXPECT_EQ(front_end.isRepeated(), i == 2);
+  }
+}
+
+TEST_F(FrontEndTest, NoiseIsNotSpread) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, noisy(cv::Mat(240, 320, CV_8UC1, cv::Scalar(20)), 1, 2.0));
+  EXPECT_LT(front_end.sift().size(), 10U);
+}
+
 TEST_F(FrontEndTest, SaysWhatTheImageIsLike) {
   FrontEnd front_end = makeFrontEnd();
   cv::Mat halves(240, 320, CV_8UC1, cv::Scalar(10));

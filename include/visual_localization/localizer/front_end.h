@@ -15,11 +15,11 @@
 
 namespace visual_localization {
 
-/// Live image in, features out: resizes to the map's size and extracts either kind of features when it is first
-/// asked for. SIFT features are kept only if the image directly before shows them as well (Weiss et al., section
-/// III); its features too are extracted only then. The first image, or one after a gap or after an image without
-/// features, is not pruned. An image that repeats the one before to the last bit is that one, seen longer. Takes no
-/// memory from the heap once it has seen a few images.
+/// Live image in, features out: resizes to the map's size, spreads the grey levels of a dull image and extracts either
+/// kind of features when it is first asked for. SIFT features are kept only if the image directly before shows them as
+/// well (Weiss et al., section III); its features too are extracted only then. The first image, or one after a gap or
+/// after an image without features, is not pruned. An image that repeats the one before to the last bit is that one,
+/// seen longer. Takes no memory from the heap once it has seen a few images.
 class FrontEnd {
  public:
   FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s,
@@ -37,6 +37,7 @@ class FrontEnd {
 
   /// Whether the image repeats the one before to the last bit, at the map's size.
   bool isRepeated() const { return is_repeated_; }
+  /// What the image is like at the map's size, before its grey levels are spread.
   const ImageLook& look() const { return look_; }
   /// The pruned SIFT features if they were asked for.
   const SiftFeatures* siftIfExtracted() const { return has_pruned_ ? &pruned_ : nullptr; }
@@ -55,6 +56,8 @@ class FrontEnd {
 
   /// Of the map's size; holds until the next call.
   const cv::Mat& fitted(const cv::Mat& grey);
+  /// With the usual contrast, if there is but little; holds until the next call.
+  const cv::Mat& spread(const cv::Mat& fitting);
   void takeImage(const cv::Mat& fitting);
   const SiftFeatures& unprunedSift(Image& image);
   bool previousIsClose() const;
@@ -68,6 +71,7 @@ class FrontEnd {
   std::optional<Image> previous_;
   std::optional<Image> current_;
   cv::Mat resized_;
+  cv::Mat spread_;
   bool is_repeated_ = false;
   ImageLook look_;
   SiftFeatures pruned_;  ///< like those of the images kept when it no longer holds, for the sake of its memory
