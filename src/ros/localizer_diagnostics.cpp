@@ -4,6 +4,8 @@
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
+#include "visual_localization/ros/image_trouble.h"
+
 namespace visual_localization {
 namespace {
 
@@ -106,6 +108,8 @@ void LocalizerDiagnostics::reportImages(Wrapper& status) {
     status.summary(DiagnosticStatus::WARN, "No image has arrived yet on " + describe_camera_());
   } else if (!last_refusal_.empty()) {
     status.summary(DiagnosticStatus::WARN, "Refused: " + last_refusal_);
+  } else if (const std::string trouble = estimate_ ? imageTrouble(*estimate_) : ""; !trouble.empty()) {
+    status.summary(DiagnosticStatus::WARN, trouble);
   } else {
     status.summary(DiagnosticStatus::OK, "Images arrive");
   }
@@ -116,6 +120,9 @@ void LocalizerDiagnostics::reportImages(Wrapper& status) {
   status.add("Dropped", counts_.dropped);
   status.add("Late", counts_.late);
   status.add("Refused", counts_.refused);
+  if (!estimate_) return;
+  status.addf("Mean grey level, contrast (of 255)", "%.0f, %.0f", estimate_->look.mean_grey, estimate_->look.contrast);
+  status.add("Repeats of the last image", estimate_->repeats);
 }
 
 void LocalizerDiagnostics::reportTransform(Wrapper& status) {

@@ -9,6 +9,7 @@
 
 #include "visual_localization/map/map_store.h"
 #include "visual_localization/parameters/parameters.h"
+#include "visual_localization/ros/image_trouble.h"
 #include "visual_localization/ros/initial_pose.h"
 #include "visual_localization/ros/map_directory.h"
 #include "visual_localization/ros/message_conversions.h"
@@ -216,6 +217,7 @@ void LocalizerNodelet::process(const ReceivedImage& image) {
     if (finite_throttle_.ready()) NODELET_ERROR("The estimate is not finite and is not published");
     return;
   }
+  reportTrouble(result->estimate);
   publish(*result, stamp, !image.header.stamp.isZero());
   std_msgs::Header header = image.header;
   header.stamp = stamp;
@@ -226,9 +228,15 @@ void LocalizerNodelet::publish(const SharedLocalizer::Result& result, const ros:
   const double latency_ms = stamp_is_usable ? millisecondsBetween(stamp, ros::Time::now()) : -1.0;
   publisher_->publish(result, stamp, latency_ms, counts());
   diagnostics_->imageProcessed(result.estimate, latency_ms, counts());
+  if (result.estimate.frozen) return;  // the pose is of long ago
   const std::string missing = transform_publisher_->publish(result.estimate.pose, stamp);
   diagnostics_->transformMissing(missing);
   if (!missing.empty() && transform_throttle_.ready()) NODELET_WARN_STREAM("Nothing broadcast on tf: " << missing);
+}
+
+void LocalizerNodelet::reportTrouble(const Estimate& estimate) {
+  const std::string trouble = imageTrouble(estimate);
+  if (!trouble.empty() && trouble_throttle_.ready()) NODELET_WARN_STREAM(trouble << " (" << images_->topic() << ")");
 }
 
 bool LocalizerNodelet::isInOrder(const ros::Time& stamp) {

@@ -59,6 +59,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   /// False for an image that comes too late to be of use.
   bool isInOrder(const ros::Time& stamp);
   void watchCamera();
+  void reportTrouble(const Estimate& estimate);
   void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, bool stamp_is_usable);
   ros::Time usableStamp(const ros::Time& stamp);
   void refuse(const std::string& reason);
@@ -90,6 +91,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   Throttle finite_throttle_;
   Throttle order_throttle_;
   Throttle jump_throttle_;
+  Throttle trouble_throttle_;
   std::thread worker_;
 };
 
