@@ -127,9 +127,9 @@ class Localizer:
 class Camera:
     """Shows images to a localizer one by one, as fast as it takes them."""
 
-    def __init__(self, localizer, topic=IMAGE_TOPIC):
+    def __init__(self, localizer, topic=IMAGE_TOPIC, message_type=CompressedImage):
         self._localizer = localizer
-        self._publisher = rospy.Publisher(topic, CompressedImage, queue_size=10)
+        self._publisher = rospy.Publisher(topic, message_type, queue_size=10)
         wait_for(self._publisher.get_num_connections, 60.0, 'a subscriber of ' + topic)
 
     def publish(self, image):
