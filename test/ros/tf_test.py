@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Transforms: with odometry map, odom and base agree with the pose; without odometry nothing is broadcast."""
+import itertools
 import math
 import sys
 import unittest
@@ -42,15 +43,16 @@ class TfTest(unittest.TestCase):
         self.localizer.wait_until_up()
         for publisher in (self.camera, self.odometry):
             fixture.wait_for(publisher.get_num_connections, DEADLINE_S, 'a subscriber')
-        self.image = fixture.images_of(rospy.get_param('~bag'), count=1)[0]
+        self.images = itertools.cycle(fixture.images_of(rospy.get_param('~bag'), count=20))
 
     def show_image(self, odometry=None):
-        """Shows one image, with odometry of the same stamp if given, until there is a pose for it."""
+        """Shows images, with odometry of the same stamp if given, until there is a pose for one."""
         def seen():
-            stamp = self.image.header.stamp = rospy.Time.now()
+            image = next(self.images)
+            stamp = image.header.stamp = rospy.Time.now()
             if odometry:
                 self.odometry.publish(TFMessage([base_in_odom(stamp, *odometry)]))
-            self.camera.publish(self.image)
+            self.camera.publish(image)
             rospy.sleep(0.3)
             return [pose for pose in self.poses.messages() if pose.header.stamp == stamp]
         return fixture.wait_for(seen, DEADLINE_S, 'the pose of an image')[0]
