@@ -49,14 +49,6 @@ FORMATS = {
 }
 
 
-def message_of(pixels, encoding, stamp):
-    pixels = np.ascontiguousarray(pixels)
-    image = Image(height=pixels.shape[0], width=pixels.shape[1], step=pixels.strides[0], encoding=encoding)
-    image.header.stamp = stamp
-    image.data = pixels.tobytes()
-    return image
-
-
 class CameraTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -74,7 +66,7 @@ class CameraTest(unittest.TestCase):
 
     def drive(self, count, change=lambda grey: grey, encoding='mono8'):
         """Shows the next images of the round as `change` makes them; their statuses."""
-        return [self.camera.show(message_of(change(grey), encoding, stamp))
+        return [self.camera.show(fixture.image_of(change(grey), encoding, stamp))
                 for grey, stamp in itertools.islice(self.round, count)]
 
     def spoilt(self, fault):
@@ -135,7 +127,7 @@ class CameraTest(unittest.TestCase):
         """The log repeats itself at most once in 5 s."""
         def logged():
             stamps.append(stamps[-1] + rospy.Duration(0.002))
-            self.camera.show(message_of(grey, 'mono8', stamps[-1]))
+            self.camera.show(fixture.image_of(grey, 'mono8', stamps[-1]))
             time.sleep(0.05)
             return any(text in line.msg for line in self.log.messages())
         stamps = [stamp]
@@ -145,7 +137,7 @@ class CameraTest(unittest.TestCase):
         self.drive_until_tracking(in_a_row=5)
         grey, _ = next(self.round)
         self.log.clear()
-        shown = [message_of(grey, 'mono8', stamp) for _, stamp in itertools.islice(self.round, 12)]
+        shown = [fixture.image_of(grey, 'mono8', stamp) for _, stamp in itertools.islice(self.round, 12)]
         states = [self.camera.show(image).state for image in shown]
         self.assertEqual(states[:3], 3 * [TRACKING], 'some cameras send an image twice')
         self.assertEqual(set(states[3:]), {LocalizationStatus.UNCERTAIN})

@@ -6,13 +6,14 @@ import threading
 import time
 import xmlrpc.client
 
+import numpy as np
 import rosbag
 import rosgraph
 import rosnode
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CompressedImage, NavSatFix
+from sensor_msgs.msg import CompressedImage, Image, NavSatFix
 
 from visual_localization.msg import LocalizationStatus
 
@@ -166,6 +167,15 @@ def images_of(bag_path, first=0, count=None):
     with rosbag.Bag(bag_path) as bag:
         images = [image for _, image, _ in bag.read_messages(topics=[IMAGE_TOPIC])]
     return images[first:] if count is None else images[first:first + count]
+
+
+def image_of(pixels, encoding, stamp):
+    """Pixels as a raw image."""
+    pixels = np.ascontiguousarray(pixels)
+    image = Image(height=pixels.shape[0], width=pixels.shape[1], step=pixels.strides[0], encoding=encoding)
+    image.header.stamp = stamp
+    image.data = pixels.tobytes()
+    return image
 
 
 def errors_m(fixes, truth):
