@@ -3,7 +3,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include <opencv2/core/version.hpp>
 #include <opencv2/features2d.hpp>
 
 #ifdef VISUAL_LOCALIZATION_HIGHWAY
@@ -13,6 +12,7 @@
 namespace visual_localization {
 namespace {
 
+#ifdef VISUAL_LOCALIZATION_OPENCV_SIFT
 class OpenCvSiftExtractor : public SiftExtractor {
  public:
   explicit OpenCvSiftExtractor(const SiftConfig& config)
@@ -38,6 +38,7 @@ class OpenCvSiftExtractor : public SiftExtractor {
   std::vector<cv::KeyPoint> found_;
   cv::Mat descriptors_;
 };
+#endif
 
 }  // namespace
 
@@ -62,12 +63,18 @@ void SiftConfig::declare(ParameterVisitor& visitor) {
 }
 
 const std::vector<std::string>& siftBackends() {
+#ifdef VISUAL_LOCALIZATION_OPENCV_SIFT
   static const std::vector<std::string> backends{kNativeSift, kOpenCvSift};
+#else
+  static const std::vector<std::string> backends{kNativeSift};
+#endif
   return backends;
 }
 
 std::unique_ptr<SiftExtractor> makeSiftExtractor(const SiftConfig& config, const std::string& backend) {
+#ifdef VISUAL_LOCALIZATION_OPENCV_SIFT
   if (backend == kOpenCvSift) return std::make_unique<OpenCvSiftExtractor>(config);
+#endif
   if (backend != kNativeSift) throw std::invalid_argument("there is no SIFT backend '" + backend + "'");
 #ifdef VISUAL_LOCALIZATION_HIGHWAY
   return std::make_unique<NativeSiftExtractor>(config);

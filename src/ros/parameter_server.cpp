@@ -61,9 +61,17 @@ bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues&
 }
 
 bool belongsToOthers(const std::string& name) {
-  static constexpr std::array<const char*, 10> kOthers = {
-      "diagnostic_period", "diagnostic_updater", "diagnostic_updater_fast", "bond_disable", "num_worker_threads",
-      "matches",           "compressed",         "compressedDepth",         "theora",       "image"};
+  static constexpr std::array<const char*, 11> kOthers = {"diagnostic_period",
+                                                          "diagnostic_updater",
+                                                          "diagnostic_updater_fast",
+                                                          "bond_disable",
+                                                          "num_worker_threads",
+                                                          "matches",
+                                                          "dashboard",
+                                                          "compressed",
+                                                          "compressedDepth",
+                                                          "theora",
+                                                          "image"};
   const std::string head = name.substr(0, name.find('/'));
   return std::any_of(kOthers.begin(), kOthers.end(), [&head](const char* other) { return head == other; });
 }

@@ -59,7 +59,8 @@ class ParametersTest(unittest.TestCase):
         self.assert_refused('/no_map', {'map': '/does/not/exist.map'}, "'map'", '/does/not/exist.map')
 
     def test_parameters_of_others_are_left_alone(self):
-        rospy.set_param('/others', {'diagnostic_period': 2.0, 'matches': {'compressed': {'format': 'jpeg'}}})
+        rospy.set_param('/others', {'diagnostic_period': 2.0, 'matches': {'compressed': {'format': 'jpeg'}},
+                                    'dashboard': {'compressed': {'format': 'jpeg'}}})
         self.addCleanup(rospy.delete_param, '/others')
         node = subprocess.Popen([self.program, '__name:=others'])
         try:

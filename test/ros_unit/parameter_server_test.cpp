@@ -50,6 +50,7 @@ TEST(ParameterServer, AListIsRefusedByName) {
 TEST(ParameterServer, ParametersOfOthersAreKnown) {
   EXPECT_TRUE(belongsToOthers("diagnostic_period"));
   EXPECT_TRUE(belongsToOthers("matches/compressed/jpeg_quality"));
+  EXPECT_TRUE(belongsToOthers("dashboard/compressed/format"));
   EXPECT_TRUE(belongsToOthers("compressed/mode"));
   EXPECT_FALSE(belongsToOthers("image_transport"));
   EXPECT_FALSE(belongsToOthers("dpso/inertia"));

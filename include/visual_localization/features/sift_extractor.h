@@ -25,9 +25,10 @@ struct SiftConfig {
 };
 
 /// Names of the extractors: our own, and OpenCV's. Their features can be matched with each other, so a map does not
-/// store which one it was built with.
+/// store which one it was built with. OpenCV has one from version 4.4 on.
 constexpr const char* kNativeSift = "native";
 constexpr const char* kOpenCvSift = "opencv";
+/// Those of this build.
 const std::vector<std::string>& siftBackends();
 
 /// Throws std::invalid_argument, naming what is wrong, unless the image is 8-bit with one channel and at least
