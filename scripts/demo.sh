@@ -13,7 +13,7 @@ Usage: demo.sh [--output DIR] [--rate FACTOR] [--map-bag BAG] [--bag BAG] [--tra
   --map-bag BAG    round to build the map from (default: the sunny sample)
   --bag BAG        round to localise (default: the cloudy sample)
   --tracker NAME   dpso (default), pf_gaussian, pf_linear
-  --features NAME  sift (default)
+  --features NAME  sift (default), global, hybrid
 Exit code 0 when the round was localised.
 USAGE
 }
