@@ -4,6 +4,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "visual_localization/features/contrast.h"
 #include "visual_localization/features/pruning.h"
 #include "visual_localization/geo/geodetic_point.h"
 #include "visual_localization/localizer/stopwatch.h"
@@ -22,17 +23,20 @@ void FrontEnd::configure(const MatchConfig& match, bool prune, double max_image_
   match_ = match;
   prune_ = prune;
   max_image_gap_s_ = max_image_gap_s;
+  has_pruned_ = false;
 }
 
 void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   requireExtractable(grey);
-  const cv::Mat& fitting = spread(fitted(grey));
-  is_repeated_ = current_ && areIdentical(fitting, current_->grey);
-  if (!is_repeated_) takeImage(fitting);
+  const cv::Mat& fitting = fitted(grey);
+  const GreyLevels levels = greyLevelsOf(fitting);
+  const cv::Mat& image = withUsualContrast(fitting, levels, spread_);
+  is_repeated_ = current_ && areIdentical(image, current_->grey);
+  if (!is_repeated_) takeImage(image);
   current_->stamp_ns = stamp_ns;
-  look_.stretch =
-      static_cast<double>(grey.cols) * image_size_.height / (static_cast<double>(grey.rows) * image_size_.width);
+  look_ = {levels.mean, levels.contrast,
+           static_cast<double>(grey.cols) * image_size_.height / (static_cast<double>(grey.rows) * image_size_.width)};
   extract_ms_ = stopwatch.elapsed_ms();
 }
 
@@ -42,23 +46,10 @@ const cv::Mat& FrontEnd::fitted(const cv::Mat& grey) {
   return resized_;
 }
 
-/// The extractor looks for a contrast in grey levels, and finds nothing in a dark or foggy image that shows all it
-/// needs.
-const cv::Mat& FrontEnd::spread(const cv::Mat& fitting) {
-  constexpr double kDull = 15.0;
-  constexpr double kNothing = 4.0;  // but noise
-  constexpr double kUsual = 40.0;
-  look_ = lookOf(fitting);
-  if (look_.contrast < kNothing || look_.contrast >= kDull) return fitting;
-  const double gain = kUsual / look_.contrast;
-  fitting.convertTo(spread_, CV_8U, gain, 128.0 - gain * look_.mean_grey);
-  return spread_;
-}
-
-void FrontEnd::takeImage(const cv::Mat& fitting) {
+void FrontEnd::takeImage(const cv::Mat& image) {
   std::swap(previous_, current_);
   if (!current_) current_ = Image{};
-  fitting.copyTo(current_->grey);
+  image.copyTo(current_->grey);
   current_->has_sift = false;
   has_pruned_ = false;
   global_.reset();

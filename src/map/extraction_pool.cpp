@@ -8,6 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "visual_localization/features/contrast.h"
+
 namespace visual_localization {
 namespace {
 
@@ -36,7 +38,8 @@ ExtractionPool::ExtractionPool(const SiftConfig& sift, const std::string& sift_b
 ExtractionPool::~ExtractionPool() = default;
 
 TrainingImage ExtractionPool::extract(const RawImage& image, Worker& worker) const {
-  return {image.place, worker.sift->extract(image.grey), worker.global.extract(image.grey),
+  const cv::Mat& grey = withUsualContrast(image.grey, greyLevelsOf(image.grey), worker.spread);
+  return {image.place, worker.sift->extract(grey), worker.global.extract(grey),
           previewOf(image.grey, preview_width_px_)};
 }
 

@@ -5,6 +5,7 @@
 
 #include "test/localizer/wall_street.h"
 #include "visual_localization/localizer/live_image.h"
+#include "visual_localization/map/extraction_pool.h"
 
 namespace visual_localization {
 namespace {
@@ -126,6 +127,30 @@ TEST_F(FrontEndTest, ADullImageShowsWhatABrightOneDoes) {
     EXPECT_LT(front_end.look().contrast, 15.0) << "as it was";
     EXPECT_EQ(front_end.isRepeated(), i == 2);
   }
+}
+
+TEST_F(FrontEndTest, ADullImageIsTheSameInTraining) {
+  for (const double gain : {0.1, 0.2, 0.3, 1.0}) {
+    cv::Mat dull;
+    viewAt(10.0).convertTo(dull, CV_8U, gain, 20.0);
+    FrontEnd front_end = makeFrontEnd();
+    front_end.setImage(0, dull);
+    ExtractionPool pool(SiftConfig(), kNativeSift, 0, 1);
+    const std::vector<TrainingImage> training = pool.extract({RawImage{TrainingPlace(), dull}});
+    EXPECT_EQ(front_end.sift().descriptors(), training.front().sift.descriptors()) << gain;
+    EXPECT_EQ(front_end.global().wgii, training.front().global.wgii) << gain;
+  }
+}
+
+TEST_F(FrontEndTest, AnImageThatStaysIsPrunedAsTheNewParametersSay) {
+  FrontEnd front_end = makeFrontEnd();
+  for (int i = 0; i < 2; ++i) front_end.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+  const std::size_t pruned = front_end.sift().size();
+  EXPECT_LT(pruned, front_end.siftExtracted());
+  front_end.configure(MatchConfig(), false, 5.0);
+  front_end.setImage(2 * kSecond, viewAt(10.5));
+  ASSERT_TRUE(front_end.isRepeated());
+  EXPECT_EQ(front_end.sift().size(), front_end.siftExtracted());
 }
 
 TEST_F(FrontEndTest, NoiseIsNotSpread) {

@@ -19,7 +19,7 @@ namespace visual_localization {
 /// kind of features when it is first asked for. SIFT features are kept only if the image directly before shows them as
 /// well (Weiss et al., section III); its features too are extracted only then. The first image, or one after a gap or
 /// after an image without features, is not pruned. An image that repeats the one before to the last bit is that one,
-/// seen longer. Takes no memory from the heap once it has seen a few images.
+/// seen longer. Takes no memory from the heap once it has seen a few images, but for what OpenCV needs to resize them.
 class FrontEnd {
  public:
   FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s,
@@ -35,7 +35,7 @@ class FrontEnd {
   /// Global features of the image.
   const GlobalFeatures& global();
 
-  /// Whether the image repeats the one before to the last bit, at the map's size.
+  /// Whether the image repeats the one before to the last bit, at the map's size and with its grey levels spread.
   bool isRepeated() const { return is_repeated_; }
   /// What the image is like at the map's size, before its grey levels are spread.
   const ImageLook& look() const { return look_; }
@@ -56,9 +56,7 @@ class FrontEnd {
 
   /// Of the map's size; holds until the next call.
   const cv::Mat& fitted(const cv::Mat& grey);
-  /// With the usual contrast, if there is but little; holds until the next call.
-  const cv::Mat& spread(const cv::Mat& fitting);
-  void takeImage(const cv::Mat& fitting);
+  void takeImage(const cv::Mat& image);
   const SiftFeatures& unprunedSift(Image& image);
   bool previousIsClose() const;
 

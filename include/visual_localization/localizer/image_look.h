@@ -11,9 +11,6 @@ struct ImageLook {
   double stretch = 1.0;    ///< its width to height over the map's: another shape is stretched to the map's
 };
 
-/// `grey`: 8-bit, one channel. Takes nothing from the heap.
-ImageLook lookOf(const cv::Mat& grey);
-
 /// Whether two 8-bit images of one channel are the same to the last bit.
 bool areIdentical(const cv::Mat& a, const cv::Mat& b);
 

@@ -33,6 +33,7 @@ class ExtractionPool {
   struct Worker {
     std::unique_ptr<SiftExtractor> sift;
     GlobalExtractor global;
+    cv::Mat spread;  ///< a dull image with the usual contrast
   };
   TrainingImage extract(const RawImage& image, Worker& worker) const;
 
