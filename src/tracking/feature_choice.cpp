@@ -53,7 +53,7 @@ void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool confirmed, bool
 
 bool FeatureChoice::isSiftDue(bool confirmed) const {
   if (config_.sift_every == 0) return false;
-  return next_ == FeatureKind::kSift ? !confirmed : since_sift_ + 1 >= config_.sift_every;
+  return since_sift_ + 1 >= config_.sift_every || (next_ == FeatureKind::kSift && !confirmed);
 }
 
 }  // namespace visual_localization

@@ -1,6 +1,7 @@
 #include "visual_localization/tracking/feature_choice.h"
 
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -111,6 +112,12 @@ TEST(FeatureChoice, SiftLooksAfterASmallCloudEverySoManyImages) {
   EXPECT_EQ(kindsOf(choice, 10, true), "SgggSgggSg");
   EXPECT_EQ(kindsOf(choice, 6, false), "ggSSSS") << "nothing confirms the position";
   EXPECT_EQ(kindsOf(choice, 3, true), "Sgg");
+
+  for (const auto& [every, kinds] : {std::pair{1, "SSSSSS"}, std::pair{2, "SgSgSg"}, std::pair{3, "SggSgg"}}) {
+    config.sift_every = every;
+    FeatureChoice other("hybrid", config);
+    EXPECT_EQ(kindsOf(other, 6, true), kinds);
+  }
 
   config.sift_every = 0;
   choice.configure("hybrid", config);
