@@ -1,5 +1,6 @@
 #include "visual_localization/localizer/heading.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -19,9 +20,11 @@ Heading headingOf(const TrainingMap& map, const TrackerEstimate& tracked, bool r
   Heading heading;
   heading.yaw_rad = map.yaw_rad(faces_away(tracked.training_image) ? tracked.best_image : tracked.training_image);
   map.nearest(tracked.position_m, kNeighbours, neighbours);
+  const auto sameWay = [&](const Neighbour& neighbour) { return !faces_away(neighbour.image); };
+  const bool any_same_way = std::any_of(neighbours.begin(), neighbours.end(), sameWay);
   std::size_t counted = 0;
   for (const Neighbour& neighbour : neighbours) {
-    if (faces_away(neighbour.image)) continue;
+    if (any_same_way && !sameWay(neighbour)) continue;
     const double difference = angleDifference(heading.yaw_rad, map.yaw_rad(neighbour.image));
     heading.variance_rad2 += difference * difference;
     ++counted;

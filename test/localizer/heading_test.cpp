@@ -1,5 +1,7 @@
 #include "visual_localization/localizer/heading.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
@@ -41,6 +43,21 @@ TEST(Heading, IsThatOfTheWayThatWasRecognised) {
   const Heading heading = headingOf(*map, tracked, true, neighbours);
   EXPECT_DOUBLE_EQ(heading.yaw_rad, 0.0);
   EXPECT_DOUBLE_EQ(heading.variance_rad2, 0.0);
+}
+
+TEST(Heading, IsUncertainWhenAllAroundFaceTheOtherWay) {
+  // The best match is the only image of its way, and farther off than the five that face west.
+  const auto map = test::mapAt({{9, 0}, {8, 0}, {7, 0}, {6, 0}, {5, 0}, {4, 0}, {4, -3}, {20, -3}});
+  ASSERT_NEAR(std::abs(map->yaw_rad(2)), kPi, 1e-9);
+  ASSERT_NEAR(map->yaw_rad(6), 0.0, 1e-9);
+  std::vector<Neighbour> neighbours;
+  TrackerEstimate tracked;
+  tracked.position_m = {7.0, 0.0};
+  tracked.training_image = 2;
+  tracked.best_image = 6;
+  const Heading heading = headingOf(*map, tracked, true, neighbours);
+  EXPECT_DOUBLE_EQ(heading.yaw_rad, map->yaw_rad(6));
+  EXPECT_GT(heading.variance_rad2, 4.0);
 }
 
 TEST(Heading, IsUncertainWhenNothingTellsTheWay) {
