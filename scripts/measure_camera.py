@@ -26,6 +26,7 @@ from camera_faults import FAULTS, Fault, soiled  # noqa: E402
 IMAGES = '/stereo/left/image_raw'
 FIXES = '/gps/fix'
 TRUTH = '/ground_truth/fix'
+SOILED_MAP = 'dirt of the map'
 WRONG_M, FAR_M = 5.0, 10.0
 FROZEN_FROM, FROZEN_UNTIL = 150, 210
 EARTH_RADIUS_M = 6371000.0
@@ -120,6 +121,8 @@ class Programs:
 
 def table_row(name: str, rows: List[Row]) -> str:
     """Shares in per cent, errors in metres."""
+    if not rows:
+        sys.exit(f'measure_camera: no image to judge for "{name}": the round is too short')
     tracking = [row.error_m for row in rows if row.state == 'TRACKING']
     wrong, far = (sum(error > limit_m for error in tracking) for limit_m in (WRONG_M, FAR_M))
     share = f'{100.0 * len(tracking) / len(rows):.1f}'
@@ -185,7 +188,8 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--bags', type=Path, nargs='+', required=True, help='rounds to drive')
     parser.add_argument('--starts', type=int, nargs='+', default=[0, 200], help='first images (default: 0 200)')
     parser.add_argument('--programs', type=Path, help='folder of map_builder and localize (default: the PATH)')
-    parser.add_argument('--only', nargs='+', help='these faults only')
+    parser.add_argument('--only', nargs='+', choices=[*FAULTS, SOILED_MAP, 'frozen'], metavar='FAULT',
+                        help='these faults only: ' + ', '.join([*FAULTS, SOILED_MAP, 'frozen']).replace('%', '%%'))
     parser.add_argument('--localize', nargs=argparse.REMAINDER, default=[], help='options of localize; comes last')
     return parser.parse_args()
 
@@ -200,7 +204,7 @@ def main() -> None:
         for name, fault in FAULTS.items():
             if args.only is None or name in args.only:
                 measurement.with_fault(name, fault)
-        if args.only is None or 'dirt of the map' in args.only:
+        if args.only is None or SOILED_MAP in args.only:
             measurement.dirt_of_the_map()
         if args.only is None or 'frozen' in args.only:
             measurement.frozen()

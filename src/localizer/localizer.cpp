@@ -1,7 +1,9 @@
 #include "visual_localization/localizer/localizer.h"
 
+#include <cmath>
 #include <utility>
 
+#include "visual_localization/geo/geodetic_point.h"
 #include "visual_localization/localizer/heading.h"
 #include "visual_localization/localizer/live_image.h"
 #include "visual_localization/localizer/stopwatch.h"
@@ -40,11 +42,15 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
 Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   front_end_.setImage(stamp_ns, grey);
-  repeats_ = front_end_.isRepeated() ? repeats_ + 1 : 0;
+  repeats_.add(stamp_ns, front_end_.isRepeated());
   Estimate estimate = isNews(stamp_ns) ? look(stamp_ns) : lastAgain(stamp_ns);
   estimate.look = front_end_.look();
-  estimate.repeats = repeats_;
-  distrustFrozen(estimate);
+  estimate.repeats = repeats_.images;
+  estimate.frozen = isFrozen();
+  if (estimate.frozen) {
+    estimate.state = doubt();
+    estimate.pose = poseOf(tracked_, estimate.state);
+  }
   estimate.times.extract_ms = front_end_.extract_ms();
   estimate.times.update_ms = stopwatch.elapsed_ms() - estimate.times.extract_ms - estimate.times.match_ms;
   last_ = estimate;
@@ -58,6 +64,7 @@ bool Localizer::isNews(std::int64_t stamp_ns) const {
 }
 
 Estimate Localizer::look(std::int64_t stamp_ns) {
+  last_.reset();  // should this image fail, its repetition must not get the answer of the one before
   LiveImage image(front_end_, *map_, sift_similarity_, global_similarity_);
   Estimate estimate = process(stamp_ns, image);
   estimate.features_extracted = front_end_.siftExtracted();
@@ -73,13 +80,24 @@ Estimate Localizer::lastAgain(std::int64_t stamp_ns) const {
   return estimate;
 }
 
-/// Even a camera that stands still has noise: it says nothing about where the robot is by now.
-void Localizer::distrustFrozen(Estimate& estimate) {
-  const auto most = static_cast<std::size_t>(config_.state.frozen_images);
-  estimate.frozen = most > 0 && repeats_ >= most;
-  if (!estimate.frozen) return;
-  estimate.state = doubt();
-  estimate.pose = poseOf(tracked_, estimate.state);
+void Localizer::Repeats::add(std::int64_t stamp_ns, bool repeated) {
+  if (repeated) {
+    ++images;
+    at_one_stamp = stamp_ns == last_ns ? at_one_stamp + 1 : 0;
+  } else {
+    *this = {};
+    first_ns = stamp_ns;
+  }
+  last_ns = stamp_ns;
+}
+
+/// Even a camera that stands still has noise: an image that stays says nothing about where the robot is by now.
+bool Localizer::isFrozen() const {
+  constexpr std::size_t kStuck = 30;  // a driver that sends its last image with its old stamp, on and on
+  const auto least = static_cast<std::size_t>(config_.state.frozen_images);
+  if (least == 0 || repeats_.images < least) return false;
+  return std::abs(secondsBetween(repeats_.first_ns, repeats_.last_ns)) >= config_.state.frozen_time_s ||
+         repeats_.at_one_stamp >= kStuck;
 }
 
 Estimate Localizer::process(std::int64_t stamp_ns, ComparableImage& image) {
@@ -165,7 +183,10 @@ void Localizer::relocalize(const Prior& prior) {
 
 LocalizationState Localizer::doubt() {
   const LocalizationState state = assessor_.doubt(tracker_->tuning().recovering);
-  if (last_) last_->state = state;
+  if (last_) {
+    last_->state = state;
+    last_->pose = poseOf(tracked_, state);
+  }
   return state;
 }
 

@@ -58,6 +58,9 @@ void StateConfig::declare(ParameterVisitor& visitor) {
       {"state/frozen_images", "1",
        "so many repetitions of an image to the last bit end TRACKING; 0: never, for a simulated camera without noise"},
       frozen_images, 0, 100000);
+  visitor.real({"state/frozen_time", "s",
+                "but only once they span so much time: a stream may repeat each image to reach its rate"},
+               frozen_time_s, 0.0, 3600.0);
 }
 
 std::vector<std::string> StateConfig::violations() const {

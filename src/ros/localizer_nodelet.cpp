@@ -228,7 +228,10 @@ void LocalizerNodelet::publish(const SharedLocalizer::Result& result, const ros:
   const double latency_ms = stamp_is_usable ? millisecondsBetween(stamp, ros::Time::now()) : -1.0;
   publisher_->publish(result, stamp, latency_ms, counts());
   diagnostics_->imageProcessed(result.estimate, latency_ms, counts());
-  if (result.estimate.frozen) return;  // the pose is of long ago
+  if (result.estimate.frozen) {  // the pose is of long ago
+    diagnostics_->transformMissing("the camera is frozen");
+    return;
+  }
   const std::string missing = transform_publisher_->publish(result.estimate.pose, stamp);
   diagnostics_->transformMissing(missing);
   if (!missing.empty() && transform_throttle_.ready()) NODELET_WARN_STREAM("Nothing broadcast on tf: " << missing);

@@ -209,6 +209,46 @@ TEST_F(Drive, ImagesThatComeTwiceDoNotDisturb) {
   }
 }
 
+TEST_F(Drive, AStreamThatRepeatsEachImageToReachItsRateIsNotFrozen) {
+  Localizer localizer(map(), LocalizerConfig());
+  bool tracking = false;
+  for (int i = 0; i < 12; ++i) {
+    const cv::Mat view = noisy(viewAt(10.0 + 0.3 * i), i);
+    for (int j = 0; j < 6; ++j) {
+      const Estimate estimate = localizer.process(i * kSecond / 2 + j * kSecond / 12, view);
+      EXPECT_FALSE(estimate.frozen) << i << " " << j;
+      tracking = estimate.state == LocalizationState::kTracking;
+    }
+  }
+  EXPECT_TRUE(tracking);
+}
+
+TEST_F(Drive, AnImageThatIsSentAgainWithItsStampIsTheSameImageUntilTheDriverMustBeStuck) {
+  Localizer localizer(map(), LocalizerConfig());
+  for (int i = 0; i < 10; ++i) localizer.process(i * kSecond, noisy(viewAt(10.0 + 0.3 * i), i));
+  const cv::Mat last = noisy(viewAt(13.0), 10);
+  const Estimate first = localizer.process(10 * kSecond, last);
+  ASSERT_EQ(first.state, LocalizationState::kTracking);
+  for (int i = 0; i < 29; ++i) {
+    const Estimate again = localizer.process(10 * kSecond, last);
+    EXPECT_EQ(again.state, LocalizationState::kTracking) << i;
+    EXPECT_EQ(again.pose.position_m, first.pose.position_m);
+  }
+  EXPECT_TRUE(localizer.process(10 * kSecond, last).frozen);
+}
+
+TEST_F(Drive, WhatIsDoubtedHasTheCovarianceOfTheWholeCloud) {
+  Localizer localizer(map(), LocalizerConfig());
+  Estimate estimate;
+  cv::Mat view;
+  for (int i = 0; i < 10; ++i) estimate = localizer.process(i * kSecond, view = noisy(viewAt(10.0 + 0.3 * i), i));
+  ASSERT_EQ(estimate.state, LocalizationState::kTracking);
+  localizer.doubt();
+  const Estimate again = localizer.process(9 * kSecond + kSecond / 5, view);
+  EXPECT_EQ(again.state, LocalizationState::kUncertain);
+  EXPECT_GT(again.pose.covariance_m2.trace(), estimate.pose.covariance_m2.trace());
+}
+
 TEST_F(Drive, ASimulatedCameraWithoutNoiseMayStandStillWhenAskedTo) {
   LocalizerConfig config;
   const auto standing = [](int, double) { return viewAt(12.0); };

@@ -93,8 +93,8 @@ class CameraTest(unittest.TestCase):
     def check_localised(self, name, statuses, most_lost):
         errors = self.errors_m(statuses)
         print('%s: %d of %d images TRACKING, errors up to %.1f m' % (
-            name, len(errors), len(statuses), max(errors)))
-        self.assertGreaterEqual(len(errors), len(statuses) - most_lost, name)
+            name, len(errors), len(statuses), max(errors, default=0.0)))
+        self.assertGreaterEqual(len(errors), max(1, len(statuses) - most_lost), name)
         self.assertLess(max(errors), NEAR_M, name)
 
     def test_1_formats_of_the_same_street(self):
@@ -107,7 +107,7 @@ class CameraTest(unittest.TestCase):
         for fault in ('motion blur of 7 pixels', 'dirt on 10 % of the image', 'bright, twice the light',
                       'noise of 10 grey levels'):
             self.drive_until_tracking()
-            self.check_localised(fault, self.drive(8, self.spoilt(fault)), most_lost=8)
+            self.check_localised(fault, self.drive(8, self.spoilt(fault)), most_lost=5)
 
     def test_3_images_that_show_nothing(self):
         for fault, guess in (('dark, a twentieth of the light', 'dark or covered?'), ('black', 'dark or covered?'),

@@ -34,7 +34,8 @@ class Localizer {
   /// `grey`: 8-bit, one channel, at least 16 x 16; resized to the map's size. Throws std::invalid_argument for
   /// anything else, and then nothing has changed. An image that repeats the one before to the last bit is no new
   /// evidence: it gets the same answer, unless the localizer was told something meanwhile. After some of them in a row
-  /// (state/frozen_images) the camera counts as frozen, and the position must be confirmed anew.
+  /// (state/frozen_images, state/frozen_time) the camera counts as frozen, and the position must be confirmed anew.
+  /// With state/frozen_images 0 a repeated image with another stamp is an image like any other.
   Estimate process(std::int64_t stamp_ns, const cv::Mat& grey);
   /// The same for an image that knows by itself how to compare: its times and counts of features stay zero.
   Estimate process(std::int64_t stamp_ns, ComparableImage& image);
@@ -60,10 +61,20 @@ class Localizer {
   }
 
  private:
+  /// How often the last image has come, to the last bit.
+  struct Repeats {
+    std::size_t images = 0;        ///< in a row, beyond the first
+    std::size_t at_one_stamp = 0;  ///< of these, the last ones whose stamp did not change either
+    std::int64_t first_ns = 0;
+    std::int64_t last_ns = 0;
+
+    void add(std::int64_t stamp_ns, bool repeated);
+  };
+
   bool isNews(std::int64_t stamp_ns) const;
   Estimate look(std::int64_t stamp_ns);
   Estimate lastAgain(std::int64_t stamp_ns) const;
-  void distrustFrozen(Estimate& estimate);
+  bool isFrozen() const;
   void configureTracker(const std::string& tracker_before);
   Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
                       ComparableImage& image);
@@ -83,7 +94,7 @@ class Localizer {
   std::vector<Neighbour> neighbours_;  ///< of the last estimate
   TrackerEstimate tracked_;            ///< after the last image
   std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again
-  std::size_t repeats_ = 0;            ///< of the last image, in a row
+  Repeats repeats_;
 };
 
 }  // namespace visual_localization

@@ -32,6 +32,7 @@ struct StateConfig {
   int off_map_images = 10;              ///< so many images that confirm nothing: off the map
   int min_features = 10;                ///< images with fewer SIFT features are blind: they say nothing either way
   int frozen_images = 3;                ///< so many images in a row without any change: the camera is frozen; 0: never
+  double frozen_time_s = 1.0;           ///< but only once they span so much time
 
   void declare(ParameterVisitor& visitor);
   std::vector<std::string> violations() const;
