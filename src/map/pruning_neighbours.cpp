@@ -1,15 +1,14 @@
 #include "visual_localization/map/pruning_neighbours.h"
 
-#include <cmath>
+#include <algorithm>
 
-#include "visual_localization/geo/angles.h"
+#include "visual_localization/map/same_view.h"
 
 namespace visual_localization {
 namespace {
 
 constexpr std::size_t kNeighbours = 2;       ///< Weiss et al., section III
 constexpr std::size_t kMostLookedAt = 1024;  ///< where many images face another way
-constexpr double kSameView_rad = 0.5 * kPi;
 
 }  // namespace
 
@@ -29,19 +28,17 @@ std::vector<std::size_t> PruningNeighbours::of(std::size_t image) const {
   const Session& session = sessions_[static_cast<std::size_t>(map_.place(image).session)];
   std::vector<Neighbour> found;
   std::vector<std::size_t> neighbours;
-  for (std::size_t count = kNeighbours + 1; count <= kMostLookedAt; count *= 4) {
+  for (std::size_t count = kNeighbours + 1;; count = std::min(4 * count, kMostLookedAt)) {
     session.index->nearest(map_.position_m(image), count, found);
     neighbours.clear();
     for (const Neighbour& neighbour : found) {
       const std::size_t other = session.images[neighbour.image];
-      const double turn_rad = angleDifference(map_.yaw_rad(image), map_.yaw_rad(other));
-      if (other == image || std::abs(turn_rad) > kSameView_rad) continue;
+      if (other == image || !faceAlike(map_.yaw_rad(image), map_.yaw_rad(other))) continue;
       neighbours.push_back(other);
       if (neighbours.size() == kNeighbours) return neighbours;
     }
-    if (found.size() < count) break;
+    if (found.size() < count || count == kMostLookedAt) return neighbours;
   }
-  return neighbours;
 }
 
 }  // namespace visual_localization

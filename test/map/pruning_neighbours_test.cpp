@@ -57,6 +57,21 @@ TEST(PruningNeighbours, FaceTheSameWay) {
   EXPECT_THAT(neighbours.of(3), ElementsAre(4U, 5U));
 }
 
+TEST(PruningNeighbours, AreFoundBehindAThousandThatFaceAnotherWay) {
+  std::vector<Place> places{{0, 0, 0}};
+  for (int i = 1; i <= 1000; ++i) places.push_back({0.001 * i, kPi, 0});
+  places.push_back({2, 0, 0});
+  for (int i = 1; i <= 100; ++i) places.push_back({2 + 0.001 * i, kPi, 0});
+  EXPECT_THAT(PruningNeighbours(*mapOf(places)).of(0), ElementsAre(1001U));
+}
+
+TEST(PruningNeighbours, AreNotLookedForWithoutEnd) {
+  std::vector<Place> places{{0, 0, 0}};
+  for (int i = 1; i <= 1023; ++i) places.push_back({0.001 * i, kPi, 0});
+  places.push_back({2, 0, 0});
+  EXPECT_THAT(PruningNeighbours(*mapOf(places)).of(0), IsEmpty());
+}
+
 TEST(PruningNeighbours, AnImageOnItsOwnHasNone) {
   const auto map = mapOf({{0, 0, 0}, {0.5, 0, 1}, {1, 0, 1}});
   const PruningNeighbours neighbours(*map);
