@@ -8,11 +8,13 @@
 namespace visual_localization {
 namespace {
 
-/// Of the cell `dx`, `dy` beside the one at `position_m`. A map reaches 10^6 m, so each index fits into 32 bits.
+/// Of the cell `dx`, `dy` beside the one at `position_m`. A map reaches 10^6 m, so each index fits into 32 bits. The
+/// keys of a column follow each other.
 std::uint64_t keyAt(const Eigen::Vector2d& position_m, int dx, int dy) {
-  const auto column = static_cast<std::int32_t>(std::floor(position_m.x() / SightGrid::kCell_m)) + dx;
-  const auto row = static_cast<std::int32_t>(std::floor(position_m.y() / SightGrid::kCell_m)) + dy;
-  return std::uint64_t{static_cast<std::uint32_t>(column)} << 32U | static_cast<std::uint32_t>(row);
+  constexpr std::int64_t kZero = std::int64_t{1} << 31U;
+  const auto column = static_cast<std::int64_t>(std::floor(position_m.x() / SightGrid::kCell_m)) + dx + kZero;
+  const auto row = static_cast<std::int64_t>(std::floor(position_m.y() / SightGrid::kCell_m)) + dy + kZero;
+  return static_cast<std::uint64_t>(column) << 32U | static_cast<std::uint64_t>(row);
 }
 
 }  // namespace
@@ -35,9 +37,9 @@ void SightGrid::add(const Eigen::Vector2d& position_m, double yaw_rad, int sessi
 template <class Predicate>
 bool SightGrid::anyHere(const Eigen::Vector2d& position_m, int octant, Predicate holds) const {
   for (int dx = -1; dx <= 1; ++dx) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      const auto cell = cells_.find(keyAt(position_m, dx, dy));
-      if (cell == cells_.end()) continue;
+    const std::uint64_t last = keyAt(position_m, dx, 1);
+    auto cell = cells_.lower_bound(keyAt(position_m, dx, -1));
+    for (; cell != cells_.end() && cell->first <= last; ++cell) {
       for (int turn = -1; turn <= 1; ++turn) {
         const TwoSessions& seen = cell->second[static_cast<std::size_t>((octant + turn + kOctants) % kOctants)];
         if (seen.first != -1 && holds(seen)) return true;

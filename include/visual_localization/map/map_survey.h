@@ -49,8 +49,7 @@ struct SurveyConfig {
   std::size_t most_listed = 5;  ///< of steps
 };
 
-/// What a map covers, how densely, in which directions and where it is weak. Takes time in proportion to the number of
-/// images.
+/// What a map covers, how densely, in which directions and where it is weak. Of n images in time n log n.
 struct MapSurvey {
   std::vector<SessionSurvey> sessions;
   double driven_m = 0.0;                     ///< by all sessions, without gaps

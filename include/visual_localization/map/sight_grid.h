@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <unordered_map>
+#include <map>
 
 #include <Eigen/Core>
 
@@ -14,8 +14,9 @@ constexpr int kOctants = 8;
 /// Which eighth of the compass, counter-clockwise: 0 is centred on east, 2 on north.
 int octantOf(double yaw_rad);
 
-/// Which sessions have looked which way at which place, in constant time however many images there are: cells of a
-/// grid, eight directions in each. "Here" is a cell and those around it, so within about 4 m.
+/// Which sessions have looked which way at which place: cells of a grid, eight directions in each. "Here" is a cell and
+/// those around it, so within about 4 m. Takes time in proportion to the logarithm of the number of cells, wherever
+/// they lie.
 class SightGrid {
  public:
   static constexpr double kCell_m = 2.5;
@@ -40,7 +41,8 @@ class SightGrid {
   template <class Predicate>
   bool anyHere(const Eigen::Vector2d& position_m, int octant, Predicate holds) const;
 
-  std::unordered_map<std::uint64_t, Cell> cells_;
+  /// Sorted and not hashed: whoever makes a map chooses the keys, and could make all of them collide.
+  std::map<std::uint64_t, Cell> cells_;
 };
 
 }  // namespace visual_localization
