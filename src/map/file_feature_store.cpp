@@ -20,8 +20,10 @@ std::size_t bytesOf(const GlobalFeatures&) { return sizeof(GlobalFeatures); }
 
 }  // namespace
 
-FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, std::size_t cache_bytes, Warn warn)
+FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path,
+                                   std::vector<std::uint32_t> feature_counts, std::size_t cache_bytes, Warn warn)
     : path_(std::move(path)),
+      feature_counts_(std::move(feature_counts)),
       cache_bytes_(cache_bytes),
       warn_(std::move(warn)),
       database_(std::move(database)),
@@ -31,7 +33,10 @@ FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, 
       cache_(cache_bytes) {}
 
 std::shared_ptr<const SiftFeatures> FileFeatureStore::sift(std::size_t image) const {
-  return get<SiftFeatures>(2 * image, [&] { return read(image, sift_rows_, "features", map_file::siftOf); });
+  return get<SiftFeatures>(2 * image, [&] {
+    return read(image, sift_rows_, "features",
+                [&](const sqlite::Statement& row) { return map_file::siftOf(row, feature_counts_[image]); });
+  });
 }
 
 std::shared_ptr<const GlobalFeatures> FileFeatureStore::global(std::size_t image) const {

@@ -88,6 +88,12 @@ void requireSchema(const sqlite::Database& database) {
   }
 }
 
+void requireCount(std::size_t actual, std::size_t expected, const Statement& row) {
+  if (actual == expected) return;
+  throw Refusal("is damaged: " + imageName(row.integer(0)) + " has " + std::to_string(actual) +
+                " features instead of " + std::to_string(expected));
+}
+
 void requireChecksum(std::int64_t computed, const Statement& row, int column, const char* what) {
   if (computed == row.integer(column)) return;
   throw Refusal(std::string("is damaged: ") + what + " of " + imageName(row.integer(0)) +
@@ -118,11 +124,12 @@ void Budget::spend(std::uint64_t bytes) {
   left_ -= bytes;
 }
 
-SiftFeatures siftOf(const Statement& row) {
+SiftFeatures siftOf(const Statement& row, std::size_t count) {
   const Bytes keypoints = row.blob(1);
   const Bytes descriptors = row.blob(2);
   requireChecksum(map_schema::rowChecksum(row.integer(0), {keypoints, descriptors}), row, 3, "features");
   if (keypoints.size % map_schema::kKeypointBytes != 0) throw Refusal("is damaged: a keypoint is incomplete");
+  requireCount(keypoints.size / map_schema::kKeypointBytes, count, row);
   // An address of null plus nothing is not a range, so the empty case goes its own way.
   if (descriptors.size == 0 && keypoints.size == 0) return {};
   return SiftFeatures(map_schema::unpackKeypoints(keypoints), {descriptors.data, descriptors.data + descriptors.size});

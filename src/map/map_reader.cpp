@@ -154,14 +154,9 @@ void forEachImage(const sqlite::Database& database, Opened& opened, const std::f
     stepTo(i, global, "global features");
     stepTo(i, preview, "bytes of the preview");
     TrainingImage image{{places.stamps_ns[i], places.sessions[i], places.positions_m[i], places.yaws_rad[i]},
-                        map_file::siftOf(sift),
+                        map_file::siftOf(sift, places.feature_counts[i]),
                         map_file::globalOf(global),
                         map_file::previewOf(preview)};
-    if (image.sift.size() != places.feature_counts[i]) {
-      throw Refusal("is damaged: " + imageName(static_cast<std::int64_t>(i)) + " has " +
-                    std::to_string(image.sift.size()) + " features instead of " +
-                    std::to_string(places.feature_counts[i]));
-    }
     opened.budget.spend(storedBytes(image));
     use(std::move(image));
   }
@@ -204,9 +199,9 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
   return withMapFile(path, [&](sqlite::Database&& database, std::int64_t size) {
     Opened opened = readPlacesAndHeader(database, size);
     if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(database, std::move(opened));
-    return std::make_shared<const TrainingMap>(
-        std::move(opened.header), std::move(opened.places),
-        std::make_unique<FileFeatureStore>(std::move(database), path, loading.cache_bytes, loading.warn));
+    auto store = std::make_unique<FileFeatureStore>(std::move(database), path, opened.places.feature_counts,
+                                                    loading.cache_bytes, loading.warn);
+    return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.places), std::move(store));
   });
 }
 

@@ -140,6 +140,25 @@ TEST_F(LargeMap, DamagedFeaturesCountAsNoneAndAreNamedOnce) {
   EXPECT_THROW(open(std::numeric_limits<std::size_t>::max()), MapStoreError) << "read as a whole it is refused";
 }
 
+TEST_F(LargeMap, AnImageWithOtherThanItsPlacesNumberOfFeaturesCountsAsDamaged) {
+  std::vector<TrainingImage> others = images_;
+  std::mt19937 random(9);
+  for (const std::size_t i : {3U, 4U}) others[i].sift = test::randomFeatures(51, random);
+  const std::string other_path = folder_ / "other.map";
+  saveMap(TrainingMap(test::exampleHeader(), others), other_path);
+  // Rows whose checksums are right.
+  tamper("ATTACH '" + other_path +
+         "' AS other; DELETE FROM main.features WHERE image IN (3, 4); "
+         "INSERT INTO main.features SELECT * FROM other.features WHERE image IN (3, 4)");
+  const auto map = open();
+  EXPECT_TRUE(map->sift(3)->empty());
+  EXPECT_TRUE(map->sift(4)->empty());
+  EXPECT_TRUE(same(map->image(5), images_[5]));
+  ASSERT_EQ(warnings_.size(), 1U);
+  EXPECT_THAT(warnings_.front(), AllOf(HasSubstr("image 3"), HasSubstr("51 features instead of 50")));
+  EXPECT_THROW(checkMap(path_), MapStoreError);
+}
+
 TEST_F(LargeMap, ExchangedImagesAreNotTakenForEachOther) {
   tamper(
       "UPDATE features SET image = -1 WHERE image = 3; UPDATE features SET image = 3 WHERE image = 4; "
