@@ -141,12 +141,12 @@ AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfi
     if (progress) progress(number + 1, search.images());
   }
   result.global_only = search.globalRivals();
-  // Images in between that were not asked about do not end a stretch.
+  // Images in between that were not asked about do not end a stretch, but for those of another session.
   const auto belongs = [&](std::size_t i) {
     const std::size_t asked = i - i % result.stride;
     const auto found = std::lower_bound(result.images.begin(), result.images.end(), asked,
                                         [](const AmbiguousImage& a, std::size_t image) { return a.image < image; });
-    return found != result.images.end() && found->image == asked;
+    return found != result.images.end() && found->image == asked && map.place(asked).session == map.place(i).session;
   };
   result.stretches = stretchesOf(map, config.far_m, belongs);
   return result;

@@ -97,6 +97,23 @@ TEST(AmbiguousPlaces, EndsWhenThereIsNoWorkLeft) {
   EXPECT_EQ(found.asked + found.unasked, 60U);
 }
 
+TEST(AmbiguousPlaces, AStretchEndsWithItsSession) {
+  std::vector<TrainingImage> images = street(4);
+  for (std::size_t i = 7; i < images.size(); ++i) images[i].session = 1;
+  AmbiguityConfig config;
+  config.most_images = 12;
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(std::move(images)), config);
+  ASSERT_EQ(found.stride, 5U);
+  ASSERT_EQ(found.images.size(), 2U);
+  EXPECT_EQ(found.images[0].image, 5U);
+  EXPECT_EQ(found.images[1].image, 40U);
+  ASSERT_EQ(found.stretches.size(), 2U) << "7, 8 and 9 are of another session and were not compared";
+  EXPECT_EQ(found.stretches[0].first, 5U);
+  EXPECT_EQ(found.stretches[0].last, 6U);
+  EXPECT_EQ(found.stretches[1].first, 40U);
+  EXPECT_EQ(found.stretches[1].last, 44U);
+}
+
 TEST(AmbiguousPlaces, ImagesWithoutFeaturesAreNotAmbiguous) {
   std::vector<TrainingImage> images = street(4);
   for (TrainingImage& image : images) {
