@@ -105,15 +105,24 @@ class Search {
   double globally(const GlobalFeatures& a, const GlobalFeatures& b) const { return global_.compare(a, b).similarity; }
   double bySift(std::size_t a, std::size_t b) const { return sift_.compare(*map_.sift(a), *map_.sift(b)).similarity; }
 
+  /// What the places say saves reading what is too much; what the features are is what counts.
   bool takeWork(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far) {
-    std::uint64_t work = 0;
-    for (const auto* others : {&near, &far}) {
-      for (const Alike& other : *others)
-        work += std::uint64_t{map_.featureCount(image)} * map_.featureCount(other.image);
-    }
+    const auto said = [this](std::size_t i) { return map_.featureCount(i); };
+    if (workOf(image, near, far, said) > work_left_) return false;
+    const std::uint64_t work = workOf(image, near, far, [this](std::size_t i) { return map_.sift(i)->size(); });
     if (work > work_left_) return false;
     work_left_ -= work;
     return true;
+  }
+
+  /// Pairs of descriptors.
+  template <class SizeOf>
+  static std::uint64_t workOf(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far,
+                              SizeOf sizeOf) {
+    std::uint64_t others = 0;
+    for (const Alike& other : near) others += sizeOf(other.image);
+    for (const Alike& other : far) others += sizeOf(other.image);
+    return others * sizeOf(image);
   }
 
   const TrainingMap& map_;

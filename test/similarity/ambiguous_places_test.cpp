@@ -114,6 +114,16 @@ TEST(AmbiguousPlaces, AStretchEndsWithItsSession) {
   EXPECT_EQ(found.stretches[1].last, 44U);
 }
 
+TEST(AmbiguousPlaces, WorkIsWhatTheFeaturesAreAndNotWhatThePlacesClaim) {
+  std::vector<TrainingImage> images = street(0);
+  TrainingPlaces places;
+  for (const TrainingImage& image : images) places.add(image, 1);
+  const TrainingMap map(test::exampleHeader(), places, std::make_unique<MemoryFeatureStore>(std::move(images)));
+  AmbiguityConfig config;
+  config.most_work = 200'000;
+  EXPECT_GT(findAmbiguousPlaces(map, config).unasked, 40U);
+}
+
 TEST(AmbiguousPlaces, ImagesWithoutFeaturesAreNotAmbiguous) {
   std::vector<TrainingImage> images = street(4);
   for (TrainingImage& image : images) {
