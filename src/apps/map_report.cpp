@@ -219,6 +219,10 @@ void printAmbiguity(std::ostream& out, const TrainingMap& map, const AmbiguousPl
     out << key("") << "of this large map every " << found.stride << "th image was compared, with every " << found.stride
         << "th\n";
   }
+  if (found.unjudged > 0) {
+    out << key("") << found.unjudged << (found.unjudged == 1 ? " image has" : " images have") << " no neighbour within "
+        << metres(config.near_m) << " and cannot be judged\n";
+  }
   if (found.unasked > 0) out << key("") << found.unasked << " images were left out: their features are too many\n";
   out << key("") << found.global_only << " by global features alone (features: global)\n";
   printStretches(out, map, found.stretches, [&](const Stretch& stretch) {

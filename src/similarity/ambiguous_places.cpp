@@ -1,20 +1,19 @@
 #include "visual_localization/similarity/ambiguous_places.h"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
-#include <optional>
+#include <utility>
 
-#include "visual_localization/geo/angles.h"
+#include "visual_localization/map/same_view.h"
 #include "visual_localization/similarity/global_similarity.h"
 #include "visual_localization/similarity/sift_similarity.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kNearImages = 16;  ///< looked at
+constexpr std::size_t kNearImages = 16;      ///< looked at
+constexpr std::size_t kMostLookedAt = 1024;  ///< where many images face another way
 constexpr std::size_t kNearCompared = 4;
-constexpr double kSameView_rad = 0.5 * kPi;
 
 struct Alike {
   std::size_t image = 0;
@@ -37,24 +36,33 @@ class Search {
   Search(const TrainingMap& map, const AmbiguityConfig& config)
       : map_(map),
         config_(config),
-        stride_(std::max<std::size_t>(1, (map.size() + config.most_images - 1) / config.most_images)),
         global_(config.similarity),
         sift_(config.match, config.similarity),
         work_left_(config.most_work) {
-    for (std::size_t i = 0; i < map.size(); i += stride_) globals_.push_back(map.global(i));
+    result_.stride = std::max<std::size_t>(1, (map.size() + config.most_images - 1) / config.most_images);
+    for (std::size_t i = 0; i < map.size(); i += result_.stride) globals_.push_back(map.global(i));
   }
 
-  std::size_t stride() const { return stride_; }
   std::size_t images() const { return globals_.size(); }
 
-  /// About the image `number` of images(); nothing when no work is left for it.
-  std::optional<AmbiguousImage> ask(std::size_t number) {
-    const std::size_t image = number * stride_;
+  /// Asks about the image `number` of images().
+  void ask(std::size_t number) {
+    const std::size_t image = number * result_.stride;
     const std::vector<Alike> near = nearImages(image);
+    if (near.empty()) {
+      ++result_.unjudged;
+      return;
+    }
     const std::vector<Alike> far = farImages(number);
-    global_rivals_ += !near.empty() && !far.empty() && near.front().similarity > 0.0 &&
-                      far.front().similarity >= config_.global_nearly_as_good * near.front().similarity;
-    if (!takeWork(image, near, far)) return std::nullopt;
+    if (!far.empty() && near.front().similarity > 0.0 &&
+        far.front().similarity >= config_.global_nearly_as_good * near.front().similarity) {
+      ++result_.global_only;
+    }
+    if (!takeWork(image, near, far)) {
+      ++result_.unasked;
+      return;
+    }
+    ++result_.asked;
     AmbiguousImage answer{image, image, 0.0, 0.0};
     for (const Alike& other : near)
       answer.near_similarity = std::max(answer.near_similarity, bySift(image, other.image));
@@ -65,26 +73,29 @@ class Search {
         answer.similarity = similarity;
       }
     }
-    return answer;
+    if (isAmbiguous(answer)) result_.images.push_back(answer);
   }
 
-  bool isAmbiguous(const AmbiguousImage& answer) const {
-    return answer.similarity >= config_.least_similarity && answer.similarity > 0.0 &&
-           answer.similarity >= config_.nearly_as_good * answer.near_similarity;
+  AmbiguousPlaces result() && {
+    const auto belongs = [this](std::size_t image) { return wasAmbiguous(image); };
+    result_.stretches = stretchesOf(map_, config_.far_m, belongs);
+    return std::move(result_);
   }
-
-  std::size_t globalRivals() const { return global_rivals_; }
 
  private:
   std::vector<Alike> nearImages(std::size_t image) {
     std::vector<Alike> near;
-    map_.nearest(map_.position_m(image), kNearImages, neighbours_);
-    for (const Neighbour& neighbour : neighbours_) {
-      const double turn_rad = angleDifference(map_.yaw_rad(image), map_.yaw_rad(neighbour.image));
-      if (neighbour.image == image || neighbour.distance_m > config_.near_m || std::abs(turn_rad) > kSameView_rad) {
-        continue;
+    const auto global = map_.global(image);
+    for (std::size_t count = kNearImages; near.empty(); count *= 4) {
+      map_.nearest(map_.position_m(image), count, neighbours_);
+      for (const Neighbour& neighbour : neighbours_) {
+        const std::size_t other = neighbour.image;
+        if (other == image || neighbour.distance_m > config_.near_m) continue;
+        if (!faceAlike(map_.yaw_rad(image), map_.yaw_rad(other))) continue;
+        near.push_back({other, globally(*global, *map_.global(other))});
       }
-      near.push_back({neighbour.image, globally(*map_.global(image), *map_.global(neighbour.image))});
+      const bool all = neighbours_.size() < count || neighbours_.back().distance_m > config_.near_m;
+      if (all || count == kMostLookedAt) break;
     }
     keepBest(kNearCompared, near);
     return near;
@@ -92,9 +103,9 @@ class Search {
 
   std::vector<Alike> farImages(std::size_t number) {
     std::vector<Alike> far;
-    const Eigen::Vector2d here_m = map_.position_m(number * stride_);
+    const Eigen::Vector2d here_m = map_.position_m(number * result_.stride);
     for (std::size_t other = 0; other < globals_.size(); ++other) {
-      const std::size_t image = other * stride_;
+      const std::size_t image = other * result_.stride;
       if ((map_.position_m(image) - here_m).norm() <= config_.far_m) continue;
       far.push_back({image, globally(*globals_[number], *globals_[other])});
     }
@@ -125,15 +136,28 @@ class Search {
     return others * sizeOf(image);
   }
 
+  bool isAmbiguous(const AmbiguousImage& answer) const {
+    return answer.similarity >= config_.least_similarity && answer.similarity > 0.0 &&
+           answer.similarity >= config_.nearly_as_good * answer.near_similarity;
+  }
+
+  /// Images in between that were not asked about do not end a stretch, but for those of another session.
+  bool wasAmbiguous(std::size_t image) const {
+    const std::size_t asked = image - image % result_.stride;
+    const auto found = std::lower_bound(result_.images.begin(), result_.images.end(), asked,
+                                        [](const AmbiguousImage& a, std::size_t b) { return a.image < b; });
+    return found != result_.images.end() && found->image == asked &&
+           map_.place(asked).session == map_.place(image).session;
+  }
+
   const TrainingMap& map_;
   AmbiguityConfig config_;
-  std::size_t stride_;
   GlobalSimilarity global_;
   SiftSimilarity sift_;
   std::uint64_t work_left_;
   std::vector<std::shared_ptr<const GlobalFeatures>> globals_;  ///< of every stride_-th image
   std::vector<Neighbour> neighbours_;
-  std::size_t global_rivals_ = 0;
+  AmbiguousPlaces result_;
 };
 
 }  // namespace
@@ -141,24 +165,11 @@ class Search {
 AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfig& config,
                                     const AmbiguityProgress& progress) {
   Search search(map, config);
-  AmbiguousPlaces result;
-  result.stride = search.stride();
   for (std::size_t number = 0; number < search.images(); ++number) {
-    const std::optional<AmbiguousImage> answer = search.ask(number);
-    ++(answer ? result.asked : result.unasked);
-    if (answer && search.isAmbiguous(*answer)) result.images.push_back(*answer);
+    search.ask(number);
     if (progress) progress(number + 1, search.images());
   }
-  result.global_only = search.globalRivals();
-  // Images in between that were not asked about do not end a stretch, but for those of another session.
-  const auto belongs = [&](std::size_t i) {
-    const std::size_t asked = i - i % result.stride;
-    const auto found = std::lower_bound(result.images.begin(), result.images.end(), asked,
-                                        [](const AmbiguousImage& a, std::size_t image) { return a.image < image; });
-    return found != result.images.end() && found->image == asked && map.place(asked).session == map.place(i).session;
-  };
-  result.stretches = stretchesOf(map, config.far_m, belongs);
-  return result;
+  return std::move(search).result();
 }
 
 }  // namespace visual_localization

@@ -127,6 +127,16 @@ class SessionsTest(ProgramTest):
         self.assertLess(max(len(line) for line in shown.splitlines()), 180)
         ElementTree.parse(self.plot)
 
+    def test_a_map_without_near_neighbours_is_not_called_ambiguous(self):
+        self.build(SUNNY, spacing=6)
+        shown = self.info('--ambiguity')
+        images = int(re.search(r'images: +(\d+) of', shown).group(1))
+        ambiguous, judged = map(int, re.search(r'ambiguous: +(\d+) of (\d+) images', shown).groups())
+        alone = int(re.search(r'(\d+) images have no neighbour within 5 m and cannot be judged', shown).group(1))
+        self.assertEqual(ambiguous, 0)
+        self.assertEqual(judged + alone, images)
+        self.assertGreater(alone, 30)  # two are near where the round begins and ends
+
     def test_a_map_is_described_in_a_moment(self):
         self.build(SUNNY, CLOUDY)
         start = time.monotonic()

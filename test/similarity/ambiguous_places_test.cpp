@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "test/support/example_map.h"
+#include "visual_localization/geo/angles.h"
 
 namespace visual_localization {
 namespace {
@@ -97,6 +98,45 @@ TEST(AmbiguousPlaces, EndsWhenThereIsNoWorkLeft) {
   EXPECT_EQ(found.asked + found.unasked, 60U);
 }
 
+TEST(AmbiguousPlaces, WorkIsWhatTheFeaturesAreAndNotWhatThePlacesClaim) {
+  std::vector<TrainingImage> images = street(0);
+  TrainingPlaces places;
+  for (const TrainingImage& image : images) places.add(image, 1);
+  const TrainingMap map(test::exampleHeader(), places, std::make_unique<MemoryFeatureStore>(std::move(images)));
+  AmbiguityConfig config;
+  config.most_work = 200'000;
+  EXPECT_GT(findAmbiguousPlaces(map, config).unasked, 40U);
+}
+
+TEST(AmbiguousPlaces, AnImageWithoutANearOneCannotBeJudged) {
+  std::vector<TrainingImage> images = street(4);
+  for (TrainingImage& image : images) image.position_m *= 6.0;
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(std::move(images)));
+  EXPECT_TRUE(found.images.empty());
+  EXPECT_EQ(found.asked, 0U);
+  EXPECT_EQ(found.unasked, 0U);
+  EXPECT_EQ(found.unjudged, 60U);
+}
+
+TEST(AmbiguousPlaces, ANearImageThatFacesAnotherWayIsNoNeighbour) {
+  std::vector<TrainingImage> images = street(4);
+  images[41].yaw_rad = kPi;
+  for (TrainingImage& image : images) image.position_m *= 4.0;  // only 40 and 42 are near 41
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(std::move(images)));
+  EXPECT_EQ(found.asked, 59U);
+  EXPECT_EQ(found.unjudged, 1U);
+  for (const AmbiguousImage& image : found.images) EXPECT_NE(image.image, 41U);
+}
+
+TEST(AmbiguousPlaces, ANeighbourIsFoundAmongManyThatFaceAnotherWay) {
+  std::vector<TrainingImage> images = street(0);
+  TrainingImage standing = images[30];
+  standing.yaw_rad = kPi;
+  for (int i = 0; i < 40; ++i) images.push_back(standing);
+  const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(std::move(images)));
+  EXPECT_EQ(found.asked, 100U);
+}
+
 TEST(AmbiguousPlaces, AStretchEndsWithItsSession) {
   std::vector<TrainingImage> images = street(4);
   for (std::size_t i = 7; i < images.size(); ++i) images[i].session = 1;
@@ -112,16 +152,6 @@ TEST(AmbiguousPlaces, AStretchEndsWithItsSession) {
   EXPECT_EQ(found.stretches[0].last, 6U);
   EXPECT_EQ(found.stretches[1].first, 40U);
   EXPECT_EQ(found.stretches[1].last, 44U);
-}
-
-TEST(AmbiguousPlaces, WorkIsWhatTheFeaturesAreAndNotWhatThePlacesClaim) {
-  std::vector<TrainingImage> images = street(0);
-  TrainingPlaces places;
-  for (const TrainingImage& image : images) places.add(image, 1);
-  const TrainingMap map(test::exampleHeader(), places, std::make_unique<MemoryFeatureStore>(std::move(images)));
-  AmbiguityConfig config;
-  config.most_work = 200'000;
-  EXPECT_GT(findAmbiguousPlaces(map, config).unasked, 40U);
 }
 
 TEST(AmbiguousPlaces, ImagesWithoutFeaturesAreNotAmbiguous) {

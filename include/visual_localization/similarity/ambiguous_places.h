@@ -39,8 +39,9 @@ struct AmbiguousPlaces {
   std::vector<Stretch> stretches;      ///< successive ones among those asked about
   std::size_t asked = 0;               ///< images that were compared
   std::size_t unasked = 0;             ///< images for which no work was left
-  std::size_t stride = 1;              ///< every so many-th image was asked about
-  std::size_t global_only = 0;         ///< images that are ambiguous when only global features are compared
+  std::size_t unjudged = 0;     ///< images without a near one that faces alike: nothing to hold the far ones against
+  std::size_t stride = 1;       ///< every so many-th image was asked about
+  std::size_t global_only = 0;  ///< images that are ambiguous when only global features are compared
 };
 
 /// Called between two images: so many of so many are done.
