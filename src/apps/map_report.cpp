@@ -216,8 +216,8 @@ void printAmbiguity(std::ostream& out, const TrainingMap& map, const AmbiguousPl
       << percent(config.nearly_as_good, 1.0) << " as much like one more than " << metres(config.far_m)
       << " away as like their neighbours\n";
   if (found.stride > 1) {
-    out << key("") << "of this large map every " << found.stride << "th image was compared, with every " << found.stride
-        << "th\n";
+    out << key("") << "of this large map one image in " << found.stride << " was compared, with one in " << found.stride
+        << '\n';
   }
   if (found.unjudged > 0) {
     out << key("") << found.unjudged << (found.unjudged == 1 ? " image has" : " images have") << " no neighbour within "

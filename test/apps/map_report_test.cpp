@@ -38,5 +38,12 @@ TEST(MapReport, SaysHowManyImagesCannotBeJudged) {
   EXPECT_THAT(reportOf(places), HasSubstr(" 25 images have no neighbour within 5 m and cannot be judged\n"));
 }
 
+TEST(MapReport, SaysOfWhichShareOfALargeMapItSpeaks) {
+  AmbiguousPlaces places;
+  EXPECT_THAT(reportOf(places), Not(HasSubstr("large map")));
+  places.stride = 3;
+  EXPECT_THAT(reportOf(places), HasSubstr("of this large map one image in 3 was compared, with one in 3\n"));
+}
+
 }  // namespace
 }  // namespace visual_localization::apps
