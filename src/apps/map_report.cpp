@@ -226,12 +226,13 @@ void printAmbiguity(std::ostream& out, const TrainingMap& map, const AmbiguousPl
   if (found.unasked > 0) out << key("") << found.unasked << " images were left out: their features are too many\n";
   out << key("") << found.global_only << " by global features alone (features: global)\n";
   printStretches(out, map, found.stretches, [&](const Stretch& stretch) {
-    const auto first = std::lower_bound(found.images.begin(), found.images.end(), stretch.first,
-                                        [](const AmbiguousImage& a, std::size_t image) { return a.image < image; });
+    const auto first = std::find_if(found.images.begin(), found.images.end(), [&](const AmbiguousImage& image) {
+      return image.image >= stretch.first && map.place(image.image).session == stretch.session;
+    });
     std::ostringstream text;
     text << std::fixed << std::setprecision(2);
-    // A stretch begins between two images that were asked about when the one asked about is of another session.
-    if (first == found.images.end()) return text.str();
+    // After a gap a stretch begins with images that were not asked about; there may be none but those.
+    if (first == found.images.end() || first->image > stretch.last) return text.str();
     text << "; like " << placeOf(map, first->twin) << ", similarity " << first->similarity << " against "
          << first->near_similarity;
     return text.str();

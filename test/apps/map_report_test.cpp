@@ -29,6 +29,9 @@ std::string reportOf(const AmbiguousPlaces& places) {
   return text.str();
 }
 
+/// Of the first session, which has images 0 to 9.
+Stretch stretch(std::size_t first, std::size_t last) { return {0, first, last, last - first + 1, 1.0, 20, 0}; }
+
 TEST(MapReport, SaysHowManyImagesCannotBeJudged) {
   AmbiguousPlaces places;
   EXPECT_THAT(reportOf(places), Not(HasSubstr("judged")));
@@ -43,6 +46,23 @@ TEST(MapReport, SaysOfWhichShareOfALargeMapItSpeaks) {
   EXPECT_THAT(reportOf(places), Not(HasSubstr("large map")));
   places.stride = 3;
   EXPECT_THAT(reportOf(places), HasSubstr("of this large map one image in 3 was compared, with one in 3\n"));
+}
+
+TEST(MapReport, NamesTheTwinOfAStretch) {
+  AmbiguousPlaces places;
+  places.images = {{4, 1, 0.5, 0.25}};
+  places.stretches = {stretch(3, 6)};
+  EXPECT_THAT(reportOf(places), HasSubstr("4 images; like (49.8, 3.0), similarity 0.50 against 0.25\n"));
+}
+
+TEST(MapReport, AStretchThatWasNotComparedHasNoTwin) {
+  AmbiguousPlaces places;
+  places.images = {{8, 1, 0.5, 0.25}};
+  places.stretches = {stretch(3, 6)};
+  EXPECT_THAT(reportOf(places), HasSubstr("4 images\n")) << "image 8 is beyond it";
+  places.images = {{11, 1, 0.5, 0.25}};
+  places.stretches = {stretch(3, 12)};
+  EXPECT_THAT(reportOf(places), HasSubstr("10 images\n")) << "image 11 is of another session";
 }
 
 }  // namespace
