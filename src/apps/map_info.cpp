@@ -49,7 +49,8 @@ int main(int argc, char** argv) {
   visual_localization::Options options;
   app.add_option("map", options.map, "the map file")->required();
   app.add_flag("--check", options.check, "verify every checksum and the structure of the file");
-  app.add_flag("--ambiguity", options.ambiguity, "look for places that are taken for others; takes up to a minute");
+  app.add_flag("--ambiguity", options.ambiguity,
+               "look for places that are taken for others; takes seconds, at most about a minute");
   app.add_option("--few-features", options.few_features, "an image with fewer SIFT features is weak")
       ->check(CLI::Range(std::size_t{0}, std::size_t{1'000'000}))
       ->capture_default_str();
