@@ -6,6 +6,8 @@
 #include <ostream>
 #include <sstream>
 
+#include "visual_localization/io/utf8.h"
+
 namespace visual_localization::apps {
 namespace {
 
@@ -15,30 +17,41 @@ double roundBelow(double most) {
   return power * (most / power >= 5.0 ? 5.0 : most / power >= 2.0 ? 2.0 : 1.0);
 }
 
-std::string metres(double value) {
+/// With as many decimals as it needs.
+std::string roundNumber(double value) {
   std::ostringstream text;
   text << std::setprecision(10) << (std::abs(value) < 1e-9 ? 0.0 : value);
   return text.str();
 }
 
-void drawText(std::ostream& out, const Eigen::Vector2d& at_px, const std::string& anchor, const std::string& text) {
-  out << "<text x=\"" << svgNumber(at_px.x()) << "\" y=\"" << svgNumber(at_px.y()) << "\" text-anchor=\"" << anchor
-      << "\">" << text << "</text>\n";
+constexpr const char* kCentred = "text-anchor=\"middle\"";
+constexpr const char* kFlushRight = "text-anchor=\"end\"";
+
+/// XML has no place for two of the characters, U+FFFE and U+FFFF.
+bool isXml(const std::string& character) {
+  const bool is_control = character.size() == 1 && (character[0] < 32 || character[0] == 127);
+  return !is_control && character != "\xEF\xBF\xBE" && character != "\xEF\xBF\xBF";
 }
 
 }  // namespace
 
 std::string escapedForXml(const std::string& text) {
   std::string safe;
-  for (const char c : text) {
-    if (c == '&')
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t bytes = characterBytes(text, at);
+    const std::string character = text.substr(at, std::max<std::size_t>(1, bytes));
+    if (bytes == 0 || !isXml(character)) {
+      safe += '?';
+    } else if (character == "&") {
       safe += "&amp;";
-    else if (c == '<')
+    } else if (character == "<") {
       safe += "&lt;";
-    else if (c == '>')
+    } else if (character == ">") {
       safe += "&gt;";
-    else
-      safe += (c >= 0 && c < 32) || c == 127 ? '?' : c;
+    } else {
+      safe += character;
+    }
+    at += character.size();
   }
   return safe;
 }
@@ -47,6 +60,11 @@ std::string svgNumber(double value) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(1) << value;
   return text.str();
+}
+
+void drawText(std::ostream& out, const Eigen::Vector2d& at_px, const std::string& text, const std::string& attributes) {
+  out << "<text x=\"" << svgNumber(at_px.x()) << "\" y=\"" << svgNumber(at_px.y()) << "\" " << attributes << '>'
+      << escapedForXml(text) << "</text>\n";
 }
 
 SvgPanel::SvgPanel(const Eigen::Vector2d& corner_px, double width_px, const Area& area)
@@ -85,15 +103,15 @@ void SvgPanel::drawTicks(std::ostream& out, double step_m) const {
   }
   out << "\"/>\n";
   for (double east = first.x(); east <= area_.max_m.x(); east += step_m) {
-    drawText(out, at({east, area_.min_m.y()}) + Eigen::Vector2d(0.0, 15.0), "middle", metres(east));
+    drawText(out, at({east, area_.min_m.y()}) + Eigen::Vector2d(0.0, 15.0), roundNumber(east), kCentred);
   }
   for (double north = first.y(); north <= area_.max_m.y(); north += step_m) {
-    drawText(out, at({area_.min_m.x(), north}) + Eigen::Vector2d(-6.0, 4.0), "end", metres(north));
+    drawText(out, at({area_.min_m.x(), north}) + Eigen::Vector2d(-6.0, 4.0), roundNumber(north), kFlushRight);
   }
-  drawText(out, corner_px_ + Eigen::Vector2d(0.5 * width(), height() + 31.0), "middle", "east of the datum, m");
+  drawText(out, corner_px_ + Eigen::Vector2d(0.5 * width(), height() + 31.0), "east of the datum, m", kCentred);
   const Eigen::Vector2d middle = corner_px_ + Eigen::Vector2d(-38.0, 0.5 * height());
   out << "<g transform=\"translate(" << svgNumber(middle.x()) << ' ' << svgNumber(middle.y()) << ") rotate(-90)\">";
-  drawText(out, {0.0, 0.0}, "middle", "north, m");
+  drawText(out, {0.0, 0.0}, "north, m", kCentred);
   out << "</g>\n</g>\n";
 }
 
@@ -102,13 +120,13 @@ void SvgPanel::drawScaleBar(std::ostream& out, double length_m) const {
   const double length_px = scale_ * length_m;
   out << "<path fill=\"none\" stroke=\"black\" stroke-width=\"1.5\" d=\"M" << svgNumber(end.x() - length_px) << ' '
       << svgNumber(end.y() - 5.0) << "v5h" << svgNumber(length_px) << "v-5\"/>\n";
-  drawText(out, end + Eigen::Vector2d(-0.5 * length_px, -6.0), "middle", metres(length_m) + " m");
+  drawText(out, end + Eigen::Vector2d(-0.5 * length_px, -6.0), roundNumber(length_m) + " m", kCentred);
 }
 
 void SvgPanel::drawNorth(std::ostream& out) const {
   const Eigen::Vector2d tip = corner_px_ + Eigen::Vector2d(width() - 20.0, 10.0);
   out << "<path fill=\"black\" d=\"M" << svgNumber(tip.x()) << ' ' << svgNumber(tip.y()) << "l5 14l-5 -4l-5 4z\"/>\n";
-  drawText(out, tip + Eigen::Vector2d(0.0, 28.0), "middle", "N");
+  drawText(out, tip + Eigen::Vector2d(0.0, 28.0), "N", kCentred);
 }
 
 }  // namespace visual_localization::apps

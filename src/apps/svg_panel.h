@@ -9,11 +9,15 @@
 
 namespace visual_localization::apps {
 
-/// As text of an SVG file; control characters become question marks.
+/// As text of an SVG file; control characters and what is no UTF-8 become question marks.
 std::string escapedForXml(const std::string& text);
 
 /// One decimal is a tenth of a pixel.
 std::string svgNumber(double value);
+
+/// `text` is escaped, `attributes` are not.
+void drawText(std::ostream& out, const Eigen::Vector2d& at_px, const std::string& text,
+              const std::string& attributes = "");
 
 /// A rectangle of an SVG picture that shows a part of the map frame: one scale on both axes, north up.
 class SvgPanel {

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "svg_panel.h"
+#include "visual_localization/io/utf8.h"
 
 namespace visual_localization::apps {
 namespace {
@@ -97,12 +98,7 @@ Area areaFor(const PlottedRound& round, const Area& together, const LocalFrame& 
 
 /// Of a long name the end: that is where rounds of one place differ.
 std::string shortened(const std::string& name, std::size_t most) {
-  return name.size() <= most ? name : "..." + name.substr(name.size() - most + 3);
-}
-
-void drawText(std::ostream& out, double x, double y, const std::string& text, const char* attributes = "") {
-  out << "<text x=\"" << svgNumber(x) << "\" y=\"" << svgNumber(y) << "\" " << attributes << '>' << escapedForXml(text)
-      << "</text>\n";
+  return name.size() <= most ? name : "..." + lastCharacters(name, most - 3);
 }
 
 void drawShape(std::ostream& out, const Style& style, const std::string& where) {
@@ -149,33 +145,33 @@ void drawImages(std::ostream& out, const PlottedRound& round, const char* colour
 /// Reasons with their counts, and what the line and the rings are; from `y` down.
 void drawLegend(std::ostream& out, const PlottedRound& round, const char* colour, double y) {
   const double x = kLeft_px + kPanel_px + 24.0;
-  drawText(out, x - 6.0, y, std::to_string(round.fixes.size()) + " fixes", "font-weight=\"bold\"");
+  drawText(out, {x - 6.0, y}, std::to_string(round.fixes.size()) + " fixes", "font-weight=\"bold\"");
   for (const Style& style : kStyles) {
     y += kLegendLine_px;
     const auto count = std::count(round.cleaned.verdicts.begin(), round.cleaned.verdicts.end(), style.verdict);
     drawShape(out, style, shapeAt(style, {x, y - 4.0}));
-    drawText(out, x + 14.0, y, std::to_string(count) + " " + style.meaning,
+    drawText(out, {x + 14.0, y}, std::to_string(count) + " " + style.meaning,
              count == 0 ? "fill=\"#999999\"" : "fill=\"#000000\"");
   }
   y += 34.0;
   std::ostringstream path;
   path << std::fixed << std::setprecision(0) << "cleaned path, " << round.cleaned.trajectory.length() << " m";
   out << "<path stroke=\"" << colour << "\" stroke-width=\"2\" d=\"M" << x - 6.0 << ' ' << y - 4.0 << "h14\"/>\n";
-  drawText(out, x + 14.0, y, path.str());
+  drawText(out, {x + 14.0, y}, path.str());
   y += kLegendLine_px;
   out << "<path fill=\"white\" stroke=\"" << colour << "\" stroke-width=\"0.8\" d=\"M" << x << ' ' << y - 4.0 << kRing
       << "\"/>\n";
-  drawText(out, x + 14.0, y, std::to_string(round.images_m.size()) + " kept images");
+  drawText(out, {x + 14.0, y}, std::to_string(round.images_m.size()) + " kept images");
   y += kLegendLine_px;
-  drawText(out, x + 14.0, y, std::to_string(round.cleaned.gaps_closed) + " gaps closed");
+  drawText(out, {x + 14.0, y}, std::to_string(round.cleaned.gaps_closed) + " gaps closed");
   y += 34.0;
-  drawText(out, x - 6.0, y, "A mark on the frame lies farther off.", "fill=\"#555555\" font-size=\"11\"");
+  drawText(out, {x - 6.0, y}, "A mark on the frame lies farther off.", "fill=\"#555555\" font-size=\"11\"");
 }
 
 void drawRound(std::ostream& out, const PlottedRound& round, const LocalFrame& frame, const char* colour,
                const SvgPanel& panel, double top_px) {
   panel.drawAxes(out);
-  drawText(out, kLeft_px, top_px - 10.0, shortened(round.name, 70), "font-size=\"15\" font-weight=\"bold\"");
+  drawText(out, {kLeft_px, top_px - 10.0}, shortened(round.name, 70), "font-size=\"15\" font-weight=\"bold\"");
   drawFixes(out, kStyles.front(), round, frame, panel);
   drawPath(out, round, colour, panel);
   drawImages(out, round, colour, panel);
@@ -185,7 +181,7 @@ void drawRound(std::ostream& out, const PlottedRound& round, const LocalFrame& f
 
 void drawTogether(std::ostream& out, const std::vector<PlottedRound>& rounds, const SvgPanel& panel, double top_px) {
   panel.drawAxes(out);
-  drawText(out, kLeft_px, top_px - 10.0, "all rounds, cleaned paths", "font-size=\"15\" font-weight=\"bold\"");
+  drawText(out, {kLeft_px, top_px - 10.0}, "all rounds, cleaned paths", "font-size=\"15\" font-weight=\"bold\"");
   const double x = kLeft_px + kPanel_px + 24.0;
   double y = top_px + 14.0;
   for (std::size_t r = 0; r < rounds.size(); ++r) {
@@ -195,10 +191,10 @@ void drawTogether(std::ostream& out, const std::vector<PlottedRound>& rounds, co
         << "\" r=\"3.5\"/>\n";
     out << "<path stroke=\"" << colourOf(r) << "\" stroke-width=\"3\" d=\"M" << x - 6.0 << ' ' << y - 4.0
         << "h14\"/>\n";
-    drawText(out, x + 14.0, y, shortened(rounds[r].name, 28));
+    drawText(out, {x + 14.0, y}, shortened(rounds[r].name, 28));
     y += kLegendLine_px;
   }
-  drawText(out, x - 6.0, y + 12.0, "A dot is where a path begins.", "fill=\"#555555\" font-size=\"11\"");
+  drawText(out, {x - 6.0, y + 12.0}, "A dot is where a path begins.", "fill=\"#555555\" font-size=\"11\"");
 }
 
 }  // namespace

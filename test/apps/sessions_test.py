@@ -127,6 +127,15 @@ class SessionsTest(ProgramTest):
         self.assertLess(max(len(line) for line in shown.splitlines()), 180)
         ElementTree.parse(self.plot)
 
+    def test_names_may_have_letters_of_any_language(self):
+        # Longer than any place for them, so that they are cut.
+        copy = self.folder / ('x' + '\u00e4' * 60 + '.bag')
+        shutil.copy(CLOUDY, copy)
+        self.build(SUNNY, copy, spacing=10)
+        texts = [text.text for text in ElementTree.parse(self.plot).getroot().iter(SVG + 'text')]
+        self.assertEqual(len([text for text in texts if re.fullmatch('\\.\\.\\.\u00e4+', text)]), 2, texts)
+        self.assertRegex(self.info(), r'1  x\u00e4+ +\d+ images')
+
     def test_a_map_without_near_neighbours_is_not_called_ambiguous(self):
         self.build(SUNNY, spacing=6)
         shown = self.info('--ambiguity')
