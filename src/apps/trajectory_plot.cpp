@@ -59,11 +59,11 @@ void include(const Eigen::Vector2d& position_m, Area& area) {
 }
 
 /// All paths, with room for bends beside them; what lies farther off is drawn at the border.
-Area areaOf(const std::vector<PlottedRound>& rounds, const LocalFrame& frame) {
+Area areaOf(const std::vector<const PlottedRound*>& rounds, const LocalFrame& frame) {
   Area paths;
   bool first = true;
-  for (const PlottedRound& round : rounds) {
-    for (const TrajectoryPoint& point : round.cleaned.trajectory.points()) {
+  for (const PlottedRound* round : rounds) {
+    for (const TrajectoryPoint& point : round->cleaned.trajectory.points()) {
       if (first) paths = {point.position_m, point.position_m};
       first = false;
       include(point.position_m, paths);
@@ -72,10 +72,10 @@ Area areaOf(const std::vector<PlottedRound>& rounds, const LocalFrame& frame) {
   const double extent_m = std::max(paths.range().maxCoeff(), 5.0);
   const Eigen::Vector2d room_m = Eigen::Vector2d::Constant(0.2 * extent_m);
   Area shown = paths;
-  for (const PlottedRound& round : rounds) {
-    for (std::size_t i = 0; i < round.fixes.size(); ++i) {
-      if (round.cleaned.verdicts[i] != FixVerdict::kBend) continue;
-      const Eigen::Vector2d bend_m = frame.toEastNorth(round.fixes[i].position);
+  for (const PlottedRound* round : rounds) {
+    for (std::size_t i = 0; i < round->fixes.size(); ++i) {
+      if (round->cleaned.verdicts[i] != FixVerdict::kBend) continue;
+      const Eigen::Vector2d bend_m = frame.toEastNorth(round->fixes[i].position);
       include(bend_m.cwiseMax(paths.min_m - room_m).cwiseMin(paths.max_m + room_m), shown);
     }
   }
@@ -92,7 +92,7 @@ Area areaOf(const std::vector<PlottedRound>& rounds, const LocalFrame& frame) {
 /// Rounds of one place are shown alike; where they lie far apart each has its own part of the map.
 Area areaFor(const PlottedRound& round, const Area& together, const LocalFrame& frame) {
   constexpr double kFarApart = 4.0;
-  const Area alone = areaOf({round}, frame);
+  const Area alone = areaOf({&round}, frame);
   return together.range().maxCoeff() > kFarApart * alone.range().maxCoeff() ? alone : together;
 }
 
@@ -205,7 +205,9 @@ std::string plotTrajectories(const std::vector<PlottedRound>& rounds, const Loca
   const auto below = [&top_px](const SvgPanel& panel, double legend_px) {
     top_px += std::max(legend_px, panel.height() + kBelow_px) + kAbove_px;
   };
-  const Area together = areaOf(rounds, frame);
+  std::vector<const PlottedRound*> all;
+  for (const PlottedRound& round : rounds) all.push_back(&round);
+  const Area together = areaOf(all, frame);
   for (std::size_t r = 0; r < rounds.size(); ++r) {
     const SvgPanel panel({kLeft_px, top_px}, kPanel_px, areaFor(rounds[r], together, frame));
     drawRound(panels, rounds[r], frame, colourOf(r), panel, top_px);
