@@ -89,7 +89,7 @@ std::string sessionName(const std::string& bag, const std::vector<apps::PlottedR
   }
 }
 
-/// Every image of a round would be its own neighbour, and the map twice as large for nothing.
+/// The map would be twice as large and show nothing more, while every place seemed to be seen by two sessions.
 void requireDifferent(const std::vector<std::string>& bags) {
   for (std::size_t i = 0; i < bags.size(); ++i) {
     for (std::size_t earlier = 0; earlier < i; ++earlier) {
