@@ -16,6 +16,7 @@
 #include "progress_bar.h"
 #include "trajectory_plot.h"
 #include "visual_localization/io/partial_file.h"
+#include "visual_localization/map/image_fit.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
@@ -149,11 +150,6 @@ void printFixes(const apps::PlottedRound& round) {
   }
   std::cout << "; " << round.cleaned.gaps_closed << " gaps closed, the longest " << round.cleaned.longest_gap_s
             << " s; path " << round.cleaned.trajectory.length() << " m\n";
-}
-
-/// How much wider than in the recording an image is shown in the map, in relation to its height.
-double stretchOf(cv::Size recorded, cv::Size in_map) {
-  return static_cast<double>(in_map.width) / recorded.width * recorded.height / in_map.height;
 }
 
 /// What one round brought, and whether its images had to be bent into shape.

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include <GeographicLib/Geodesic.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "visual_localization/features/pruning.h"
+#include "visual_localization/map/image_fit.h"
 #include "visual_localization/map/map_writer.h"
 #include "visual_localization/map/pruning_neighbours.h"
 #include "visual_localization/parameters/parameters.h"
@@ -63,13 +63,6 @@ void requireNear(const GeodeticPoint& place, const GeodeticPoint& datum) {
 
 bool isUsable(const cv::Mat& grey) {
   return grey.type() == CV_8UC1 && grey.rows >= kSmallestSide_px && grey.cols >= kSmallestSide_px;
-}
-
-cv::Mat resized(const cv::Mat& grey, cv::Size size) {
-  if (grey.size() == size) return grey;
-  cv::Mat result;
-  cv::resize(grey, result, size, 0.0, 0.0, cv::INTER_AREA);
-  return result;
 }
 
 /// The unpruned features of the images that tell what is noise in image `i`.
@@ -172,7 +165,8 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   RawImage image;
   image.place = {stamp_ns, static_cast<int>(header_.sessions.size()) - 1, place->position_m, place->yaw_rad};
   // A camera's or a decoder's buffer does not stay.
-  image.grey = grey.size() == header_.image_size ? grey.clone() : resized(grey, header_.image_size);
+  cv::Mat resized;
+  image.grey = fitted(grey, header_.image_size, resized).clone();
   waiting_.push_back(std::move(image));
   last_kept_m_ = place->position_m;
   SessionImages& session = report_.session_images.back();
