@@ -1,8 +1,8 @@
 #!/usr/bin/python3
-"""Checks that imports run one way, and that only ros/ and apps/ know ROS.
+"""Checks that imports run one way, that public headers need no private one, and that few folders know ROS.
 
-A folder of src/ and include/visual_localization/ may include its own headers and those of the folders before it:
-io <- parameters <- geo <- features <- map <- similarity <- tracking <- localizer <- evaluation <- ros <- apps.
+A folder of src/ and include/visual_localization/ may include its own headers and those of the folders before it in
+ORDER, which doc/architecture.md explains.
 """
 import argparse
 import re
@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Iterator, Optional, Tuple
 
 PACKAGE = 'visual_localization'
-ORDER = ['io', 'parameters', 'geo', 'features', 'map', 'similarity', 'tracking', 'localizer', 'evaluation', 'ros',
+ORDER = ['base', 'parameters', 'geo', 'features', 'map', 'localization', 'survey', 'ros', 'bag', 'evaluation', 'node',
          'apps']
-KNOWS_ROS = {'ros', 'apps'}
+KNOWS_ROS = {'ros', 'bag', 'node', 'apps'}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 ROS_HEADER = re.compile(
     r'^(ros|rosbag|roscpp|nodelet|pluginlib|class_loader|cv_bridge|image_transport|message_filters|tf2?|tf2_\w+|'
@@ -41,14 +41,17 @@ def folder_of(path: Path, root: Path) -> str:
     return parts[2] if parts[0] == 'include' else parts[1]
 
 
-def violation(folder: str, header: str, is_test: bool) -> Optional[str]:
+def violation(folder: str, header: str, is_test: bool, is_public: bool) -> Optional[str]:
     """What is wrong with including `header` from `folder`, in words."""
     parts = header.split('/')
     ours = parts[0] == PACKAGE
+    private = parts[0] in ORDER and len(parts) > 1
     generated = ours and len(parts) == 2  # a message or a service
-    if (ROS_HEADER.match(header) or generated) and folder not in KNOWS_ROS:
+    if (ROS_HEADER.match(header) and not private or generated) and folder not in KNOWS_ROS:
         return None if is_test and folder not in ORDER else f'{folder}/ must not know ROS'
-    target = parts[1] if ours and len(parts) > 2 else None
+    if private and is_public:
+        return 'a public header must not need a private one'
+    target = parts[0] if private else parts[1] if ours and len(parts) > 2 else None
     if is_test or target is None:
         return None
     if target not in ORDER:
@@ -70,8 +73,9 @@ def main() -> int:
         if not is_test and folder not in ORDER:
             print(f'{path.relative_to(root)}: {folder}/ has no place in the order')
             found += 1
+        is_public = path.relative_to(root).parts[0] == 'include'
         for line, header in includes(path):
-            problem = violation(folder, header, is_test)
+            problem = violation(folder, header, is_test, is_public)
             if problem:
                 print(f'{path.relative_to(root)}:{line}: includes {header}: {problem}')
                 found += 1

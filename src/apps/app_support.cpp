@@ -1,4 +1,4 @@
-#include "app_support.h"
+#include "apps/app_support.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "visual_localization/io/partial_file.h"
+#include "base/files.h"
 
 namespace visual_localization::apps {
 namespace {

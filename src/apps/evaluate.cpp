@@ -15,15 +15,15 @@
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utility.hpp>
 
-#include "app_support.h"
-#include "evaluation_report.h"
-#include "progress_bar.h"
-#include "visual_localization/evaluation/evaluator.h"
-#include "visual_localization/evaluation/experiment.h"
-#include "visual_localization/evaluation/result_folder.h"
-#include "visual_localization/evaluation/result_tables.h"
-#include "visual_localization/io/read_file.h"
-#include "visual_localization/ros/round_recorder.h"
+#include "apps/app_support.h"
+#include "apps/evaluation_report.h"
+#include "apps/progress_bar.h"
+#include "base/files.h"
+#include "evaluation/evaluator.h"
+#include "evaluation/experiment.h"
+#include "evaluation/result_folder.h"
+#include "evaluation/result_tables.h"
+#include "evaluation/round_recorder.h"
 
 namespace visual_localization::apps {
 namespace {

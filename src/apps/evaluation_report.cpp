@@ -1,4 +1,4 @@
-#include "evaluation_report.h"
+#include "apps/evaluation_report.h"
 
 #include <array>
 #include <cerrno>

@@ -8,20 +8,20 @@
 
 #include <CLI/CLI.hpp>
 
-#include "app_support.h"
-#include "progress_bar.h"
-#include "visual_localization/evaluation/error_statistics.h"
-#include "visual_localization/evaluation/image_order.h"
-#include "visual_localization/evaluation/track_csv.h"
+#include "apps/app_support.h"
+#include "apps/progress_bar.h"
+#include "base/files.h"
+#include "evaluation/drive_order.h"
+#include "evaluation/metrics.h"
+#include "evaluation/round_recorder.h"
+#include "evaluation/track_csv.h"
+#include "node/node_config.h"
+#include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/geo/trajectory.h"
-#include "visual_localization/io/partial_file.h"
-#include "visual_localization/localizer/localizer.h"
-#include "visual_localization/map/map_store.h"
+#include "visual_localization/localization/localizer.h"
+#include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
-#include "visual_localization/ros/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
-#include "visual_localization/ros/node_config.h"
-#include "visual_localization/ros/round_recorder.h"
 
 namespace visual_localization::apps {
 namespace {

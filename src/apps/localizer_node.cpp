@@ -10,8 +10,8 @@
 #include <ros/spinner.h>
 #include <ros/this_node.h>
 
-#include "visual_localization/ros/localizer_nodelet.h"
-#include "visual_localization/ros/parameters_page.h"
+#include "node/localizer_nodelet.h"
+#include "node/node_config.h"
 
 namespace {
 

@@ -12,13 +12,13 @@
 #include <thread>
 #include <vector>
 
-#include "app_support.h"
-#include "progress_bar.h"
-#include "trajectory_plot.h"
-#include "visual_localization/io/partial_file.h"
-#include "visual_localization/map/image_fit.h"
+#include "apps/app_support.h"
+#include "apps/progress_bar.h"
+#include "apps/trajectory_plot.h"
+#include "base/files.h"
+#include "visual_localization/bag/bag_reader.h"
+#include "visual_localization/features/front_end.h"
 #include "visual_localization/parameters/parameters.h"
-#include "visual_localization/ros/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {

@@ -1,4 +1,4 @@
-#include "map_export.h"
+#include "apps/map_export.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "visual_localization/map/map_survey.h"
+#include "survey/ambiguous_places.h"
+#include "survey/map_survey.h"
 #include "visual_localization/map/training_map.h"
-#include "visual_localization/similarity/ambiguous_places.h"
 
 namespace visual_localization::apps {
 

@@ -1,12 +1,12 @@
 #include <iostream>
 #include <string>
 
-#include "app_support.h"
-#include "map_export.h"
-#include "map_report.h"
-#include "progress_bar.h"
-#include "visual_localization/io/partial_file.h"
-#include "visual_localization/map/map_store.h"
+#include "apps/app_support.h"
+#include "apps/map_export.h"
+#include "apps/map_report.h"
+#include "apps/progress_bar.h"
+#include "base/files.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
 namespace {

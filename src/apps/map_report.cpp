@@ -1,4 +1,4 @@
-#include "map_report.h"
+#include "apps/map_report.h"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,9 @@
 #include <sstream>
 #include <vector>
 
-#include "app_support.h"
-#include "visual_localization/io/one_line.h"
-#include "visual_localization/map/map_store.h"
+#include "apps/app_support.h"
+#include "base/text.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization::apps {
 namespace {

@@ -3,7 +3,7 @@
 #include <iosfwd>
 #include <string>
 
-#include "map_export.h"
+#include "apps/map_export.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::apps {

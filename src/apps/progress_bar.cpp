@@ -1,4 +1,4 @@
-#include "progress_bar.h"
+#include "apps/progress_bar.h"
 
 #include <array>
 #include <cstdio>

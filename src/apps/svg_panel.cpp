@@ -1,4 +1,4 @@
-#include "svg_panel.h"
+#include "apps/svg_panel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <ostream>
 #include <sstream>
 
-#include "visual_localization/io/utf8.h"
+#include "base/text.h"
 
 namespace visual_localization::apps {
 namespace {

@@ -1,4 +1,4 @@
-#include "trajectory_plot.h"
+#include "apps/trajectory_plot.h"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <optional>
 #include <sstream>
 
-#include "svg_panel.h"
-#include "visual_localization/io/utf8.h"
+#include "apps/svg_panel.h"
+#include "base/text.h"
 
 namespace visual_localization::apps {
 namespace {

@@ -1,11 +1,11 @@
-#include "visual_localization/evaluation/evaluator.h"
+#include "evaluation/evaluator.h"
 
 #include <algorithm>
 #include <set>
 #include <utility>
 
-#include "visual_localization/evaluation/image_order.h"
-#include "visual_localization/evaluation/parallel.h"
+#include "base/parallel.h"
+#include "evaluation/drive_order.h"
 
 namespace visual_localization {
 namespace {

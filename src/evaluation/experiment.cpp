@@ -1,9 +1,9 @@
-#include "visual_localization/evaluation/experiment.h"
+#include "evaluation/experiment.h"
 
 #include <algorithm>
 #include <set>
 
-#include "visual_localization/parameters/yaml_map.h"
+#include "parameters/yaml_map.h"
 
 namespace visual_localization {
 namespace {

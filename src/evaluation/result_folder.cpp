@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/result_folder.h"
+#include "evaluation/result_folder.h"
 
 #include <filesystem>
 #include <system_error>
@@ -6,8 +6,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "visual_localization/io/partial_file.h"
-#include "visual_localization/io/read_file.h"
+#include "base/files.h"
 
 namespace visual_localization {
 namespace {

@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/result_tables.h"
+#include "evaluation/result_tables.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <sstream>
 #include <utility>
 
-#include "visual_localization/io/partial_file.h"
+#include "base/files.h"
 
 namespace visual_localization {
 namespace {

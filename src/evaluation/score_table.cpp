@@ -1,7 +1,7 @@
-#include "visual_localization/evaluation/score_table.h"
+#include "evaluation/score_table.h"
 
-#include "visual_localization/evaluation/cpu_stopwatch.h"
-#include "visual_localization/evaluation/parallel.h"
+#include "base/parallel.h"
+#include "base/time.h"
 
 namespace visual_localization {
 namespace {

@@ -1,11 +1,11 @@
-#include "visual_localization/evaluation/sequence_matcher.h"
+#include "evaluation/sequence_matcher.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "visual_localization/evaluation/similarity_row.h"
+#include "evaluation/place_recogniser.h"
 
 namespace visual_localization {
 namespace {

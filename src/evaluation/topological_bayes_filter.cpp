@@ -1,10 +1,10 @@
-#include "visual_localization/evaluation/topological_bayes_filter.h"
+#include "evaluation/topological_bayes_filter.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "visual_localization/evaluation/similarity_row.h"
+#include "evaluation/place_recogniser.h"
 
 namespace visual_localization {
 namespace {

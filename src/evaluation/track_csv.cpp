@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/track_csv.h"
+#include "evaluation/track_csv.h"
 
 #include <cstdio>
 #include <iomanip>

@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/unit_result.h"
+#include "evaluation/unit_result.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "visual_localization/evaluation/error_statistics.h"
-#include "visual_localization/evaluation/precision_recall.h"
+#include "evaluation/metrics.h"
 
 namespace visual_localization {
 namespace {

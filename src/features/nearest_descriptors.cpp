@@ -3,8 +3,8 @@
 #define HWY_WANT_AVX3_DL
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/features/nearest_descriptors.cpp"
-#include "visual_localization/features/nearest_descriptors.h"
+#define HWY_TARGET_INCLUDE "features/nearest_descriptors.cpp"
+#include "features/nearest_descriptors.h"
 
 #include <cmath>
 #include <cstring>

@@ -1,6 +1,6 @@
 #include <numeric>
 
-#include "visual_localization/features/nearest_descriptors.h"
+#include "features/nearest_descriptors.h"
 
 namespace visual_localization {
 namespace {

@@ -6,7 +6,7 @@
 #include <opencv2/features2d.hpp>
 
 #ifdef VISUAL_LOCALIZATION_HIGHWAY
-#include "visual_localization/features/native_sift_extractor.h"
+#include "features/sift/native_sift_extractor.h"
 #endif
 
 namespace visual_localization {

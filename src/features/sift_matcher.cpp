@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
-#include "visual_localization/features/angle_ratio_test.h"
-#include "visual_localization/features/nearest_descriptors.h"
+#include "features/angle_ratio_test.h"
+#include "features/nearest_descriptors.h"
 
 namespace visual_localization {
 namespace {
@@ -55,6 +56,18 @@ void forEachSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_a
 
 }  // namespace
 
+AngleRatioTest::AngleRatioTest(double max_angle_ratio) : max_angle_ratio_(max_angle_ratio) {
+  for (std::size_t i = 0; i <= kCells; ++i) {
+    bounds_[i] = std::cos(max_angle_ratio * std::acos(static_cast<double>(i) / kCells));
+  }
+}
+
+bool AngleRatioTest::exactly(float best, float second) const {
+  const double nearest = std::acos(std::min(1.0, static_cast<double>(best)));
+  const double next = std::acos(std::min(1.0, static_cast<double>(second)));
+  return nearest < max_angle_ratio_ * next;
+}
+
 void MatchConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"match/max_angle_ratio", "1", "largest ratio of the angles to the nearest and second nearest (delta)"},
                max_angle_ratio, 0.1, 1.0);
@@ -72,12 +85,6 @@ std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatur
   std::vector<FeatureMatch> matches;
   matchSymmetric(a, b, max_angle_ratio, matches);
   return matches;
-}
-
-void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
-                 std::vector<std::size_t>& matched) {
-  matched.clear();
-  forEachOneWay(a, b, max_angle_ratio, [&matched](const FeatureMatch& match) { matched.push_back(match.a); });
 }
 
 void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
@@ -103,6 +110,29 @@ double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vect
   const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
   std::nth_element(scales.begin(), middle, scales.end());
   return static_cast<double>(*middle);
+}
+
+SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
+                        double max_angle_ratio) {
+  std::vector<bool> seen(features.size(), false);
+  for (const SiftFeatures* neighbour : neighbours) {
+    for (const FeatureMatch& match : matchOneWay(features, *neighbour, max_angle_ratio)) seen[match.a] = true;
+  }
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen[i]) kept.push_back(i);
+  }
+  return features.subset(kept);
+}
+
+void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, double max_angle_ratio,
+                SiftFeatures& kept) {
+  static thread_local std::vector<FeatureMatch> matches;
+  static thread_local std::vector<std::size_t> seen;
+  matchOneWay(features, neighbour, max_angle_ratio, matches);
+  seen.clear();
+  for (const FeatureMatch& match : matches) seen.push_back(match.a);
+  features.subset(seen, kept);
 }
 
 }  // namespace visual_localization

@@ -1,12 +1,11 @@
-#include "visual_localization/features/wgii.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 #include <opencv2/imgproc.hpp>
 
-#include "visual_localization/geo/angles.h"
+#include "base/angles.h"
+#include "features/global_histograms.h"
 
 namespace visual_localization {
 namespace {

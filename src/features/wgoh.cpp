@@ -1,7 +1,7 @@
-#include "visual_localization/features/wgoh.h"
-
 #include <cmath>
 #include <cstdlib>
+
+#include "features/global_histograms.h"
 
 namespace visual_localization {
 namespace {

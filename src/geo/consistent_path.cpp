@@ -1,4 +1,4 @@
-#include "visual_localization/geo/consistent_path.h"
+#include "geo/consistent_path.h"
 
 #include <algorithm>
 #include <cmath>

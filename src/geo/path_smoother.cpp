@@ -1,4 +1,4 @@
-#include "visual_localization/geo/path_smoother.h"
+#include "geo/path_smoother.h"
 
 #include <algorithm>
 #include <array>

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "visual_localization/geo/angles.h"
+#include "base/angles.h"
 #include "visual_localization/geo/geodetic_point.h"
 
 namespace visual_localization {

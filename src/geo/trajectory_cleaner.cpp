@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "visual_localization/geo/angles.h"
-#include "visual_localization/geo/consistent_path.h"
-#include "visual_localization/geo/path_smoother.h"
+#include "base/angles.h"
+#include "geo/consistent_path.h"
+#include "geo/path_smoother.h"
 
 namespace visual_localization {
 namespace {

@@ -1,4 +1,4 @@
-#include "visual_localization/map/extraction_pool.h"
+#include "map/extraction_pool.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "visual_localization/features/contrast.h"
+#include "visual_localization/features/front_end.h"
 
 namespace visual_localization {
 namespace {

@@ -1,10 +1,10 @@
-#include "file_feature_store.h"
+#include "map/file_feature_store.h"
 
 #include <exception>
 #include <utility>
 
-#include "map_file.h"
-#include "visual_localization/io/one_line.h"
+#include "base/text.h"
+#include "map/map_rows.h"
 
 namespace visual_localization {
 namespace {
@@ -27,26 +27,26 @@ FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path,
       cache_bytes_(cache_bytes),
       warn_(std::move(warn)),
       database_(std::move(database)),
-      sift_rows_(database_, std::string(map_file::kSelectSift) + kOfOneImage),
-      global_rows_(database_, std::string(map_file::kSelectGlobal) + kOfOneImage),
-      preview_rows_(database_, std::string(map_file::kSelectPreview) + kOfOneImage),
+      sift_rows_(database_, std::string(map_rows::kSelectSift) + kOfOneImage),
+      global_rows_(database_, std::string(map_rows::kSelectGlobal) + kOfOneImage),
+      preview_rows_(database_, std::string(map_rows::kSelectPreview) + kOfOneImage),
       cache_(cache_bytes) {}
 
 std::shared_ptr<const SiftFeatures> FileFeatureStore::sift(std::size_t image) const {
   return get<SiftFeatures>(2 * image, [&] {
     return read(image, sift_rows_, "features",
-                [&](const sqlite::Statement& row) { return map_file::siftOf(row, feature_counts_[image]); });
+                [&](const sqlite::Statement& row) { return map_rows::siftOf(row, feature_counts_[image]); });
   });
 }
 
 std::shared_ptr<const GlobalFeatures> FileFeatureStore::global(std::size_t image) const {
   return get<GlobalFeatures>(2 * image + 1,
-                             [&] { return read(image, global_rows_, "global features", map_file::globalOf); });
+                             [&] { return read(image, global_rows_, "global features", map_rows::globalOf); });
 }
 
 std::vector<std::uint8_t> FileFeatureStore::preview(std::size_t image) const {
   const std::lock_guard<std::mutex> lock(reading_);
-  return read(image, preview_rows_, "preview", map_file::previewOf);
+  return read(image, preview_rows_, "preview", map_rows::previewOf);
 }
 
 std::size_t FileFeatureStore::globalsKept() const {
@@ -76,7 +76,7 @@ auto FileFeatureStore::read(std::size_t image, sqlite::Statement& row, const cha
   try {
     row.reset();
     row.bind(0, static_cast<std::int64_t>(image));
-    if (!row.step()) throw map_file::Refusal("they are missing");
+    if (!row.step()) throw map_rows::Refusal("they are missing");
     auto value = decode(row);
     row.reset();
     return value;
@@ -89,7 +89,7 @@ auto FileFeatureStore::read(std::size_t image, sqlite::Statement& row, const cha
 
 void FileFeatureStore::warnOnce(std::size_t image, const char* what, const std::string& reason) const {
   if (std::exchange(warned_, true) || !warn_) return;
-  warn_(path_ + ": " + what + " of " + map_file::imageName(static_cast<std::int64_t>(image)) +
+  warn_(path_ + ": " + what + " of " + map_rows::imageName(static_cast<std::int64_t>(image)) +
         " cannot be used: " + oneLine(reason) +
         "; it counts as without features, and so does any other such image from now on without a word");
 }

@@ -1,10 +1,10 @@
-#include "visual_localization/map/image_spool.h"
+#include "map/image_spool.h"
 
 #include <utility>
 
-#include "visual_localization/io/partial_file.h"
-#include "visual_localization/map/map_store.h"
-#include "visual_localization/map/map_writer.h"
+#include "base/files.h"
+#include "map/map_writer.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
 namespace {

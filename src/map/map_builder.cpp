@@ -7,10 +7,12 @@
 
 #include <GeographicLib/Geodesic.hpp>
 
-#include "visual_localization/features/pruning.h"
-#include "visual_localization/map/image_fit.h"
-#include "visual_localization/map/map_writer.h"
-#include "visual_localization/map/pruning_neighbours.h"
+#include "map/extraction_pool.h"
+#include "map/image_spool.h"
+#include "map/map_writer.h"
+#include "map/pruning_neighbours.h"
+#include "visual_localization/features/front_end.h"
+#include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -112,9 +114,10 @@ std::vector<std::string> MapBuilderConfig::violations() const {
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources)
     : config_(validated(config)),
-      extraction_(config_.sift, config_.sift_backend, config_.preview_width_px, resources.threads),
+      extraction_(std::make_unique<ExtractionPool>(config_.sift, config_.sift_backend, config_.preview_width_px,
+                                                   resources.threads)),
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
-      spool_(resources.spool_beside) {
+      spool_(std::make_unique<ImageSpool>(resources.spool_beside)) {
   header_.sift = config_.sift;
 }
 
@@ -178,9 +181,9 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
 }
 
 void MapBuilder::extractWaiting() {
-  for (const TrainingImage& image : extraction_.extract(waiting_)) {
+  for (const TrainingImage& image : extraction_->extract(waiting_)) {
     report_.features_extracted += image.sift.size();
-    spool_.append(image);
+    spool_->append(image);
   }
   waiting_.clear();
 }
@@ -188,7 +191,7 @@ void MapBuilder::extractWaiting() {
 void MapBuilder::prune(const Sink& sink, const BuildProgress& progress) {
   if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
   extractWaiting();
-  const std::shared_ptr<const TrainingMap> unpruned = spool_.finish(header_);
+  const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
   const PruningNeighbours neighbours_of(*unpruned);
   report_.features_kept = 0;
   for (std::size_t i = 0; i < unpruned->size(); ++i) {

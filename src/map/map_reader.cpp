@@ -5,18 +5,18 @@
 #include <string>
 #include <utility>
 
-#include "file_feature_store.h"
-#include "map_file.h"
-#include "visual_localization/io/one_line.h"
-#include "visual_localization/map/map_schema.h"
-#include "visual_localization/map/map_store.h"
-#include "visual_localization/map/sqlite.h"
+#include "base/text.h"
+#include "map/file_feature_store.h"
+#include "map/map_rows.h"
+#include "map/map_schema.h"
+#include "map/sqlite.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
 namespace {
 
-using map_file::imageName;
-using map_file::Refusal;
+using map_rows::imageName;
+using map_rows::Refusal;
 using map_schema::ImageRow;
 using sqlite::Statement;
 
@@ -31,7 +31,7 @@ ParameterValue metaValue(const Statement& row) {
   }
 }
 
-ParameterValues readMeta(const sqlite::Database& database, map_file::Budget& budget) {
+ParameterValues readMeta(const sqlite::Database& database, map_rows::Budget& budget) {
   ParameterValues meta;
   Statement row(database, "SELECT key, value FROM meta ORDER BY key");
   while (row.step()) {
@@ -114,11 +114,11 @@ TrainingPlaces readPlaces(const sqlite::Database& database, std::int64_t file_si
 struct Opened {
   MapHeader header;
   TrainingPlaces places;
-  map_file::Budget budget;  ///< for the rest
+  map_rows::Budget budget;  ///< for the rest
 };
 
 Opened readPlacesAndHeader(const sqlite::Database& database, std::int64_t file_size) {
-  map_file::Budget budget(file_size);
+  map_rows::Budget budget(file_size);
   ParameterValues meta = readMeta(database, budget);
   const std::int64_t expected = takeChecksum(meta);
   map_schema::Checksum checksum;
@@ -146,17 +146,17 @@ std::uint64_t storedBytes(const TrainingImage& image) {
 void forEachImage(const sqlite::Database& database, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
   const TrainingPlaces& places = opened.places;
   const std::string in_order = " ORDER BY image";
-  Statement sift(database, map_file::kSelectSift + in_order);
-  Statement global(database, map_file::kSelectGlobal + in_order);
-  Statement preview(database, map_file::kSelectPreview + in_order);
+  Statement sift(database, map_rows::kSelectSift + in_order);
+  Statement global(database, map_rows::kSelectGlobal + in_order);
+  Statement preview(database, map_rows::kSelectPreview + in_order);
   for (std::size_t i = 0; i < places.size(); ++i) {
     stepTo(i, sift, "features");
     stepTo(i, global, "global features");
     stepTo(i, preview, "bytes of the preview");
     TrainingImage image{{places.stamps_ns[i], places.sessions[i], places.positions_m[i], places.yaws_rad[i]},
-                        map_file::siftOf(sift, places.feature_counts[i]),
-                        map_file::globalOf(global),
-                        map_file::previewOf(preview)};
+                        map_rows::siftOf(sift, places.feature_counts[i]),
+                        map_rows::globalOf(global),
+                        map_rows::previewOf(preview)};
     opened.budget.spend(storedBytes(image));
     use(std::move(image));
   }
@@ -182,8 +182,8 @@ void requireIntegrity(const sqlite::Database& database) {
 template <class Read>
 auto withMapFile(const std::string& path, Read read) {
   try {
-    const std::int64_t size = map_file::fileSize(path);
-    return read(map_file::open(path, size), size);
+    const std::int64_t size = map_rows::fileSize(path);
+    return read(map_rows::open(path, size), size);
   } catch (const Refusal& refusal) {
     throw MapStoreError(path + ": " + oneLine(refusal.what()));
   } catch (const std::bad_alloc&) {
@@ -218,7 +218,7 @@ void checkMap(const std::string& path) {
 
 std::string packageVersionOf(const std::string& path) {
   return withMapFile(path, [](const sqlite::Database& database, std::int64_t size) {
-    map_file::Budget budget(size);
+    map_rows::Budget budget(size);
     const ParameterValues meta = readMeta(database, budget);
     const auto found = meta.find("package_version");
     if (found == meta.end()) throw Refusal("is damaged: it has no package version");

@@ -1,4 +1,4 @@
-#include "visual_localization/map/map_schema.h"
+#include "map/map_schema.h"
 
 #include <cmath>
 #include <cstring>

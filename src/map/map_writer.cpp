@@ -1,13 +1,13 @@
-#include "visual_localization/map/map_writer.h"
+#include "map/map_writer.h"
 
 #include <cstdint>
 #include <initializer_list>
 #include <vector>
 
-#include "visual_localization/io/partial_file.h"
-#include "visual_localization/map/map_schema.h"
-#include "visual_localization/map/map_store.h"
-#include "visual_localization/map/sqlite.h"
+#include "base/files.h"
+#include "map/map_schema.h"
+#include "map/sqlite.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
 namespace {

@@ -1,8 +1,8 @@
-#include "visual_localization/map/pruning_neighbours.h"
+#include "map/pruning_neighbours.h"
 
 #include <algorithm>
 
-#include "visual_localization/map/same_view.h"
+#include "map/same_view.h"
 
 namespace visual_localization {
 namespace {

@@ -1,4 +1,4 @@
-#include "visual_localization/map/sqlite.h"
+#include "map/sqlite.h"
 
 #include <algorithm>
 #include <cstring>

@@ -5,8 +5,17 @@
 #include <string>
 #include <utility>
 
+#include "map/feature_store.h"
+#include "map/position_index.h"
+
 namespace visual_localization {
 namespace {
+
+/// A pointer that owns nothing, for what lives as long as the store: no count that threads would contend for.
+template <class T>
+std::shared_ptr<const T> unowned(const T& value) {
+  return {std::shared_ptr<const T>(), &value};
+}
 
 [[noreturn]] void refuse(std::size_t image, const std::string& reason) {
   throw std::invalid_argument("training map: image " + std::to_string(image) + ": " + reason);
@@ -46,13 +55,53 @@ Area boundingBox(const std::vector<Eigen::Vector2d>& positions_m) {
 
 }  // namespace
 
+void TrainingPlaces::reserve(std::size_t count) {
+  positions_m.reserve(count);
+  yaws_rad.reserve(count);
+  stamps_ns.reserve(count);
+  sessions.reserve(count);
+  feature_counts.reserve(count);
+}
+
+void TrainingPlaces::add(const TrainingPlace& place, std::size_t feature_count) {
+  positions_m.push_back(place.position_m);
+  yaws_rad.push_back(place.yaw_rad);
+  stamps_ns.push_back(place.stamp_ns);
+  sessions.push_back(place.session);
+  feature_counts.push_back(static_cast<std::uint32_t>(feature_count));
+}
+
+TrainingPlaces placesOf(const std::vector<TrainingImage>& images) {
+  TrainingPlaces places;
+  places.reserve(images.size());
+  for (const TrainingImage& image : images) places.add(image, image.sift.size());
+  return places;
+}
+
+MemoryFeatureStore::MemoryFeatureStore(std::vector<TrainingImage>&& images) {
+  sift_.reserve(images.size());
+  global_.reserve(images.size());
+  previews_.reserve(images.size());
+  for (TrainingImage& image : images) {
+    sift_.push_back(std::move(image.sift));
+    global_.push_back(image.global);
+    previews_.push_back(std::move(image.preview_jpeg));
+  }
+}
+
+std::shared_ptr<const SiftFeatures> MemoryFeatureStore::sift(std::size_t image) const { return unowned(sift_[image]); }
+
+std::shared_ptr<const GlobalFeatures> MemoryFeatureStore::global(std::size_t image) const {
+  return unowned(global_[image]);
+}
+
 TrainingMap::TrainingMap(MapHeader header, std::vector<TrainingImage> images)
     : header_(std::move(header)),
       frame_(header_.datum),
       places_(checked(header_, placesOf(images))),
       store_(std::make_unique<MemoryFeatureStore>(std::move(images))),
       area_(boundingBox(places_.positions_m)),
-      index_(places_.positions_m) {}
+      index_(std::make_unique<const PositionIndex>(places_.positions_m)) {}
 
 TrainingMap::TrainingMap(MapHeader header, TrainingPlaces places, std::unique_ptr<const FeatureStore> store)
     : header_(std::move(header)),
@@ -60,7 +109,17 @@ TrainingMap::TrainingMap(MapHeader header, TrainingPlaces places, std::unique_pt
       places_(checked(header_, std::move(places))),
       store_(std::move(store)),
       area_(boundingBox(places_.positions_m)),
-      index_(places_.positions_m) {}
+      index_(std::make_unique<const PositionIndex>(places_.positions_m)) {}
+
+TrainingMap::~TrainingMap() = default;
+
+std::shared_ptr<const SiftFeatures> TrainingMap::sift(std::size_t i) const { return store_->sift(i); }
+
+std::shared_ptr<const GlobalFeatures> TrainingMap::global(std::size_t i) const { return store_->global(i); }
+
+std::vector<std::uint8_t> TrainingMap::preview(std::size_t i) const { return store_->preview(i); }
+
+std::size_t TrainingMap::globalsKept() const { return store_->globalsKept(); }
 
 TrainingPlace TrainingMap::place(std::size_t i) const {
   return {places_.stamps_ns[i], places_.sessions[i], places_.positions_m[i], places_.yaws_rad[i]};
@@ -70,7 +129,7 @@ TrainingImage TrainingMap::image(std::size_t i) const {
   return {place(i), *store_->sift(i), *store_->global(i), store_->preview(i)};
 }
 
-Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const { return index_.nearest(position_m); }
+Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const { return index_->nearest(position_m); }
 
 std::vector<Neighbour> TrainingMap::nearest(const Eigen::Vector2d& position_m, std::size_t count) const {
   std::vector<Neighbour> found;
@@ -79,7 +138,7 @@ std::vector<Neighbour> TrainingMap::nearest(const Eigen::Vector2d& position_m, s
 }
 
 void TrainingMap::nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
-  index_.nearest(position_m, count, found);
+  index_->nearest(position_m, count, found);
 }
 
 }  // namespace visual_localization

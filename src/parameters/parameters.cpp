@@ -7,7 +7,19 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "visual_localization/parameters/yaml_map.h"
+#include "base/text.h"
+#include "parameters/yaml_map.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::size_t kLongestError = 10000;  ///< characters; with room for a list of all names
+
+}  // namespace
+
+ParameterError::ParameterError(const std::string& text) : std::runtime_error(oneLine(text, kLongestError)) {}
+
+}  // namespace visual_localization
 
 namespace visual_localization::parameters {
 namespace {

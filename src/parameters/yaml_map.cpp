@@ -1,4 +1,4 @@
-#include "visual_localization/parameters/yaml_map.h"
+#include "parameters/yaml_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,7 @@
 
 #include <yaml-cpp/eventhandler.h>
 
-#include "visual_localization/io/partial_file.h"
-#include "visual_localization/io/read_file.h"
+#include "base/files.h"
 
 namespace visual_localization::parameters {
 namespace {

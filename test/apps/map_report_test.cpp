@@ -1,4 +1,4 @@
-#include "src/apps/map_report.h"
+#include "apps/map_report.h"
 
 #include <sstream>
 
@@ -7,7 +7,7 @@
 
 #include "test/support/example_map.h"
 #include "test/support/temporary_folder.h"
-#include "visual_localization/map/map_store.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization::apps {
 namespace {

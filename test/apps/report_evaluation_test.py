@@ -146,15 +146,15 @@ class ReportTest(unittest.TestCase):
         text = self.report(figures=('error', 'comparisons'))
         self.assertIn('| DPSO-80 | 3.00 ± 0.50 | 2.54 <sup>1</sup> | 20.0 | 25.9 <sup>1</sup> |', text)
         self.assertIn('Papers: <sup>1</sup> Kronfeld et al. (journal), Table 1.', text)
-        self.assertIn('- Comparisons per image of `DPSO-80` over `PF-l-100`: 0.40 here, 0.61 in the papers: '
+        self.assertIn('- Comparisons per image, `DPSO-80` / `PF-l-100`: 0.40 here, 0.61 in the papers: '
                       '**differs** (-35 %).',
                       text)
-        self.assertIn('- Mean error of `DPSO-80` over `PF-l-300`: 1.20 here, 1.07 in the papers: agrees (+12 %).', text)
+        self.assertIn('- Mean error, `DPSO-80` / `PF-l-300`: 1.20 here, 1.07 in the papers: agrees (+12 %).', text)
         self.assertIn('Here: `PF-l-300` < `PF-l-100` < `DPSO-80`. Papers: `PF-l-300` < `DPSO-80` < `PF-l-100`. '
-                      '2 of 3 pairs are in the papers\' order. Turned: `DPSO-80` before `PF-l-100` in the papers '
-                      '(2.54 and 2.8), here behind it (3 and 2.9).', text)
+                      '2 of 3 pairs are in the papers\' order. Reversed: `DPSO-80` and `PF-l-100` (papers 2.54 < 2.8, '
+                      'here 3 ≥ 2.9).', text)
         self.assertIn('2 of 4 ratios agree with the papers within 25 %; 4 of 6 pairs', text)
-        self.assertIn('## Why\n\nBecause of the light.\n\n- and of *this*\n', text)
+        self.assertIn('## Discussion\n\nBecause of the light.\n\n- and of *this*\n', text)
         self.assertIn('a paper \\| its Table', text)
 
     def test_sources_that_differ_are_both_shown(self):
@@ -165,8 +165,8 @@ class ReportTest(unittest.TestCase):
         text = self.report(figures=('kidnapped', 'error', 'comparisons'))
         self.assertIn('5.58 ± 14.2 <sup>1</sup> / 6.10 ± 2.34 <sup>2</sup>', text)
         self.assertIn('2.56 ± 0.71 <sup>1</sup> |', text)
-        self.assertIn('- Mean error of `adaptive, paper recovery, kidnapped` over `not adaptive, kidnapped`:', text)
-        self.assertIn('- Mean error of `not adaptive, kidnapped` over `not adaptive`:', text)
+        self.assertIn('- Mean error, `adaptive, paper recovery, kidnapped` / `not adaptive, kidnapped`:', text)
+        self.assertIn('- Mean error, `not adaptive, kidnapped` / `not adaptive`:', text)
 
     def test_speeds_stand_in_one_table(self):
         evaluation = self.evaluation('speed')
@@ -177,7 +177,7 @@ class ReportTest(unittest.TestCase):
         text = self.report(figures=('speed', 'comparisons'))
         self.assertIn('| simulated speed | adaptive | adaptive (papers) | not adaptive | not adaptive (papers) |', text)
         self.assertIn('| 3 x | 2.90 | 3.20 <sup>1</sup> | 6.50 | 5.89 <sup>1</sup> |', text)
-        self.assertIn('- Mean error of `adaptive 4x` over `not adaptive 4x`: 0.40 here, 0.39 in the papers: '
+        self.assertIn('- Mean error, `adaptive 4x` / `not adaptive 4x`: 0.40 here, 0.39 in the papers: '
                       'agrees (+2 %).', text)
 
     def test_single_runs_are_drawn(self):
@@ -189,7 +189,7 @@ class ReportTest(unittest.TestCase):
             evaluation.trace(name, swarm=name.startswith('DPSO'))
         evaluation.write()
         text = self.report(figures=('run', 'diversity', 'diversity_filters'))
-        self.assertIn('The papers have no numbers', text)
+        self.assertIn('The papers give no numbers for this experiment.', text)
 
     def test_motion_grid_has_the_shape_of_the_table(self):
         evaluation = self.evaluation('motion_grid')
@@ -241,7 +241,8 @@ class ReportTest(unittest.TestCase):
         evaluation.rows[0]['mean_err_m'], evaluation.rows[1]['mean_err_m'] = 2.5, 2.25
         evaluation.write()
         text = self.report(figures=('error_over_images', 'error'))
-        self.assertIn('- `hybrid 100`: +0.25 m mean error against 300 particles here, +0.15 m in the paper', text)
+        self.assertIn('- `hybrid 100`: mean error +0.25 m relative to 300 particles here, +0.15 m in the paper', text)
+        self.assertNotIn('\n.\n', text)  # no tally: nothing has a ratio or an order
 
     def test_thresholds_are_read_from_settings_or_names(self):
         evaluation = self.evaluation('thresholds')
@@ -308,7 +309,7 @@ class ReportTest(unittest.TestCase):
         evaluation.write()
         papers = self.papers(('own', SAME, 'A', 'mean_err_m', '1.0'), ('own', SAME, 'b', 'mean_err_m', '1.5'))
         text = self.report('--papers', papers, '--format', 'png')
-        self.assertIn('- Mean error of `A` over `B`: 0.50 here, 0.67 in the papers: agrees (-25 %).', text)
+        self.assertIn('- Mean error, `A` / `B`: 0.50 here, 0.67 in the papers: agrees (-25 %).', text)
         self.assertTrue((self.folder / 'figures/error.png').read_bytes().startswith(b'\x89PNG'))
 
     def test_damaged_files_are_refused(self):

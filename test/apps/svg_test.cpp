@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "src/apps/svg_panel.h"
-#include "src/apps/trajectory_plot.h"
+#include "apps/svg_panel.h"
+#include "apps/trajectory_plot.h"
 
 namespace visual_localization::apps {
 namespace {

@@ -14,11 +14,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "base/time.h"
 #include "test/benchmark/street_map.h"
-#include "visual_localization/localizer/localizer.h"
-#include "visual_localization/localizer/stopwatch.h"
-#include "visual_localization/map/map_store.h"
-#include "visual_localization/tracking/prior.h"
+#include "visual_localization/localization/localizer.h"
+#include "visual_localization/localization/particles.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization::benchmark {
 namespace {

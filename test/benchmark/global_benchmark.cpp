@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "visual_localization/features/global_extractor.h"
-#include "visual_localization/features/histogram_intersection.h"
+#include "visual_localization/features/global_features.h"
 
 namespace visual_localization::benchmarks {
 namespace {

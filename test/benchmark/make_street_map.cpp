@@ -7,8 +7,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "map/map_writer.h"
 #include "test/benchmark/street_map.h"
-#include "visual_localization/map/map_writer.h"
 
 int main(int argc, char** argv) {
   using namespace visual_localization;

@@ -7,10 +7,10 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/flann.hpp>
 
+#include "features/nearest_descriptors.h"
 #include "test/benchmark/descriptor_sets.h"
-#include "visual_localization/features/nearest_descriptors.h"
 #include "visual_localization/features/sift_matcher.h"
-#include "visual_localization/similarity/sift_similarity.h"
+#include "visual_localization/localization/scores.h"
 
 namespace visual_localization::benchmarks {
 namespace {

@@ -8,9 +8,9 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/features2d.hpp>
 
-#include "visual_localization/localizer/localizer.h"
-#include "visual_localization/ros/bag_reader.h"
-#include "visual_localization/ros/round_recorder.h"
+#include "evaluation/round_recorder.h"
+#include "visual_localization/bag/bag_reader.h"
+#include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
 namespace {

@@ -14,12 +14,11 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "visual_localization/features/sift_descriptor.h"
+#include "features/sift/descriptor.h"
+#include "features/sift/extrema.h"
+#include "features/sift/orientation.h"
+#include "features/sift/scale_space.h"
 #include "visual_localization/features/sift_extractor.h"
-#include "visual_localization/features/sift_extrema.h"
-#include "visual_localization/features/sift_orientation.h"
-#include "visual_localization/features/sift_refinement.h"
-#include "visual_localization/features/sift_scale_space.h"
 
 namespace visual_localization {
 namespace {

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "visual_localization/features/subimage_grid.h"
-#include "visual_localization/geo/angles.h"
+#include "base/angles.h"
+#include "features/global_histograms.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::benchmark {

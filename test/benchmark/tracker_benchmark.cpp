@@ -4,9 +4,9 @@
 
 #include <benchmark/benchmark.h>
 
+#include "localization/dpso.h"
 #include "test/support/world.h"
-#include "visual_localization/tracking/dpso.h"
-#include "visual_localization/tracking/particle_filter.h"
+#include "visual_localization/localization/particle_filter.h"
 
 namespace visual_localization::benchmarks {
 namespace {

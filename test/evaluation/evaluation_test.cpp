@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "visual_localization/evaluation/error_statistics.h"
-#include "visual_localization/evaluation/track_csv.h"
+#include "evaluation/metrics.h"
+#include "evaluation/track_csv.h"
 
 namespace visual_localization {
 namespace {

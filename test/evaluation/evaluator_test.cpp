@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/evaluator.h"
+#include "evaluation/evaluator.h"
 
 #include <filesystem>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/experiment.h"
+#include "evaluation/experiment.h"
 
 #include <algorithm>
 #include <filesystem>

@@ -1,10 +1,10 @@
-#include "visual_localization/evaluation/image_order.h"
-
 #include <algorithm>
 #include <stdexcept>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "evaluation/drive_order.h"
 
 namespace visual_localization {
 namespace {

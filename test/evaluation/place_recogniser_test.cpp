@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "evaluation/place_recogniser_factory.h"
 #include "test/evaluation/place_rows.h"
-#include "visual_localization/evaluation/place_recogniser_factory.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {

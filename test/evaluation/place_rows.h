@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "visual_localization/evaluation/place_recogniser.h"
+#include "evaluation/place_recogniser.h"
 
 namespace visual_localization::test {
 

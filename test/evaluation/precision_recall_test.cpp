@@ -1,10 +1,10 @@
-#include "visual_localization/evaluation/precision_recall.h"
-
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
+
+#include "evaluation/metrics.h"
 
 namespace visual_localization {
 namespace {

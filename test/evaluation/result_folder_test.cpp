@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/result_folder.h"
+#include "evaluation/result_folder.h"
 
 #include <filesystem>
 #include <functional>
@@ -6,8 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/files.h"
 #include "test/evaluation/small_experiment.h"
-#include "visual_localization/io/partial_file.h"
 
 namespace visual_localization {
 namespace {

@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/result_tables.h"
+#include "evaluation/result_tables.h"
 
 #include <map>
 

@@ -1,9 +1,9 @@
-#include "visual_localization/evaluation/route.h"
-
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "evaluation/place_recogniser.h"
 
 namespace visual_localization {
 namespace {

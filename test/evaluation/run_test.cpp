@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/run.h"
+#include "evaluation/run.h"
 
 #include <gtest/gtest.h>
 

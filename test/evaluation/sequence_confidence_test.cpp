@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "evaluation/sequence_matcher.h"
 #include "test/evaluation/place_rows.h"
-#include "visual_localization/evaluation/sequence_matcher.h"
 
 namespace visual_localization {
 namespace {

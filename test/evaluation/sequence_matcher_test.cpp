@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/sequence_matcher.h"
+#include "evaluation/sequence_matcher.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "evaluation/place_recogniser.h"
 #include "test/evaluation/place_rows.h"
-#include "visual_localization/evaluation/best_single_image.h"
 
 namespace visual_localization {
 namespace {

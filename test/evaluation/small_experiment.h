@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/evaluator.h"
+#include "evaluation/result_tables.h"
 #include "test/support/synthetic.h"
 #include "test/support/temporary_folder.h"
-#include "visual_localization/evaluation/evaluator.h"
-#include "visual_localization/evaluation/result_tables.h"
 
 namespace visual_localization::test {
 

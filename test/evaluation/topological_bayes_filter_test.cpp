@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/topological_bayes_filter.h"
+#include "evaluation/topological_bayes_filter.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/trust.h"
+#include "evaluation/trust.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "visual_localization/evaluation/unit_result.h"
+#include "evaluation/unit_result.h"
 
 #include <limits>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "visual_localization/features/gaussian_blur.h"
+#include "features/sift/gaussian_blur.h"
 
 #include <cmath>
 #include <random>

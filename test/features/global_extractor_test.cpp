@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
-#include "visual_localization/features/histogram_intersection.h"
+#include "visual_localization/features/global_features.h"
 
 namespace visual_localization {
 namespace {

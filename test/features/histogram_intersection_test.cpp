@@ -1,5 +1,3 @@
-#include "visual_localization/features/histogram_intersection.h"
-
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -7,7 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "visual_localization/features/subimage_grid.h"
+#include "features/global_histograms.h"
+#include "visual_localization/features/global_features.h"
 
 namespace visual_localization {
 namespace {

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "features/sift/native_sift_extractor.h"
 #include "test/support/allocation_counter.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/features/native_sift_extractor.h"
 
 namespace visual_localization {
 namespace {

@@ -1,4 +1,4 @@
-#include "visual_localization/features/native_sift_extractor.h"
+#include "features/sift/native_sift_extractor.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,12 +1,12 @@
-#include "visual_localization/features/nearest_descriptors.h"
+#include "features/nearest_descriptors.h"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "features/angle_ratio_test.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/features/angle_ratio_test.h"
 
 namespace visual_localization {
 namespace {

@@ -7,9 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/angles.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/features/pruning.h"
-#include "visual_localization/geo/angles.h"
 
 namespace visual_localization {
 namespace {

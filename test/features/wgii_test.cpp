@@ -1,5 +1,3 @@
-#include "visual_localization/features/wgii.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,9 +6,10 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "base/angles.h"
+#include "features/global_histograms.h"
 #include "test/support/pixel_place.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/geo/angles.h"
 
 namespace visual_localization {
 namespace {

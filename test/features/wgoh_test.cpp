@@ -1,14 +1,13 @@
-#include "visual_localization/features/wgoh.h"
-
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "base/angles.h"
+#include "features/global_histograms.h"
 #include "test/support/pixel_place.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/geo/angles.h"
 
 namespace visual_localization {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "test/fuzz/fuzz_support.h"
-#include "visual_localization/ros/bag_reader.h"
+#include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {

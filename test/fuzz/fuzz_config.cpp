@@ -5,9 +5,9 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "evaluation/experiment.h"
 #include "test/fuzz/fuzz_support.h"
-#include "visual_localization/evaluation/experiment.h"
-#include "visual_localization/localizer/localizer_config.h"
+#include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/parameters/parameters.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "test/fuzz/fuzz_support.h"
-#include "visual_localization/map/map_store.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
 namespace {

@@ -11,9 +11,9 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
+#include "node/shared_localizer.h"
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/ros/image_conversion.h"
-#include "visual_localization/ros/initial_pose.h"
 
 namespace visual_localization {
 namespace {

@@ -3,8 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "evaluation/unit_result.h"
 #include "test/fuzz/fuzz_support.h"
-#include "visual_localization/evaluation/unit_result.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace visual_localization;

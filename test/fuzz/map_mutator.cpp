@@ -11,8 +11,8 @@
 
 #include <sqlite3.h>
 
-#include "visual_localization/map/map_schema.h"
-#include "visual_localization/map/map_store.h"
+#include "map/map_schema.h"
+#include "visual_localization/map/map_file.h"
 
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
 

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "visual_localization/geo/angles.h"
+#include "base/angles.h"
 
 namespace visual_localization {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "visual_localization/geo/angles.h"
+#include "base/angles.h"
 #include "visual_localization/geo/local_frame.h"
 
 namespace visual_localization {

@@ -1,8 +1,8 @@
-#include "visual_localization/map/feature_cache.h"
-
 #include <limits>
 
 #include <gtest/gtest.h>
+
+#include "map/file_feature_store.h"
 
 namespace visual_localization {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "test/support/example_map.h"
 #include "test/support/temporary_folder.h"
-#include "visual_localization/map/map_store.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
 namespace {

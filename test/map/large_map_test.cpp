@@ -11,10 +11,10 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include "map/map_writer.h"
 #include "test/support/example_map.h"
 #include "test/support/temporary_folder.h"
-#include "visual_localization/map/map_store.h"
-#include "visual_localization/map/map_writer.h"
+#include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
 namespace {

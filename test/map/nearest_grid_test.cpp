@@ -1,5 +1,3 @@
-#include "visual_localization/map/nearest_grid.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -7,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "map/position_index.h"
 #include "test/support/synthetic.h"
 
 namespace visual_localization {

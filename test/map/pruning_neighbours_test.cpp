@@ -1,9 +1,9 @@
-#include "visual_localization/map/pruning_neighbours.h"
+#include "map/pruning_neighbours.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "visual_localization/geo/angles.h"
+#include "base/angles.h"
 
 namespace visual_localization {
 namespace {

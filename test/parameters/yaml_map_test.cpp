@@ -1,4 +1,4 @@
-#include "visual_localization/parameters/yaml_map.h"
+#include "parameters/yaml_map.h"
 
 #include <functional>
 

@@ -5,7 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "visual_localization/geo/angles.h"
+#include "base/angles.h"
 
 namespace visual_localization::test {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "test/support/synthetic.h"
-#include "visual_localization/similarity/score_cache.h"
-#include "visual_localization/tracking/tracker.h"
+#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/tracker.h"
 
 namespace visual_localization::test {
 

@@ -1,10 +1,10 @@
 #pragma once
 
+#include <memory>
+
 #include <opencv2/core.hpp>
 
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/wgii.h"
-#include "visual_localization/features/wgoh.h"
 
 namespace visual_localization {
 
@@ -20,12 +20,17 @@ namespace visual_localization {
 ///   pixels at the border: image continued        2.1 m /  5.5 m
 class GlobalExtractor {
  public:
+  GlobalExtractor();
+  ~GlobalExtractor();
+  GlobalExtractor(GlobalExtractor&&) noexcept;
+  GlobalExtractor& operator=(GlobalExtractor&&) noexcept;
+
   /// Throws like requireExtractable.
   GlobalFeatures extract(const cv::Mat& grey);
 
  private:
-  Wgoh wgoh_;
-  Wgii wgii_;
+  struct Histograms;
+  std::unique_ptr<Histograms> histograms_;
 };
 
 }  // namespace visual_localization

@@ -16,4 +16,8 @@ struct GlobalFeatures {
   Histogram wgii{};  ///< weighted grid integral invariants (Weiss et al., section II.B)
 };
 
+/// Normalised histogram intersection of Weiss et al., Eq. 1: sum of min(q, d) over the sum of q, in [0, 1]; 0 when the
+/// query is empty.
+double histogramIntersection(const GlobalFeatures::Histogram& query, const GlobalFeatures::Histogram& training);
+
 }  // namespace visual_localization

@@ -32,9 +32,6 @@ std::vector<FeatureMatch> matchOneWay(const SiftFeatures& a, const SiftFeatures&
 /// M*_AB: pairs that are each other's nearest neighbour and pass the ratio test in both directions. In order of a.
 std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
 
-/// Into `matched`: the features of `a` that matchOneWay matches, in order; without memory of its own.
-void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
-                 std::vector<std::size_t>& matched);
 /// The same as above into `matches`; without memory of their own.
 void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
                  std::vector<FeatureMatch>& matches);
@@ -42,8 +39,17 @@ void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_ang
                     std::vector<FeatureMatch>& matches);
 
 /// Median size of the matched features of `a` as a share of their partners' in `b`: how much larger the same things
-/// look, and so how much nearer they are, seen from a. 1 without matches of
-/// sizes above 0.
+/// look, and so how much nearer they are, seen from a. 1 without matches of sizes above 0.
 double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vector<FeatureMatch>& matches);
+
+/// Drops the "noisy" features that appear in one image only (Weiss et al., section III): keeps those of
+/// `features` that match (one way, ratio test) a feature of at least one of `neighbours`. The neighbours are
+/// given unpruned. Order is kept.
+SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
+                        double max_angle_ratio);
+
+/// The same with one neighbour, into `kept`, whose memory is used again.
+void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, double max_angle_ratio,
+                SiftFeatures& kept);
 
 }  // namespace visual_localization

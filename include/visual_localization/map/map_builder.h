@@ -13,11 +13,13 @@
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
-#include "visual_localization/map/extraction_pool.h"
-#include "visual_localization/map/image_spool.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
+
+class ExtractionPool;
+class ImageSpool;
+struct RawImage;
 
 /// How a recorded round becomes training images.
 struct MapBuilderConfig {
@@ -102,10 +104,10 @@ class MapBuilder {
   MapBuildReport report_;
   std::optional<LocalFrame> frame_;
   MapHeader header_;
-  ExtractionPool extraction_;
+  std::unique_ptr<ExtractionPool> extraction_;
   std::vector<RawImage> waiting_;  ///< for extraction
   std::size_t most_waiting_;
-  ImageSpool spool_;  ///< not pruned yet
+  std::unique_ptr<ImageSpool> spool_;  ///< not pruned yet
   std::optional<std::int64_t> last_stamp_ns_;
   std::optional<Eigen::Vector2d> last_kept_m_;
 };

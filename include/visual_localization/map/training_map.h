@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,14 +9,46 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 #include "visual_localization/geo/local_frame.h"
-#include "visual_localization/map/feature_store.h"
-#include "visual_localization/map/position_index.h"
-#include "visual_localization/map/training_image.h"
-#include "visual_localization/map/training_places.h"
 
 namespace visual_localization {
+
+class FeatureStore;
+class PositionIndex;
+
+/// Where and when an image of the map was taken.
+struct TrainingPlace {
+  std::int64_t stamp_ns = 0;
+  int session = 0;                                       ///< which of MapHeader::sessions it came from
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north in the map frame
+  double yaw_rad = 0.0;                                  ///< direction of travel, 0 = east, counter-clockwise
+};
+
+/// One image of the map: where it was taken and what it looked like.
+struct TrainingImage : TrainingPlace {
+  SiftFeatures sift;                       ///< after pruning
+  GlobalFeatures global;                   ///< of the whole image
+  std::vector<std::uint8_t> preview_jpeg;  ///< small grey JPEG for people; may be empty
+};
+
+/// Where the images of a map were taken, image by image: 40 bytes each, all that is always in memory of a large map.
+struct TrainingPlaces {
+  std::vector<Eigen::Vector2d> positions_m;  ///< east, north in the map frame
+  std::vector<double> yaws_rad;              ///< direction of travel, 0 = east, counter-clockwise
+  std::vector<std::int64_t> stamps_ns;
+  std::vector<std::int32_t> sessions;         ///< which of MapHeader::sessions
+  std::vector<std::uint32_t> feature_counts;  ///< SIFT features after pruning
+
+  std::size_t size() const { return stamps_ns.size(); }
+  void reserve(std::size_t count);
+  void add(const TrainingPlace& place, std::size_t feature_count);
+};
+
+/// The places of these images, in their order.
+TrainingPlaces placesOf(const std::vector<TrainingImage>& images);
 
 /// What holds for all images of a map.
 struct MapHeader {
@@ -32,6 +65,12 @@ struct Area {
   Eigen::Vector2d range() const { return max_m - min_m; }
 };
 
+/// A training image and how far it is from the position asked about.
+struct Neighbour {
+  std::size_t image = 0;
+  double distance_m = 0.0;
+};
+
 /// The map: places of the training images in memory with a spatial index over them, and what the images looked like
 /// wherever the store has it. Immutable, so that it can be shared between threads.
 class TrainingMap {
@@ -41,6 +80,7 @@ class TrainingMap {
   TrainingMap(MapHeader header, std::vector<TrainingImage> images);
   /// A map whose images' looks are in `store`. Throws like the other one.
   TrainingMap(MapHeader header, TrainingPlaces places, std::unique_ptr<const FeatureStore> store);
+  ~TrainingMap();
   TrainingMap(const TrainingMap&) = delete;
   TrainingMap& operator=(const TrainingMap&) = delete;
 
@@ -59,11 +99,11 @@ class TrainingMap {
 
   // What training image `i` looked like, for as long as the map and the pointer live. Read from the map's file when it
   // is not in memory: what cannot be read there, or does not agree with its checksum, counts as without features.
-  std::shared_ptr<const SiftFeatures> sift(std::size_t i) const { return store_->sift(i); }
-  std::shared_ptr<const GlobalFeatures> global(std::size_t i) const { return store_->global(i); }
-  std::vector<std::uint8_t> preview(std::size_t i) const { return store_->preview(i); }
-  /// How many images' global features can be in memory at a time; see FeatureStore.
-  std::size_t globalsKept() const { return store_->globalsKept(); }
+  std::shared_ptr<const SiftFeatures> sift(std::size_t i) const;
+  std::shared_ptr<const GlobalFeatures> global(std::size_t i) const;
+  std::vector<std::uint8_t> preview(std::size_t i) const;
+  /// How many images' global features can be in memory at a time; more than any map has when all of them are.
+  std::size_t globalsKept() const;
   /// Everything about it, copied.
   TrainingImage image(std::size_t i) const;
 
@@ -81,7 +121,7 @@ class TrainingMap {
   TrainingPlaces places_;
   std::unique_ptr<const FeatureStore> store_;
   Area area_;
-  PositionIndex index_;
+  std::unique_ptr<const PositionIndex> index_;
 };
 
 }  // namespace visual_localization

@@ -9,7 +9,6 @@
 #include <variant>
 #include <vector>
 
-#include "visual_localization/io/one_line.h"
 #include "visual_localization/parameters/parameter_visitor.h"
 
 namespace visual_localization {
@@ -23,10 +22,7 @@ using ParameterValues = std::map<std::string, ParameterValue>;
 /// value and what would be allowed, in one line.
 class ParameterError : public std::runtime_error {
  public:
-  explicit ParameterError(const std::string& text) : std::runtime_error(oneLine(text, kLongest)) {}
-
- private:
-  static constexpr std::size_t kLongest = 10000;  ///< characters; with room for a list of all names
+  explicit ParameterError(const std::string& text);
 };
 
 namespace parameters {

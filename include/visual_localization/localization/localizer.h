@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "visual_localization/features/front_end.h"
+#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/feature_choice.h"
+#include "visual_localization/localization/localizer_config.h"
+#include "visual_localization/localization/place_check.h"
+#include "visual_localization/localization/place_proposal.h"
+#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/state.h"
+#include "visual_localization/localization/tracker.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// One image in, one estimate out: the whole method. The nodelet, the offline programs and the experiments all
+/// run through this class. Not thread-safe.
+class Localizer {
+ public:
+  /// Starts with an unknown position. Throws ParameterError when `config` is invalid.
+  Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config);
+
+  /// `grey`: 8-bit, one channel, at least 16 x 16; resized to the map's size. Throws std::invalid_argument for
+  /// anything else, and then nothing has changed. An image that repeats the one before to the last bit is no new
+  /// evidence: it gets the same answer, unless the localizer was told something meanwhile. After some of them in a row
+  /// (state/frozen_images, state/frozen_time) the camera counts as frozen, and the position must be confirmed anew.
+  /// With state/frozen_images 0 a repeated image with another stamp is an image like any other.
+  Estimate process(std::int64_t stamp_ns, const cv::Mat& grey);
+  /// The same for an image that knows by itself how to compare: its times and counts of features stay zero.
+  Estimate process(std::int64_t stamp_ns, ComparableImage& image);
+
+  /// Goes on with other parameters from the next image on, without losing the track: another tracker, or another number
+  /// of particles, begins with particles drawn from the present ones; the rest keeps all it knows. The seed holds for
+  /// trackers that are made from now on. Throws ParameterError when `config` is invalid, and then nothing has changed.
+  void configure(const LocalizerConfig& config);
+  /// The position is unknown: anywhere in the map.
+  void relocalize();
+  /// The position is unknown within a prior (see prior.h).
+  void relocalize(const Prior& prior);
+
+  /// Nothing was seen for long: the particles stay, but the position must be confirmed anew. The state until then.
+  LocalizationState doubt();
+
+  const TrainingMap& map() const { return *map_; }
+  const std::vector<Particle>& particles() const { return tracker_->particles(); }
+  /// SIFT features of the last image after pruning, for drawing its matches; empty when there was no need for them.
+  SiftFeatures lastSift() const {
+    const SiftFeatures* sift = front_end_.siftIfExtracted();
+    return sift == nullptr ? SiftFeatures() : *sift;
+  }
+
+ private:
+  /// How often the last image has come, to the last bit.
+  struct Repeats {
+    std::size_t images = 0;        ///< in a row, beyond the first
+    std::size_t at_one_stamp = 0;  ///< of these, the last ones whose stamp did not change either
+    std::int64_t first_ns = 0;
+    std::int64_t last_ns = 0;
+
+    void add(std::int64_t stamp_ns, bool repeated);
+  };
+
+  bool isNews(std::int64_t stamp_ns) const;
+  Estimate look(std::int64_t stamp_ns);
+  Estimate lastAgain(std::int64_t stamp_ns) const;
+  bool isFrozen() const;
+  void configureTracker(const std::string& tracker_before);
+  Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
+                      ComparableImage& image);
+  PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
+
+  std::shared_ptr<const TrainingMap> map_;
+  LocalizerConfig config_;
+  FrontEnd front_end_;
+  SiftSimilarity sift_similarity_;
+  GlobalSimilarity global_similarity_;
+  ScoreCache scores_;
+  PlaceProposal places_;
+  std::unique_ptr<Tracker> tracker_;
+  FeatureChoice choice_;
+  PlaceCheck place_check_;
+  StateAssessor assessor_;
+  std::vector<Neighbour> neighbours_;  ///< of the last estimate
+  TrackerEstimate tracked_;            ///< after the last image
+  std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again
+  Repeats repeats_;
+};
+
+}  // namespace visual_localization

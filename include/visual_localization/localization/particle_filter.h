@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "visual_localization/localization/motion_model.h"
+#include "visual_localization/localization/particles.h"
+#include "visual_localization/localization/tracker.h"
+#include "visual_localization/parameters/parameter_visitor.h"
+
+namespace visual_localization {
+
+/// Parameters of the particle filters; defaults of Weiss et al., section IV.A, and Kronfeld et al. (journal), Table 3.
+struct ParticleFilterConfig {
+  int particles = 300;              ///< m
+  double pull = 0.2;                ///< share of the way to its nearest training image that a particle is moved
+  double random_share = 0.05;       ///< worst particles that are replaced by random ones after each image
+  double gaussian_std_m = 4.0;      ///< step of pf_gaussian per image and axis
+  double rotation_std_deg = 60.0;   ///< sigma_rot of pf_linear
+  double acceleration_std = 0.001;  ///< sigma_acc of pf_linear
+  double initial_speed_m = 1.8;     ///< v_init of pf_linear per image: three times the papers' 0.6 m
+
+  void declare(ParameterVisitor& visitor);
+  std::vector<std::string> violations() const { return {}; }
+};
+
+/// The motion of the tracker called `tracker`, "pf_gaussian" or "pf_linear", with the pull towards the training images.
+/// `map` must outlive it.
+std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
+                                             const TrainingMap& map);
+
+/// Particle filter without odometry (Weiss et al., section IV.A): resample, move, weigh, estimate the weighted
+/// mean, replace the worst by random particles.
+class ParticleFilter final : public Tracker {
+ public:
+  /// `map` must outlive the filter. Starts anywhere in the map's area.
+  ParticleFilter(const TrainingMap& map, std::unique_ptr<MotionModel> motion, const ParticleFilterConfig& config,
+                 const FitnessConfig& fitness, std::uint32_t seed);
+
+  void reset() override { reset(anywhere_); }
+  void reset(const Prior& prior) override;
+  void configure(const TrackerConfig& config) override;
+  TrackerEstimate update(const TrackerInput& input) override;
+  const std::vector<Particle>& particles() const override { return particles_; }
+  TrackerTuning tuning() const override { return {}; }
+
+ private:
+  void resample();
+  void weigh(ScoreCache& scores);
+  TrackerEstimate estimate() const;
+  void injectRandomParticles();
+
+  const TrainingMap& map_;
+  std::unique_ptr<MotionModel> motion_;
+  ParticleFilterConfig config_;
+  FitnessConfig fitness_config_;
+  Random random_;
+  Prior anywhere_;
+  std::vector<Particle> particles_;
+  std::vector<Particle> drawn_;     ///< of the last resampling; kept to save the allocation
+  std::vector<std::size_t> order_;  ///< of the particles by weight
+  Fitness best_;                    ///< of the last image
+  bool seen_an_image_ = false;
+};
+
+}  // namespace visual_localization

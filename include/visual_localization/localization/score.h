@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "visual_localization/parameters/parameter_visitor.h"
+
+namespace visual_localization {
+
+/// Which features images are compared by.
+enum class FeatureKind : std::uint8_t { kSift = 0, kGlobal = 1 };
+
+/// "SIFT", "GLOBAL".
+std::string toString(FeatureKind kind);
+
+/// How alike two images are, and on how much evidence.
+struct Score {
+  double similarity = 0.0;  ///< m in [0, 1]
+  double weight = 0.0;      ///< what counts for a particle, [0, 1]: m, sharpened for global features
+  std::size_t matches = 0;  ///< matched local features behind it; 0 for global features
+  bool recognised = false;  ///< m is good enough to be no accident
+  double scale = 1.0;       ///< median size of the matched features, share of their size in training; 1 without any
+};
+
+/// What a similarity means, for each kind of features.
+struct SimilarityConfig {
+  double sift_recognised = 0.05;   ///< m below this is a bad match (Kronfeld et al. (journal), section 5: 5 %)
+  double global_recognised = 0.6;  ///< the same for global features, whose m is never small
+  double global_exponent = 20.0;   ///< global m is raised to this to be a weight (Weiss et al., section IV.A)
+
+  void declare(ParameterVisitor& visitor);
+  std::vector<std::string> violations() const { return {}; }
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,172 @@
+#include "base/files.h"
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <climits>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace visual_localization {
+namespace {
+
+/// The names of all unfinished files, in a form that a signal handler may read.
+std::array<std::atomic<char*>, 32> unfinished{};
+
+int enlist(const std::string& path) {
+  char* name = ::strdup(path.c_str());
+  for (std::size_t i = 0; name != nullptr && i < unfinished.size(); ++i) {
+    char* expected = nullptr;
+    if (unfinished[i].compare_exchange_strong(expected, name)) return static_cast<int>(i);
+  }
+  std::free(name);
+  return -1;
+}
+
+void strike(int slot) {
+  if (slot >= 0) std::free(unfinished[static_cast<std::size_t>(slot)].exchange(nullptr));
+}
+
+void removeUnfinishedAndDie(int signal_number) {
+  for (auto& slot : unfinished) {
+    const char* name = slot.load();
+    if (name != nullptr) ::unlink(name);
+  }
+  // The handler was reset to the default on entry: whoever waits for this process sees how it ended.
+  ::raise(signal_number);
+}
+
+[[noreturn]] void refuse(const std::string& path, const std::string& reason) {
+  throw FileError(path + ": cannot be written: " + reason);
+}
+
+[[noreturn]] void refuse(const std::string& path, int error) { refuse(path, std::string(std::strerror(error))); }
+
+std::string resolved(const std::string& path) {
+  struct stat status {};
+  if (::lstat(path.c_str(), &status) != 0 || !S_ISLNK(status.st_mode)) return path;
+  std::error_code error;
+  const auto target = std::filesystem::weakly_canonical(path, error);
+  return error ? path : target.string();
+}
+
+std::string folderOf(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+void requireReplaceable(const std::string& shown, const std::string& target) {
+  if (target.empty()) throw FileError("'': cannot be written: the name is empty");
+  struct stat status {};
+  if (::stat(folderOf(target).c_str(), &status) != 0) {
+    refuse(shown, errno == ENOENT ? "its folder does not exist" : std::strerror(errno));
+  }
+  if (!S_ISDIR(status.st_mode)) refuse(shown, folderOf(target) + " is not a folder");
+  if (target.back() == '/') refuse(shown, "it names a folder");
+  if (::stat(target.c_str(), &status) != 0) return;
+  if (S_ISDIR(status.st_mode)) refuse(shown, "it is a folder");
+  if (!S_ISREG(status.st_mode)) refuse(shown, "it is not a regular file");
+}
+
+std::string partialName(const std::string& target) {
+  static std::atomic<unsigned> count{0};
+  return target + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".partial";
+}
+
+/// 0 or the error of flushing `path` (file or folder) to the disk.
+int flush(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return errno;
+  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
+  ::close(descriptor);
+  return error;
+}
+
+[[noreturn]] void refuseToRead(const std::string& path, int error) {
+  throw FileError((path.empty() ? "''" : path) + ": cannot be read: " + std::strerror(error));
+}
+
+}  // namespace
+
+PartialFile::PartialFile(const std::string& target)
+    : shown_(target), target_(resolved(target)), partial_(partialName(target_)) {
+  requireReplaceable(shown_, target_);
+  // A file of this name can only be left over from a killed process that had the same number.
+  ::unlink(partial_.c_str());
+  const int descriptor = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor < 0) refuse(shown_, errno);
+  slot_ = enlist(partial_);
+  ::close(descriptor);
+}
+
+PartialFile::~PartialFile() {
+  if (!committed_) ::unlink(partial_.c_str());
+  strike(slot_);
+}
+
+void PartialFile::commit() {
+  if (const int error = flush(partial_)) refuse(shown_, error);
+  if (std::rename(partial_.c_str(), target_.c_str()) != 0) refuse(shown_, errno);
+  committed_ = true;
+  // The file is in place. That its folder cannot be flushed, as on some network disks, is no failure.
+  flush(folderOf(target_));
+}
+
+void PartialFile::write(const std::string& content) {
+  const int descriptor = ::open(partial_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (descriptor < 0) refuse(shown_, errno);
+  std::size_t written = 0;
+  while (written < content.size()) {
+    const ssize_t count = ::write(descriptor, content.data() + written, content.size() - written);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int error = count < 0 ? errno : ENOSPC;
+      ::close(descriptor);
+      refuse(shown_, error);
+    }
+    written += static_cast<std::size_t>(count);
+  }
+  if (::close(descriptor) != 0) refuse(shown_, errno);
+}
+
+void writeFile(const std::string& path, const std::string& content) {
+  PartialFile file(path);
+  file.write(content);
+  file.commit();
+}
+
+void removePartialFilesOnSignals() {
+  struct sigaction action {};
+  action.sa_handler = removeUnfinishedAndDie;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigemptyset(&action.sa_mask);
+  for (const int signal_number : {SIGHUP, SIGINT, SIGPIPE, SIGTERM}) {
+    struct sigaction current {};
+    // What the caller chose to ignore (nohup) stays ignored.
+    if (::sigaction(signal_number, nullptr, &current) == 0 && current.sa_handler == SIG_IGN) continue;
+    ::sigaction(signal_number, &action, nullptr);
+  }
+  ::signal(SIGXFSZ, SIG_IGN);
+}
+
+std::string readFile(const std::string& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rbe"), std::fclose);
+  if (!file) refuseToRead(path, errno);
+  std::string text;
+  std::array<char, 65536> block{};
+  while (const std::size_t count = std::fread(block.data(), 1, block.size(), file.get())) {
+    text.append(block.data(), count);
+  }
+  if (std::ferror(file.get()) != 0) refuseToRead(path, errno);  // a folder, for instance
+  return text;
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// A jump of the robot that nobody tells it about.
+struct Kidnapping {
+  std::size_t at = 0;  ///< number of images before it
+  std::size_t to = 0;  ///< index of the first image after it
+};
+
+/// The order in which a run sees the images of a closed round: every step one image, starting at `start`, wrapping
+/// at the end, with an optional jump (protocol of Kronfeld et al. (journal), section 6). As many steps as the
+/// round has images. Throws std::invalid_argument, naming the allowed range, for an index beyond the round.
+std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const std::optional<Kidnapping>& kidnapping);
+
+/// How the runs of an experiment go through a round.
+struct RunShape {
+  bool closed = true;      ///< indices wrap; an open round is driven to its end
+  double speed = 1.0;      ///< images of the round per step: at 2 every other one, at 1/2 each one twice
+  bool kidnapped = false;  ///< after half of the run carried by half of the round; closed rounds only
+};
+
+/// The images that the run beginning at `start` sees: once around a closed round, to the end of an open one.
+std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const RunShape& shape);
+
+/// Where the runs begin: every image of a closed round, or of the first half of an open one; `count` of them, evenly
+/// spread, unless that is 0 or more than there are.
+std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_t count);
+
+/// A map with some of its images left out, as when the robot leaves the recorded way.
+struct PartialMap {
+  std::shared_ptr<const TrainingMap> map;
+  std::vector<std::size_t> images;  ///< index in the whole map of each image that is left; empty when all are
+};
+
+/// Leaves out `share` of the images, beginning with image 0.35 * size; all stay when it is 0. At least one stays.
+PartialMap withGap(std::shared_ptr<const TrainingMap> map, double share);
+
+}  // namespace visual_localization

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "evaluation/place_recogniser_factory.h"
+#include "visual_localization/localization/localizer_config.h"
+#include "visual_localization/map/map_builder.h"
+
+namespace visual_localization {
+
+/// One recorded round of an experiment.
+struct RoundSpec {
+  std::string name;
+  std::string bag;    ///< file name as the experiment gives it
+  std::string group;  ///< rounds of one group are summed up together
+  std::string image_topic;
+  std::string fix_topic;    ///< what a map of this round gets its positions from
+  std::string truth_topic;  ///< what estimates are judged by; if it is the fix topic, its cleaned positions
+};
+
+/// One round becomes the map, another one is driven. Indices into Experiment::rounds.
+struct PairSpec {
+  std::size_t map = 0;
+  std::size_t drive = 0;
+};
+
+/// One method under test: a tracker of the localizer, or a place recogniser beside it.
+struct MethodSpec {
+  std::string name;
+  std::string tracker;        ///< "dpso", ... or a name of placeRecogniserNames()
+  LocalizerConfig localizer;  ///< its `features` hold for place recognisers too
+  PlaceRecogniserConfig recogniser;
+  double speed = 1.0;      ///< simulated speed: images of the round per step
+  bool kidnapped = false;  ///< carried to the other side of the round after half of the run
+  double map_gap = 0.0;    ///< share of the map's images that are left out
+  double covered = 0.0;    ///< share of the run, after its half, during which something covers the camera
+  std::vector<std::pair<std::string, std::string>> settings;  ///< all of the above that the experiment sets, as text
+
+  bool isTracker() const;
+};
+
+/// An experiment of the papers: which rounds, which pairs, which methods.
+struct Experiment {
+  std::string name;
+  bool closed = true;  ///< the rounds end where they begin: indices wrap
+  std::vector<RoundSpec> rounds;
+  std::vector<PairSpec> pairs;
+  std::size_t starts = 0;       ///< runs per pair, spread evenly over the start images; 0 = one for every image
+  std::size_t trace_start = 0;  ///< the run whose course is written out
+  MapBuilderConfig map;
+  LocalizerConfig front_end;  ///< extraction, pruning and matching, the same for all methods
+  std::vector<MethodSpec> methods;
+};
+
+/// Reads an experiment's YAML file. Throws ParameterError, in one line that names the file and the key, for anything
+/// unknown, missing or contradictory.
+Experiment readExperiment(const std::string& path);
+/// The same of the file's text; `path` is for messages.
+Experiment parseExperiment(const std::string& yaml, const std::string& path);
+
+}  // namespace visual_localization

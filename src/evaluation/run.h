@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "evaluation/drive_order.h"
+#include "evaluation/experiment.h"
+#include "evaluation/score_table.h"
+#include "visual_localization/localization/estimate.h"
+
+namespace visual_localization {
+
+/// What a method under test says after one image.
+struct Verdict {
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< in the map frame
+  double confidence = 0.0;                               ///< the larger the surer
+  FeatureKind features = FeatureKind::kSift;
+  std::size_t comparisons = 0;       ///< training images compared
+  std::optional<Estimate> estimate;  ///< of a tracker, for tracing
+};
+
+/// A method under test in one run.
+class Contestant {
+ public:
+  virtual ~Contestant() = default;
+  virtual Verdict process(std::int64_t stamp_ns, RecordedImage& image) = 0;
+  /// Mean distance between two particles, metres; 0 for a method without particles. Not cheap.
+  virtual double diversity_m() const { return 0.0; }
+};
+
+/// `seed` makes the runs of one method differ. `closed`: the map is a closed round.
+std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::shared_ptr<const TrainingMap> map,
+                                           std::uint32_t seed, bool closed);
+
+/// Estimates nearer to the truth than this are right.
+constexpr double kRight_m = 5.0;
+/// A robot farther than this from all training images is off the map.
+constexpr double kOffMap_m = 10.0;
+
+/// What happened at one step of a run.
+struct StepRecord {
+  float error_m = std::numeric_limits<float>::quiet_NaN();  ///< NaN when the image has no true position
+  float confidence = 0.0F;
+  std::uint32_t comparisons = 0;
+  bool sift = false;                                    ///< compared by SIFT features
+  LocalizationState state = LocalizationState::kNoMap;  ///< what a tracker's localizer says; others say nothing
+  bool off_map = false;                                 ///< the true position is farther than kOffMap_m from the map
+};
+
+/// A closer look at one step, for the course of a single run.
+struct TraceRecord {
+  std::size_t image = 0;
+  double diversity_m = 0.0;
+  Estimate estimate;
+};
+
+/// One run of one method over one driven round.
+struct RunRecord {
+  std::size_t start = 0;
+  std::vector<StepRecord> steps;
+  std::vector<TraceRecord> trace;       ///< of every step of a tracker, when asked for
+  std::size_t steps_to_localise = 0;    ///< images until the first of three right estimates in a row; all when never
+  std::size_t steps_to_relocalise = 0;  ///< the same after the kidnapping
+  std::size_t sift_extractions = 0;     ///< SIFT extractions that a live image would have needed
+  std::size_t global_extractions = 0;
+  std::size_t sift_comparisons = 0;
+  std::size_t global_comparisons = 0;  ///< those of guided recovery included
+  double method_ms = 0.0;              ///< time of the method itself, without extraction and comparisons
+};
+
+/// Everything that the runs of one pair of rounds share.
+struct RunContext {
+  const PartialMap& map;
+  const Drive& drive;
+  const ScoreTable& table;  ///< of the whole map
+  bool closed = true;
+};
+
+/// Drives from image `start` on (protocol of Kronfeld et al. (journal), section 6).
+RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace);
+
+}  // namespace visual_localization

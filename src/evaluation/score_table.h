@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "visual_localization/features/global_features.h"
+#include "visual_localization/features/sift_features.h"
+#include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/localization/scores.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// One image of a round that is driven, as the front end of the localizer sees it.
+struct DriveImage {
+  std::int64_t stamp_ns = 0;
+  std::optional<GeodeticPoint> truth;  ///< absent when it has no true position
+  SiftFeatures sift;                   ///< pruned by the image recorded before it
+  GlobalFeatures global;
+};
+
+/// A round as images to localise.
+struct Drive {
+  std::vector<DriveImage> images;
+  cv::Size image_size;     ///< pixels
+  double sift_ms = 0.0;    ///< mean time to extract and prune the SIFT features of an image
+  double global_ms = 0.0;  ///< mean time to extract its global features
+};
+
+/// A round in the roles it plays in an experiment; a role it does not play is empty.
+struct RecordedRound {
+  std::shared_ptr<const TrainingMap> map;
+  std::shared_ptr<const Drive> drive;
+};
+
+/// All similarities between a driven round and a map, computed once and shared by all runs of an experiment.
+class ScoreTable {
+ public:
+  struct Entry {
+    double sift = 0.0;  ///< similarity by SIFT
+    double global = 0.0;
+    std::uint32_t matches = 0;  ///< behind `sift`
+    float scale = 1.0F;         ///< of these matches
+  };
+
+  ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads);
+
+  std::size_t trainingImages() const { return training_images_; }
+  const Entry& at(std::size_t drive_image, std::size_t training_image) const {
+    return entries_[drive_image * training_images_ + training_image];
+  }
+  /// Number of SIFT features of an image of the drive.
+  std::size_t siftFeatures(std::size_t drive_image) const { return sift_features_[drive_image]; }
+  /// Mean processor time of one comparison.
+  double siftCompare_ms() const { return sift_compare_ms_; }
+  double globalCompare_ms() const { return global_compare_ms_; }
+
+ private:
+  std::size_t training_images_;
+  std::vector<Entry> entries_;
+  std::vector<std::size_t> sift_features_;
+  double sift_compare_ms_ = 0.0;
+  double global_compare_ms_ = 0.0;
+};
+
+/// One recorded image whose scores are looked up instead of computed. Counts what a live image would have cost.
+class RecordedImage final : public ComparableImage {
+ public:
+  /// All parts must outlive it.
+  RecordedImage(const ScoreTable& table, std::size_t drive_image, const SiftSimilarity& sift,
+                const GlobalSimilarity& global)
+      : table_(table), drive_image_(drive_image), sift_(sift), global_(global) {}
+
+  /// Of the training images only these are in the map, and counted by their place in this list; all when it is empty.
+  void restrictTo(const std::vector<std::size_t>& training_images) { training_images_ = &training_images; }
+  /// Nothing can be seen.
+  void cover() { covered_ = true; }
+
+  Score compare(FeatureKind kind, std::size_t training_image) override;
+  std::size_t siftFeatures() override { return covered_ ? 0 : table_.siftFeatures(drive_image_); }
+  /// Similarities to all training images.
+  void row(FeatureKind kind, std::vector<double>& similarities);
+  std::size_t siftComparisons() const { return sift_comparisons_; }
+  std::size_t globalComparisons() const { return global_comparisons_; }
+
+ private:
+  const ScoreTable& table_;
+  std::size_t drive_image_;
+  const SiftSimilarity& sift_;
+  const GlobalSimilarity& global_;
+  std::size_t trainingImages() const;
+  const ScoreTable::Entry& entry(std::size_t training_image) const;
+
+  const std::vector<std::size_t>* training_images_ = nullptr;
+  bool covered_ = false;
+  std::size_t sift_comparisons_ = 0;
+  std::size_t global_comparisons_ = 0;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,128 @@
+#include "visual_localization/features/front_end.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/time.h"
+#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/geo/geodetic_point.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kNothing = 4.0;  ///< less is noise
+constexpr double kDull = 10.0;    ///< up to here the grey levels are spread to kUsual, less and less up to kEnough
+constexpr double kEnough = 20.0;
+constexpr double kUsual = 40.0;
+constexpr double kMiddle = 128.0;
+
+/// Falls steadily from kDull on: of two successive images one must not be spread and the other left as it is.
+double gainFor(double contrast) {
+  if (contrast < kNothing || contrast >= kEnough) return 1.0;
+  if (contrast <= kDull) return kUsual / contrast;
+  const double largest = kUsual / kDull;
+  return largest + (1.0 - largest) * (contrast - kDull) / (kEnough - kDull);
+}
+
+/// To the last bit; of two images of a camera it looks at the first few pixels only.
+bool areIdentical(const cv::Mat& a, const cv::Mat& b) {
+  if (a.size() != b.size()) return false;
+  for (int row = 0; row < a.rows; ++row) {
+    const auto* pixels = a.ptr<std::uint8_t>(row);
+    if (!std::equal(pixels, pixels + a.cols, b.ptr<std::uint8_t>(row))) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+GreyLevels greyLevelsOf(const cv::Mat& grey) {
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::meanStdDev(grey, mean, deviation);
+  return {mean[0], deviation[0]};
+}
+
+const cv::Mat& withUsualContrast(const cv::Mat& grey, const GreyLevels& levels, cv::Mat& buffer) {
+  const double gain = gainFor(levels.contrast);
+  if (gain == 1.0) return grey;
+  const double spread = std::min(1.0, (gain - 1.0) / (kUsual / kDull - 1.0));
+  const double mean = levels.mean + spread * (kMiddle - levels.mean);
+  grey.convertTo(buffer, CV_8U, gain, mean - gain * levels.mean);
+  return buffer;
+}
+
+FrontEnd::FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune,
+                   double max_image_gap_s, const std::string& sift_backend)
+    : match_(match),
+      image_size_(image_size),
+      prune_(prune),
+      max_image_gap_s_(max_image_gap_s),
+      sift_extractor_(makeSiftExtractor(sift, sift_backend)) {}
+
+void FrontEnd::configure(const MatchConfig& match, bool prune, double max_image_gap_s) {
+  match_ = match;
+  prune_ = prune;
+  max_image_gap_s_ = max_image_gap_s;
+  has_pruned_ = false;
+}
+
+void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
+  const Stopwatch stopwatch;
+  requireExtractable(grey);
+  const cv::Mat& fitting = fitted(grey, image_size_, resized_);
+  const GreyLevels levels = greyLevelsOf(fitting);
+  const cv::Mat& image = withUsualContrast(fitting, levels, spread_);
+  is_repeated_ = current_ && areIdentical(image, current_->grey);
+  if (!is_repeated_) takeImage(image);
+  current_->stamp_ns = stamp_ns;
+  look_ = {levels.mean, levels.contrast, stretchOf(image_size_, grey.size())};
+  extract_ms_ = stopwatch.elapsed_ms();
+}
+
+void FrontEnd::takeImage(const cv::Mat& image) {
+  std::swap(previous_, current_);
+  if (!current_) current_ = Image{};
+  image.copyTo(current_->grey);
+  current_->has_sift = false;
+  has_pruned_ = false;
+  global_.reset();
+}
+
+const SiftFeatures& FrontEnd::sift() {
+  if (has_pruned_) return pruned_;
+  const Stopwatch stopwatch;
+  const SiftFeatures& all = unprunedSift(*current_);
+  constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
+  const bool prunable = prune_ && previousIsClose() && unprunedSift(*previous_).size() >= kLeast;
+  if (prunable) {
+    keepSeenIn(all, previous_->sift, match_.max_angle_ratio, pruned_);
+  } else {
+    pruned_ = all;
+  }
+  has_pruned_ = true;
+  extract_ms_ += stopwatch.elapsed_ms();
+  return pruned_;
+}
+
+const GlobalFeatures& FrontEnd::global() {
+  if (global_) return *global_;
+  const Stopwatch stopwatch;
+  global_ = global_extractor_.extract(current_->grey);
+  extract_ms_ += stopwatch.elapsed_ms();
+  return *global_;
+}
+
+const SiftFeatures& FrontEnd::unprunedSift(Image& image) {
+  if (!image.has_sift) sift_extractor_->extract(image.grey, image.sift);
+  image.has_sift = true;
+  return image.sift;
+}
+
+bool FrontEnd::previousIsClose() const {
+  if (!previous_) return false;
+  const double gap_s = secondsBetween(previous_->stamp_ns, current_->stamp_ns);
+  return gap_s > 0.0 && gap_s <= max_image_gap_s_;
+}
+
+}  // namespace visual_localization

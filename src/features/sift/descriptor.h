@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+
+#include "features/sift/extrema.h"
+#include "features/sift/float_plane.h"
+
+namespace visual_localization {
+
+/// Describes points by histograms of the gradients around them (Lowe 2004, section 6): 4 x 4 cells of 3 sigma x
+/// 3 sigma, turned by the point's angle, with 8 directions each.
+class SiftDescriber {
+ public:
+  /// Writes 128 bytes, a vector of length 512 whose elements were clipped at 0.2 of its length. `level`: the blurred
+  /// image that the point was found in.
+  void describe(const FloatPlane& level, const SiftPoint& point, std::uint8_t* descriptor);
+
+  /// What pixels add to the histograms.
+  struct Samples {
+    static constexpr int kCapacity = 512;
+    static constexpr int kSpace = kCapacity + 16;  ///< whole vectors are written
+    alignas(64) std::int32_t bins[kSpace];         ///< first one of the upper left of the four cells around the pixel
+    alignas(64) float directions[kSpace];          ///< in bins, [0, 8]
+    alignas(64) float upper_left[kSpace];          ///< weight in that cell
+    alignas(64) float upper_right[kSpace];
+    alignas(64) float lower_left[kSpace];
+    alignas(64) float lower_right[kSpace];
+  };
+
+  struct Workspace {
+    GaussianWindow window;
+    Samples samples;
+  };
+
+ private:
+  Workspace work_;
+};
+
+}  // namespace visual_localization

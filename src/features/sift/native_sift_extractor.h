@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "features/sift/descriptor.h"
+#include "features/sift/extrema.h"
+#include "features/sift/orientation.h"
+#include "features/sift/scale_space.h"
+#include "visual_localization/features/sift_extractor.h"
+
+namespace visual_localization {
+
+/// Our own SIFT, for one core and small images: the scale space, detector and descriptor of Lowe 2004 with the
+/// conventions of OpenCV 4.6, so that features of either can be matched with each other. Whole vectors of pixels at
+/// a time, and memory that is kept from image to image.
+class NativeSiftExtractor : public SiftExtractor {
+ public:
+  explicit NativeSiftExtractor(const SiftConfig& config);
+
+  using SiftExtractor::extract;
+  /// Allocates nothing once it has seen the largest image and the most features.
+  void extract(const cv::Mat& grey, SiftFeatures& features) override;
+  const char* backend() const override { return kNativeSift; }
+
+ private:
+  void detect();
+  void detectIn(std::size_t octave);
+  void keepStrongest();
+
+  SiftConfig config_;
+  SiftScaleSpace scale_space_;
+  SiftExtremaSearch search_;
+  SiftOrientations orientations_;
+  SiftDescriber describer_;
+  std::vector<SiftExtremum> extrema_;
+  std::vector<SiftPoint> points_;
+  std::vector<float> responses_;
+  std::vector<SiftKeypoint> keypoints_;    ///< next features, or what is left of those before
+  std::vector<std::uint8_t> descriptors_;  ///< theirs
+};
+
+}  // namespace visual_localization

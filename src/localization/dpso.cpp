@@ -1,0 +1,227 @@
+#include "localization/dpso.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "visual_localization/localization/particles.h"
+#include "visual_localization/localization/tracker_factory.h"
+
+namespace visual_localization {
+namespace {
+
+/// Keeps a particle inside the area and stops the velocity that led out of it.
+void confine(Particle& particle, const Area& area) {
+  for (int axis = 0; axis < 2; ++axis) {
+    const double inside = std::clamp(particle.position_m[axis], area.min_m[axis], area.max_m[axis]);
+    if (inside != particle.position_m[axis]) particle.velocity_m[axis] = 0.0;
+    particle.position_m[axis] = inside;
+  }
+}
+
+/// Length of a displacement in shares of the area's range; an axis without range cannot be travelled.
+double relativeLength(const Eigen::Vector2d& displacement_m, const Eigen::Vector2d& range_m) {
+  double squared = 0.0;
+  for (int axis = 0; axis < 2; ++axis) {
+    if (range_m[axis] <= 0.0) continue;
+    const double share = displacement_m[axis] / range_m[axis];
+    squared += share * share;
+  }
+  return std::sqrt(squared);
+}
+
+double approach(double from, double to, double start, double share) {
+  const double step = std::abs(to - start) * share;
+  return from < to ? std::min(to, from + step) : std::max(to, from - step);
+}
+
+}  // namespace
+
+Dpso::Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed)
+    : map_(map), config_(config), fitness_config_(fitness), random_(seed), area_(map.area()) {
+  particles_.resize(static_cast<std::size_t>(config.particles));
+  fitness_.resize(particles_.size());
+  reset();
+}
+
+void Dpso::reset() {
+  reset(anywhere(area_));
+  position_unknown_ = true;
+}
+
+void Dpso::reset(const Prior& prior) {
+  tuning_ = {config_.v0, 0.0, config_.quantum_share, config_.phi2, false};
+  attractor_m_.reset();
+  centre_of_mass_m_.reset();
+  speed_known_ = false;
+  seen_an_image_ = false;
+  position_unknown_ = false;
+  bad_images_ = 0;
+  for (Particle& particle : particles_) {
+    particle = Particle();
+    particle.position_m = prior(random_);
+    for (int axis = 0; axis < 2; ++axis) {
+      particle.velocity_m[axis] = random_.uniform(-1.0, 1.0) * config_.v0 * range_m()[axis];
+    }
+    particle.weight = 1.0 / static_cast<double>(particles_.size());
+    confine(particle, area_);
+  }
+  assignKinds();
+}
+
+void Dpso::configure(const TrackerConfig& config) {
+  const DpsoConfig before = std::exchange(config_, config.dpso);
+  fitness_config_ = config.fitness;
+  if (config_.v0 != before.v0) tuning_.v0 = config_.v0;
+  if (config_.quantum_share != before.quantum_share) tuning_.quantum_share = config_.quantum_share;
+  if (config_.phi2 != before.phi2) tuning_.phi2 = config_.phi2;
+  tuning_.v0 = std::clamp(tuning_.v0, config_.v0_min, config_.v0_max);
+  if (config_.recovery == "none" && tuning_.recovering) endRecovery();
+  assignKinds();
+}
+
+TrackerEstimate Dpso::update(const TrackerInput& input) {
+  for (Particle& particle : particles_) {
+    if (particle.kind == ParticleKind::kQuantum && isGuided()) {
+      particle.velocity_m.setZero();
+      particle.position_m = map_.position_m(input.places.draw(random_));
+    } else if (seen_an_image_) {
+      particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
+    }
+    confine(particle, area_);
+  }
+  seen_an_image_ = true;
+  const std::size_t best = evaluate(input.scores);
+  // An image that matches nothing says nothing about where to go: the attractor stays where it was.
+  if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
+  TrackerEstimate result = estimate();
+  adaptSpeed();
+  adaptDiversity(result.best);
+  assignKinds();
+  centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
+  return result;
+}
+
+/// The first particles are the quantum ones, the last the high-energy ones, so that a growing quantum share
+/// takes from the standard ones.
+void Dpso::assignKinds() {
+  const auto count = static_cast<double>(particles_.size());
+  const auto quantum = static_cast<std::size_t>(std::lround(tuning_.quantum_share * count));
+  const auto high_energy = static_cast<std::size_t>(std::lround(config_.high_energy_share * count));
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    particles_[i].kind = i < quantum                            ? ParticleKind::kQuantum
+                         : i + high_energy >= particles_.size() ? ParticleKind::kHighEnergy
+                                                                : ParticleKind::kStandard;
+  }
+}
+
+/// Kronfeld et al. (journal), Eq. 4 and 5, with r0 in [-1, 1] so that the swarm does not drift one way.
+void Dpso::move(Particle& particle) {
+  const double factor = particle.kind == ParticleKind::kHighEnergy ? config_.high_energy_factor : 1.0;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double range = range_m()[axis];
+    const double perturbation = config_.phi0 * random_.uniform(-1.0, 1.0) * range * tuning_.v0;
+    const double attraction =
+        attractor_m_ ? tuning_.phi2 * random_.uniform(0.0, 1.0) * ((*attractor_m_)[axis] - particle.position_m[axis])
+                     : 0.0;
+    const double limit = factor * tuning_.v0 * range;
+    const double wanted = config_.inertia * particle.velocity_m[axis] + perturbation + attraction;
+    particle.velocity_m[axis] = std::clamp(wanted, -limit, limit);
+  }
+  particle.position_m += particle.velocity_m;
+}
+
+/// Kronfeld et al. (journal), Eq. 6; anywhere as long as nothing was recognised.
+void Dpso::moveQuantum(Particle& particle) {
+  particle.velocity_m.setZero();
+  particle.position_m = attractor_m_ ? *attractor_m_ + random_.normal(Eigen::Vector2d(config_.quantum_std * range_m()))
+                                     : anywhere(area_)(random_);
+}
+
+/// Whether quantum particles go where the whole image looks alike instead of around the best particle.
+bool Dpso::isGuided() const {
+  if (config_.recovery != "guided") return false;
+  return tuning_.recovering || (config_.guided_start && position_unknown_);
+}
+
+std::size_t Dpso::evaluate(ScoreCache& scores) {
+  std::size_t best = 0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    fitness_[i] = evaluateFitness(particles_[i].position_m, map_, scores, fitness_config_);
+    particles_[i].weight = fitness_[i].value;
+    if (fitness_[i].value > fitness_[best].value) best = i;
+  }
+  normaliseWeights(particles_);
+  return best;
+}
+
+/// The best particle; before any image was recognised, the middle of the cloud.
+TrackerEstimate Dpso::estimate() const {
+  const CloudMoments cloud = momentsOf(particles_);
+  TrackerEstimate result;
+  result.position_m = attractor_m_.value_or(cloud.mean_m);
+  result.training_image = map_.nearest(result.position_m).image;
+  result.mode_covariance_m2 = covarianceAbout(result.position_m, particles_, config_.mode_radius_m);
+  result.cloud_covariance_m2 = scatterAbout(result.position_m, particles_);
+  result.spread_m = cloud.spread();
+  result.best_image = result.training_image;
+  for (const Fitness& fitness : fitness_) {
+    if (fitness.score.similarity <= result.best.similarity) continue;
+    result.best = fitness.score;
+    result.best_image = fitness.training_image;
+  }
+  result.best_distance_m = (map_.position_m(result.best_image) - result.position_m).norm();
+  return result;
+}
+
+/// v_sw: the quantum particles do not travel, so they do not count.
+Eigen::Vector2d Dpso::centreOfMass() const {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double count = 0.0;
+  for (const Particle& particle : particles_) {
+    if (particle.kind == ParticleKind::kQuantum) continue;
+    sum += particle.position_m;
+    count += 1.0;
+  }
+  return count > 0.0 ? Eigen::Vector2d(sum / count) : momentsOf(particles_).mean_m;
+}
+
+/// Holds v0 at about twice the speed of the swarm (journal, section 5, "Self-adaptive parameters").
+void Dpso::adaptSpeed() {
+  const Eigen::Vector2d centre = centreOfMass();
+  if (centre_of_mass_m_) {
+    const double speed = relativeLength(centre - *centre_of_mass_m_, range_m());
+    tuning_.speed_ema =
+        speed_known_ ? (1.0 - config_.ema_alpha) * tuning_.speed_ema + config_.ema_alpha * speed : speed;
+    speed_known_ = true;
+  }
+  if (!config_.adapt_speed || tuning_.recovering || !speed_known_) return;
+  const double ratio = tuning_.speed_ema / tuning_.v0;
+  if (ratio > 0.6) tuning_.v0 *= 1.1;
+  if (ratio < 0.4) tuning_.v0 *= 0.9;
+  tuning_.v0 = std::clamp(tuning_.v0, config_.v0_min, config_.v0_max);
+}
+
+/// Recovery phase of the same section: a best match that stays bad boosts the diversity step by step; the
+/// first good one ends it.
+void Dpso::adaptDiversity(const Score& best) {
+  const bool bad = !best.recognised;
+  if (!bad) position_unknown_ = false;
+  if (config_.recovery == "none") return;
+  bad_images_ = bad ? bad_images_ + 1 : 0;
+  if (!bad && tuning_.recovering) endRecovery();
+  tuning_.recovering = bad_images_ >= config_.recovery_patience;
+  if (!tuning_.recovering) return;
+  tuning_.v0 = approach(tuning_.v0, config_.v0_max, config_.v0, config_.recovery_step);
+  tuning_.quantum_share =
+      approach(tuning_.quantum_share, config_.quantum_share_max, config_.quantum_share, config_.recovery_step);
+  tuning_.phi2 = approach(tuning_.phi2, config_.phi2_min, config_.phi2, config_.recovery_step);
+}
+
+void Dpso::endRecovery() {
+  tuning_ = {config_.v0, tuning_.speed_ema, config_.quantum_share, config_.phi2, false};
+  speed_known_ = false;
+  bad_images_ = 0;
+}
+
+}  // namespace visual_localization

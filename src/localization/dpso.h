@@ -1,0 +1,57 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "visual_localization/localization/dpso_config.h"
+#include "visual_localization/localization/particles.h"
+#include "visual_localization/localization/tracker.h"
+
+namespace visual_localization {
+
+/// Dynamic particle swarm optimisation, Kronfeld et al. (journal), section 5: particles fly towards the best
+/// one of the last image; the best one is the estimate.
+class Dpso final : public Tracker {
+ public:
+  /// `map` must outlive the tracker. Starts anywhere in the map's area.
+  Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed);
+
+  void reset() override;
+  void reset(const Prior& prior) override;
+  /// What has adapted itself to the images stays, unless just that was changed.
+  void configure(const TrackerConfig& config) override;
+  TrackerEstimate update(const TrackerInput& input) override;
+  const std::vector<Particle>& particles() const override { return particles_; }
+  TrackerTuning tuning() const override { return tuning_; }
+
+ private:
+  void assignKinds();
+  void move(Particle& particle);
+  void moveQuantum(Particle& particle);
+  bool isGuided() const;
+  std::size_t evaluate(ScoreCache& scores);
+  TrackerEstimate estimate() const;
+  void adaptSpeed();
+  void adaptDiversity(const Score& best);
+  void endRecovery();
+  Eigen::Vector2d centreOfMass() const;
+  /// What speeds and the reach of quantum particles are shares of.
+  Eigen::Vector2d range_m() const { return area_.range().cwiseMin(config_.max_range_m); }
+
+  const TrainingMap& map_;
+  DpsoConfig config_;
+  FitnessConfig fitness_config_;
+  Random random_;
+  Area area_;
+  TrackerTuning tuning_;
+  std::vector<Particle> particles_;
+  std::vector<Fitness> fitness_;
+  std::optional<Eigen::Vector2d> attractor_m_;       ///< p^n: the best particle of the last image
+  std::optional<Eigen::Vector2d> centre_of_mass_m_;  ///< after the last image
+  bool seen_an_image_ = false;                       ///< since the last reset
+  bool speed_known_ = false;
+  bool position_unknown_ = true;  ///< nothing was recognised since a reset without a prior
+  int bad_images_ = 0;
+};
+
+}  // namespace visual_localization

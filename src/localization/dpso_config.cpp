@@ -1,0 +1,59 @@
+#include "visual_localization/localization/dpso_config.h"
+
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+
+void DpsoConfig::declare(ParameterVisitor& visitor) {
+  visitor.integer({"dpso/particles", "1", "size of the swarm"}, particles, 2, 100000);
+  visitor.real({"dpso/inertia", "1", "share of the velocity that is kept (omega)"}, inertia, 0.0, 1.0);
+  visitor.real({"dpso/phi0", "1", "weight of the random perturbation"}, phi0, 0.0, 10.0);
+  visitor.real({"dpso/phi2", "1", "weight of the attraction to the best particle"}, phi2, 0.0, 4.0);
+  visitor.real({"dpso/quantum_share", "1", "share of quantum particles (q_r)"}, quantum_share, 0.0, 1.0);
+  visitor.real({"dpso/quantum_std", "1", "spread of quantum particles, share of the area's range (q_d)"}, quantum_std,
+               0.0, 1.0);
+  visitor.real({"dpso/high_energy_share", "1", "share of particles allowed a higher speed (h_r)"}, high_energy_share,
+               0.0, 1.0);
+  visitor.real({"dpso/high_energy_factor", "1", "their speed limit in multiples of v0"}, high_energy_factor, 1.0,
+               100.0);
+  visitor.real({"dpso/v0", "1", "initial speed limit per image, share of the area's range"}, v0, 1e-6, 1.0);
+  visitor.flag({"dpso/adapt_speed", "", "keep v0 at about twice the speed of the swarm"}, adapt_speed);
+  visitor.real({"dpso/v0_min", "1", "lower limit of the speed adaptation"}, v0_min, 1e-6, 1.0);
+  visitor.real({"dpso/ema_alpha", "1", "weight of the newest speed in its moving average (alpha)"}, ema_alpha, 0.001,
+               1.0);
+  visitor.choice({"recovery", "",
+                  "when the swarm is lost: search where the image looks alike, widen as in the papers, "
+                  "or nothing"},
+                 recovery, {"guided", "paper", "none"});
+  visitor.flag({"dpso/guided_start", "", "guided also while the position is unknown from the start"}, guided_start);
+  visitor.integer({"dpso/recovery_patience", "1", "bad images in a row before recovery starts"}, recovery_patience, 1,
+                  1000);
+  visitor.real({"dpso/recovery_step", "1", "share of the way to the limits taken per bad image"}, recovery_step, 0.01,
+               1.0);
+  visitor.real({"dpso/v0_max", "1", "speed limit in recovery and of the speed adaptation"}, v0_max, 1e-6, 1.0);
+  visitor.real({"dpso/max_range", "m", "of a larger map, shares of its range are shares of this"}, max_range_m, 1.0,
+               100000.0);
+  visitor.real({"dpso/quantum_share_max", "1", "share of quantum particles in recovery"}, quantum_share_max, 0.0, 1.0);
+  visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);
+  visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
+               1000.0);
+}
+
+std::vector<std::string> DpsoConfig::violations() const {
+  std::vector<std::string> wrong;
+  const auto require = [&wrong](const std::string& name, double value, const std::string& limit_name, double limit) {
+    if (value > limit) wrong.push_back(parameters::exceeds(name, value, limit_name, limit));
+  };
+  require("dpso/v0_min", v0_min, "'dpso/v0'", v0);
+  require("dpso/v0", v0, "'dpso/v0_max'", v0_max);
+  require("dpso/quantum_share", quantum_share, "'dpso/quantum_share_max'", quantum_share_max);
+  require("dpso/phi2_min", phi2_min, "'dpso/phi2'", phi2);
+  // Not by the difference: 1 - 0.9 is less than 0.1.
+  if (quantum_share_max + high_energy_share > 1.0) {
+    wrong.push_back(parameters::exceeds("dpso/quantum_share_max", quantum_share_max, "1 - 'dpso/high_energy_share'",
+                                        1.0 - high_energy_share));
+  }
+  return wrong;
+}
+
+}  // namespace visual_localization

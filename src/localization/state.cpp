@@ -1,0 +1,196 @@
+#include "visual_localization/localization/state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+
+#include "visual_localization/localization/estimate.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+namespace {
+
+/// A short vector is moved sooner than memory is found for a list.
+template <class Value>
+void keepLast(std::size_t count, std::vector<Value>& values) {
+  if (values.size() > count) values.erase(values.begin(), values.end() - static_cast<std::ptrdiff_t>(count));
+}
+
+}  // namespace
+
+std::string toString(LocalizationState state) {
+  switch (state) {
+    case LocalizationState::kNoMap:
+      return "NO_MAP";
+    case LocalizationState::kInitializing:
+      return "INITIALIZING";
+    case LocalizationState::kTracking:
+      return "TRACKING";
+    case LocalizationState::kUncertain:
+      return "UNCERTAIN";
+    case LocalizationState::kRecovering:
+      return "RECOVERING";
+    case LocalizationState::kOffMap:
+      return "OFF_MAP";
+  }
+  return "UNKNOWN";
+}
+
+void Course::add(std::int64_t stamp_ns, const Eigen::Vector2d& position_m) {
+  points_.push_back({stamp_ns, position_m});
+  if (points_.size() > length_) points_.erase(points_.begin());
+}
+
+double Course::residual_m() const {
+  if (points_.size() < 3) return 0.0;
+  const bool timed = stampsRise();
+  const auto count = static_cast<double>(points_.size());
+  const auto timeOf = [&](std::size_t i) {
+    // From the first image on: differences of stamps are exact, stamps as double would not be.
+    return timed ? 1e-9 * static_cast<double>(points_[i].stamp_ns - points_[0].stamp_ns) : static_cast<double>(i);
+  };
+  double mean_time = 0.0;
+  Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    mean_time += timeOf(i) / count;
+    mean_m += points_[i].position_m / count;
+  }
+  double times = 0.0;
+  Eigen::Vector2d products = Eigen::Vector2d::Zero();
+  double squares = 0.0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const double time = timeOf(i) - mean_time;
+    const Eigen::Vector2d offset = points_[i].position_m - mean_m;
+    times += time * time;
+    products += time * offset;
+    squares += offset.squaredNorm();
+  }
+  return std::sqrt(std::max(0.0, squares - products.squaredNorm() / times) / count);
+}
+
+bool Course::stampsRise() const {
+  const auto falls = [](const Point& a, const Point& b) { return b.stamp_ns <= a.stamp_ns; };
+  return std::adjacent_find(points_.begin(), points_.end(), falls) == points_.end();
+}
+
+void StateConfig::declare(ParameterVisitor& visitor) {
+  visitor.real({"state/min_similarity", "1", "a weaker best match by SIFT does not confirm a position"}, min_similarity,
+               0.0, 1.0);
+  visitor.integer({"state/min_matches", "1", "fewer matched SIFT features are no evidence, whatever their share"},
+                  min_matches, 0, 10000);
+  visitor.real(
+      {"state/max_scale", "1",
+       "matched SIFT features that look so many times larger or smaller are seen from too far away to confirm"},
+      max_scale, 1.0, 100.0);
+  visitor.real(
+      {"state/min_global_similarity", "1", "a weaker best match by global features does not confirm a position"},
+      min_global_similarity, 0.0, 1.0);
+  visitor.real({"state/max_distance", "m", "a best match farther from the estimate does not confirm it"},
+               max_distance_m, 0.1, 10000.0);
+  visitor.integer({"state/window", "1", "how many of the last images decide about the state"}, window, 1, 1000);
+  visitor.integer({"state/images_to_confirm", "1", "how many of them must confirm the position for TRACKING"},
+                  images_to_confirm, 1, 1000);
+  visitor.real({"state/max_step", "m", "a larger jump of the estimate between two images voids earlier confirmations"},
+               max_step_m, 0.1, 10000.0);
+  visitor.flag({"state/place_check", "", "ask the global features whether another place of the map looks more alike"},
+               place_check);
+  visitor.real({"state/sure_similarity", "1", "a stronger SIFT match needs no place check"}, sure_similarity, 0.0, 1.0);
+  visitor.real({"state/min_place_ratio", "1",
+                "global similarity here over the best anywhere, mean over the window; below, the position is in doubt"},
+               min_place_ratio, 0.0, 1.0);
+  visitor.integer({"state/place_check_images", "1", "of a larger map the place check looks at so many images only"},
+                  place_check_images, 1, 100'000'000);
+  visitor.integer({"state/course_length", "1", "so many of the last estimates must follow a steady motion"},
+                  course_length, 2, 1000);
+  visitor.real({"state/max_course_residual", "m", "up to this root mean square distance from it"},
+               max_course_residual_m, 0.0, 10000.0);
+  visitor.integer(
+      {"state/off_map_images", "1", "so many images that confirm nothing, with no TRACKING in between, mean OFF_MAP"},
+      off_map_images, 1, 100000);
+  visitor.integer(
+      {"state/min_features", "1", "images with fewer SIFT features are blind and say nothing about OFF_MAP"},
+      min_features, 0, 10000);
+  visitor.integer(
+      {"state/frozen_images", "1",
+       "so many repetitions of an image to the last bit end TRACKING; 0: never, for a simulated camera without noise"},
+      frozen_images, 0, 100000);
+  visitor.real({"state/frozen_time", "s",
+                "but only once they span so much time: a stream may repeat each image to reach its rate"},
+               frozen_time_s, 0.0, 3600.0);
+}
+
+std::vector<std::string> StateConfig::violations() const {
+  if (images_to_confirm <= window) return {};
+  return {parameters::exceeds("state/images_to_confirm", std::int64_t{images_to_confirm}, "'state/window'",
+                              std::int64_t{window})};
+}
+
+void StateAssessor::configure(const StateConfig& config) {
+  if (config.course_length != config_.course_length) course_ = Course(static_cast<std::size_t>(config.course_length));
+  config_ = config;
+}
+
+void StateAssessor::reset() { *this = StateAssessor(config_); }
+
+LocalizationState StateAssessor::doubt(bool recovering) {
+  forget();
+  return stateOf(false, recovering);
+}
+
+LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, const Evidence& evidence) {
+  remember(estimate, evidence);
+  const bool certain = isCertain();
+  ever_confirmed_ = ever_confirmed_ || certain;
+  // Matched local features are of a mapped place, even while the position is not certain.
+  const bool sees_map = lastConfirms() && evidence.features == FeatureKind::kSift;
+  if (certain) unconfirmed_ = 0;
+  if (!certain && !evidence.blind && !sees_map) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
+  return stateOf(certain, evidence.recovering);
+}
+
+LocalizationState StateAssessor::stateOf(bool certain, bool recovering) const {
+  if (unconfirmed_ >= config_.off_map_images) return LocalizationState::kOffMap;
+  if (recovering) return LocalizationState::kRecovering;
+  if (certain) return LocalizationState::kTracking;
+  return ever_confirmed_ ? LocalizationState::kUncertain : LocalizationState::kInitializing;
+}
+
+void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& evidence) {
+  if (last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m) forget();
+  last_position_m_ = estimate.position_m;
+  course_.add(evidence.stamp_ns, estimate.position_m);
+  confirmations_.push_back(confirms(estimate, evidence.features) ? 1 : 0);
+  place_ratios_.push_back(evidence.place_ratio);
+  const auto window = static_cast<std::size_t>(config_.window);
+  keepLast(window, confirmations_);
+  keepLast(window, place_ratios_);
+}
+
+void StateAssessor::forget() {
+  confirmations_.clear();
+  place_ratios_.clear();
+  course_.clear();
+}
+
+bool StateAssessor::isCertain() const {
+  const auto confirmed = std::count(confirmations_.begin(), confirmations_.end(), 1);
+  return confirmed >= config_.images_to_confirm && !isDoubtful() &&
+         course_.residual_m() <= config_.max_course_residual_m;
+}
+
+bool StateAssessor::isDoubtful() const {
+  if (place_ratios_.empty()) return false;
+  const double sum = std::accumulate(place_ratios_.begin(), place_ratios_.end(), 0.0);
+  return sum < config_.min_place_ratio * static_cast<double>(place_ratios_.size());
+}
+
+bool StateAssessor::confirms(const TrackerEstimate& estimate, FeatureKind features) const {
+  if (estimate.best_distance_m > config_.max_distance_m) return false;
+  if (features == FeatureKind::kGlobal) return estimate.best.similarity >= config_.min_global_similarity;
+  return estimate.best.similarity >= config_.min_similarity &&
+         estimate.best.matches >= static_cast<std::size_t>(config_.min_matches) &&
+         estimate.best.scale <= config_.max_scale && estimate.best.scale * config_.max_scale >= 1.0;
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "map/sqlite.h"
+#include "visual_localization/features/global_features.h"
+#include "visual_localization/features/sift_features.h"
+#include "visual_localization/map/training_map.h"
+#include "visual_localization/parameters/parameters.h"
+
+/// What is where in a map file; shared by its reader and its writer.
+namespace visual_localization::map_schema {
+
+/// "vlmp" in the file's header (PRAGMA application_id): tells a map from any other SQLite file.
+constexpr std::int64_t kApplicationId = 0x766C6D70;
+constexpr std::int64_t kMaxImages = 100'000'000;
+constexpr std::int64_t kMaxFeaturesPerImage = 1'000'000;
+constexpr std::int64_t kMinImageSide_px = 16;  ///< smaller ones have no features
+constexpr std::int64_t kMaxImageSide_px = 32768;
+constexpr std::size_t kHistogramBytes = GlobalFeatures::kSize * sizeof(float);
+constexpr std::size_t kKeypointBytes = 16;
+/// Of the largest row that may be read: the features of one image.
+constexpr std::int64_t kMaxRowBytes =
+    kMaxFeaturesPerImage * static_cast<std::int64_t>(kKeypointBytes + SiftFeatures::kDescriptorSize) + 4096;
+
+struct Table {
+  const char* name;
+  const char* sql;
+};
+
+/// All that may be in a map's schema, in order of name.
+extern const std::array<Table, 5> kTables;
+
+/// CRC-32 over a sequence of values, each in one byte order on every machine.
+class Checksum {
+ public:
+  void add(std::int64_t value);
+  void add(double value);
+  void add(const std::string& value);
+  void add(const ParameterValues& values);
+  void addRaw(const std::uint8_t* data, std::size_t size);
+  std::int64_t value() const { return value_; }
+
+ private:
+  std::uint32_t value_ = 0;
+};
+
+/// CRC-32 of some bytes, continuing from `previous`.
+std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous = 0);
+
+/// CRC-32 of a row of a wide table: the number of its image, so that exchanged rows are found, and then its blobs.
+std::int64_t rowChecksum(std::int64_t image, std::initializer_list<sqlite::Bytes> blobs);
+
+/// One row of the table `images`: where an image was taken. All of them are read when a map is opened, so they are
+/// small and hold nothing that only a comparison needs.
+struct ImageRow {
+  std::int64_t id = 0;
+  std::int64_t session = 0;
+  std::int64_t stamp_ns = 0;
+  double east_m = 0.0;
+  double north_m = 0.0;
+  double yaw_rad = 0.0;
+  std::int64_t feature_count = 0;
+
+  void addTo(Checksum& checksum) const;
+};
+
+/// The header as rows of the table `meta`, without the checksum.
+ParameterValues toMeta(const MapHeader& header);
+/// Inverse of toMeta(). Throws std::runtime_error when a value is missing, unknown, of the wrong type or out of
+/// range.
+MapHeader toHeader(ParameterValues meta);
+
+/// Four little-endian 32-bit floats a keypoint: x, y, size, angle.
+std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints);
+/// Inverse of packKeypoints(). Throws std::runtime_error when a value is not finite.
+std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes);
+
+/// 128 little-endian 32-bit floats.
+std::vector<std::uint8_t> packHistogram(const GlobalFeatures::Histogram& histogram);
+/// Inverse of packHistogram(). Throws std::runtime_error when the size is wrong or a value is not finite or negative.
+GlobalFeatures::Histogram unpackHistogram(sqlite::Bytes bytes);
+
+}  // namespace visual_localization::map_schema

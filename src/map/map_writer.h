@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// Writes a map image by image, so that it need not fit into memory; only the places are kept until the end. One SQLite
+/// file, filled in one transaction under a temporary name beside its own: without finish() nothing has happened.
+class MapWriter {
+ public:
+  /// Throws MapStoreError when the file cannot be made.
+  explicit MapWriter(const std::string& path);
+  ~MapWriter();
+  MapWriter(const MapWriter&) = delete;
+  MapWriter& operator=(const MapWriter&) = delete;
+
+  /// The next image. Throws MapStoreError, for instance when the disk is full or the image has too many features.
+  void append(const TrainingImage& image);
+  std::size_t size() const;
+  /// Puts the file in its place. To be called once. Throws MapStoreError.
+  void finish(const MapHeader& header);
+
+ private:
+  class Tables;
+
+  std::string path_;
+  std::unique_ptr<Tables> tables_;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,66 @@
+#include "node/image_source.h"
+
+#include <set>
+#include <utility>
+
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+
+#include "visual_localization/parameters/parameters.h"
+#include "visual_localization/ros/image_conversion.h"
+
+namespace visual_localization {
+namespace {
+
+const char* const kCompressed = "compressed";
+
+/// "image_transport/raw" is known to users as "raw".
+std::set<std::string> knownTransports(const image_transport::ImageTransport& image_transport) {
+  std::set<std::string> names{kCompressed};
+  for (const std::string& name : image_transport.getLoadableTransports()) names.insert(name.substr(name.find('/') + 1));
+  return names;
+}
+
+void requireKnown(const std::string& transport, const std::set<std::string>& known) {
+  if (known.count(transport) != 0) return;
+  std::string all;
+  for (const auto& name : known) all += (all.empty() ? "" : ", ") + name;
+  throw ParameterError("parameter 'image_transport' = '" + transport + "' is not allowed: installed are " + all);
+}
+
+template <class MessagePtr>
+ReceivedImage received(const MessagePtr& message) {
+  return {message->header, [message] { return toGrey(*message); }};
+}
+
+}  // namespace
+
+ImageSource::ImageSource(ros::NodeHandle node, const ros::NodeHandle& private_node, const std::string& transport,
+                         Callback callback)
+    : image_transport_(node) {
+  requireKnown(transport, knownTransports(image_transport_));
+  if (transport == kCompressed) {
+    const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> forward =
+        [callback](const sensor_msgs::CompressedImageConstPtr& message) { callback(received(message)); };
+    compressed_ = node.subscribe<sensor_msgs::CompressedImage>(node.resolveName("image") + "/compressed", 1, forward,
+                                                               ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
+  } else {
+    const image_transport::TransportHints hints(transport, ros::TransportHints().tcpNoDelay(), private_node);
+    by_plugin_ = image_transport_.subscribe(
+        "image", 1, [callback](const sensor_msgs::ImageConstPtr& message) { callback(received(message)); },
+        ros::VoidPtr(), hints);
+  }
+  topic_ = compressed_ ? compressed_.getTopic() : by_plugin_.getTopic();
+}
+
+void ImageSource::shutdown() {
+  by_plugin_.shutdown();
+  compressed_.shutdown();
+}
+
+std::string ImageSource::description() const {
+  const unsigned publishers = compressed_ ? compressed_.getNumPublishers() : by_plugin_.getNumPublishers();
+  return topic() + (publishers == 0 ? ", which nobody publishes" : " (publishers: " + std::to_string(publishers) + ")");
+}
+
+}  // namespace visual_localization

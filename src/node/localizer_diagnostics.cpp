@@ -1,0 +1,195 @@
+#include "node/localizer_diagnostics.h"
+
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include <diagnostic_msgs/DiagnosticStatus.h>
+
+namespace visual_localization {
+namespace {
+
+// Where people begin to call an image dark, bright or dull; nothing is decided by them.
+constexpr double kDark = 20.0;
+constexpr double kBright = 235.0;
+constexpr double kDull = 8.0;
+constexpr double kStretched = 0.05;
+
+const char* guessAt(const ImageLook& look) {
+  if (look.mean_grey < kDark) return ": dark or covered?";
+  if (look.mean_grey > kBright) return ": overexposed?";
+  if (look.contrast < kDull) return ": fog, or something before the lens?";
+  return ": blurred, or fewer than the image before showed as well?";
+}
+
+std::string brightness(const ImageLook& look) {
+  char text[80];
+  std::snprintf(text, sizeof text, "mean grey level %.0f of 255, contrast %.0f", look.mean_grey, look.contrast);
+  return text + std::string(guessAt(look));
+}
+
+std::string features(const Estimate& estimate) {
+  if (estimate.features != FeatureKind::kSift) return "Hardly anything in the image";
+  const std::string kept = std::to_string(estimate.features_kept);
+  if (estimate.features_kept == estimate.features_extracted) return kept + " features in the image";
+  return kept + " of " + std::to_string(estimate.features_extracted) + " features in the image are of use";
+}
+
+bool looksBad(const ImageLook& look) {
+  return look.mean_grey < kDark || look.mean_grey > kBright || look.contrast < kDull;
+}
+
+std::string stretched(const ImageLook& look) {
+  char text[120];
+  std::snprintf(text, sizeof text, "Images are of another shape than the map's, stretched by %.2f: another camera?",
+                look.stretch > 1.0 ? look.stretch : 1.0 / look.stretch);
+  return text;
+}
+
+using diagnostic_msgs::DiagnosticStatus;
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+std::string imageTrouble(const Estimate& estimate) {
+  if (estimate.frozen) {
+    const std::string times = std::to_string(estimate.repeats + 1) + " times";
+    const std::string sent = "The camera has sent the same image " + times;
+    return looksBad(estimate.look) ? sent + ", " + brightness(estimate.look) : sent + ": frozen?";
+  }
+  if (estimate.state == LocalizationState::kTracking) return {};
+  if (estimate.blind || looksBad(estimate.look)) return features(estimate) + ", " + brightness(estimate.look);
+  if (std::abs(estimate.look.stretch - 1.0) > kStretched) return stretched(estimate.look);
+  return {};
+}
+
+LocalizerDiagnostics::LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                                           const std::string& name, const NodeConfig& config,
+                                           DescribeCamera describe_camera)
+    : image_timeout_s_(config.image_timeout_s),
+      describe_camera_(std::move(describe_camera)),
+      updater_(node, private_node, name) {
+  updater_.setHardwareID("none");
+  updater_.add("localization", this, &LocalizerDiagnostics::reportState);
+  updater_.add("images", this, &LocalizerDiagnostics::reportImages);
+  updater_.add("map", this, &LocalizerDiagnostics::reportMap);
+  if (config.tf_mode != "none") updater_.add("transform", this, &LocalizerDiagnostics::reportTransform);
+}
+
+void LocalizerDiagnostics::setImageTimeout(double image_timeout_s) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  image_timeout_s_ = image_timeout_s;
+}
+
+void LocalizerDiagnostics::imageArrived() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  arrivals_.add();
+  last_arrival_ = Clock::now();
+}
+
+double LocalizerDiagnostics::age_s() const { return secondsSince(last_arrival_.value_or(start_)); }
+
+std::optional<double> LocalizerDiagnostics::silence_s() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double silence = age_s();
+  return silence > image_timeout_s_ ? std::optional<double>(silence) : std::nullopt;
+}
+
+void LocalizerDiagnostics::stateIs(LocalizationState state) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (estimate_) estimate_->state = state;
+}
+
+void LocalizerDiagnostics::transformMissing(const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  missing_transform_ = reason;
+}
+
+void LocalizerDiagnostics::imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  estimate_ = estimate;
+  latency_ms_ = latency_ms;
+  counts_ = counts;
+  last_refusal_.clear();
+}
+
+void LocalizerDiagnostics::imageRefused(const ImageCounts& counts, const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  counts_ = counts;
+  last_refusal_ = reason;
+}
+
+void LocalizerDiagnostics::mapLoaded(const std::string& path, std::size_t images) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  map_path_ = path;
+  map_images_ = images;
+  estimate_.reset();
+}
+
+void LocalizerDiagnostics::reportState(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const LocalizationState state = estimate_         ? estimate_->state
+                                  : map_images_ > 0 ? LocalizationState::kInitializing
+                                                    : LocalizationState::kNoMap;
+  status.summary(state == LocalizationState::kTracking ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
+                 toString(state));
+  if (!estimate_) return;
+  status.add("Best similarity", estimate_->best.similarity);
+  status.add("Matched features", estimate_->best.matches);
+  status.addf("They look so many times larger", "%.2f", estimate_->best.scale);
+  status.add("Features kept", estimate_->features_kept);
+  status.addf("Looks like here, of the best anywhere", "%.3f", estimate_->place_ratio);
+  status.addf("Residual of the course (m)", "%.2f", estimate_->course_residual_m);
+  status.add("Images compared", estimate_->comparisons);
+  status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->spread_m.x(), estimate_->spread_m.y());
+  status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->times.extract_ms, estimate_->times.match_ms,
+              estimate_->times.update_ms);
+}
+
+void LocalizerDiagnostics::reportImages(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (age_s() > image_timeout_s_) {
+    status.summaryf(DiagnosticStatus::ERROR, "No image for %.1f s on %s", age_s(), describe_camera_().c_str());
+  } else if (!last_arrival_) {
+    status.summary(DiagnosticStatus::WARN, "No image has arrived yet on " + describe_camera_());
+  } else if (!last_refusal_.empty()) {
+    status.summary(DiagnosticStatus::WARN, "Refused: " + last_refusal_);
+  } else if (const std::string trouble = estimate_ ? imageTrouble(*estimate_) : ""; !trouble.empty()) {
+    status.summary(DiagnosticStatus::WARN, trouble);
+  } else {
+    status.summary(DiagnosticStatus::OK, "Images arrive");
+  }
+  status.addf("Rate (Hz)", "%.2f", arrivals_.rate_hz());
+  if (last_arrival_) status.addf("Age of the newest (s)", "%.2f", age_s());
+  if (latency_ms_ >= 0.0) status.addf("Latency (ms)", "%.1f", latency_ms_);
+  status.add("Processed", counts_.processed);
+  status.add("Dropped", counts_.dropped);
+  status.add("Late", counts_.late);
+  status.add("Refused", counts_.refused);
+  if (!estimate_) return;
+  status.addf("Mean grey level, contrast (of 255)", "%.0f, %.0f", estimate_->look.mean_grey, estimate_->look.contrast);
+  status.add("Repeats of the last image", estimate_->repeats);
+}
+
+void LocalizerDiagnostics::reportTransform(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool missing = !missing_transform_.empty();
+  status.summary(missing ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
+                 missing ? "Nothing broadcast: " + missing_transform_ : "Broadcast with every image");
+}
+
+void LocalizerDiagnostics::reportMap(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (map_images_ == 0) {
+    status.summary(DiagnosticStatus::WARN, "No map is loaded");
+    return;
+  }
+  status.summary(DiagnosticStatus::OK, "Map is loaded");
+  status.add("Path", map_path_);
+  status.add("Training images", map_images_);
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
+
+#include "node/node_config.h"
+#include "visual_localization/localization/estimate.h"
+
+namespace visual_localization {
+
+/// What is wrong with the image that led to `estimate`, in a line that people understand; empty when nothing seems to
+/// be. An image that is recognised is all right, whatever it is like.
+std::string imageTrouble(const Estimate& estimate);
+
+/// Rate of events over the last seconds. One that is slower than the reports shows its rate too, not one and nought in
+/// turn.
+class RateMeter {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  explicit RateMeter(std::chrono::milliseconds window = std::chrono::seconds(10)) : window_(window) {}
+
+  void add(Clock::time_point now = Clock::now()) {
+    times_.push_back(now);
+    forget(now);
+  }
+
+  /// Hertz; zero with fewer than two events in the window.
+  double rate_hz(Clock::time_point now = Clock::now()) {
+    forget(now);
+    if (times_.size() < 2) return 0.0;
+    const double span_s = std::chrono::duration<double>(times_.back() - times_.front()).count();
+    return span_s > 0.0 ? static_cast<double>(times_.size() - 1) / span_s : 0.0;
+  }
+
+ private:
+  void forget(Clock::time_point now) {
+    while (!times_.empty() && now - times_.front() > window_) times_.pop_front();
+  }
+
+  std::chrono::milliseconds window_;
+  std::deque<Clock::time_point> times_;
+};
+
+/// How many images came to what end, since start.
+struct ImageCounts {
+  std::uint64_t processed = 0;
+  std::uint64_t dropped = 0;  ///< replaced by a newer one before they were processed
+  std::uint64_t late = 0;     ///< older than one that was processed
+  std::uint64_t refused = 0;  ///< unusable
+};
+
+/// What the node tells on /diagnostics: state, images, latency, map. Thread-safe.
+class LocalizerDiagnostics {
+ public:
+  /// Tells where images should come from.
+  using DescribeCamera = std::function<std::string()>;
+
+  /// `name` of the node. It is an error when no image comes for longer than the timeout.
+  LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, const std::string& name,
+                       const NodeConfig& config, DescribeCamera describe_camera);
+
+  void setImageTimeout(double image_timeout_s);
+  void imageArrived();
+  void imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts);
+  void imageRefused(const ImageCounts& counts, const std::string& reason);
+  /// How long no image has come, when that is longer than the timeout.
+  std::optional<double> silence_s();
+  /// The state has changed without an image.
+  void stateIs(LocalizationState state);
+  /// Empty when the transform was broadcast.
+  void transformMissing(const std::string& reason);
+  void mapLoaded(const std::string& path, std::size_t images);
+  void publish() { updater_.force_update(); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using Wrapper = diagnostic_updater::DiagnosticStatusWrapper;
+
+  void reportState(Wrapper& status);
+  void reportImages(Wrapper& status);
+  void reportMap(Wrapper& status);
+  void reportTransform(Wrapper& status);
+  double age_s() const;
+
+  std::mutex mutex_;
+  double image_timeout_s_;
+  std::optional<Estimate> estimate_;
+  double latency_ms_ = 0.0;
+  ImageCounts counts_;
+  std::string last_refusal_;
+  std::string map_path_;
+  std::size_t map_images_ = 0;
+  std::string missing_transform_;
+  DescribeCamera describe_camera_;
+  RateMeter arrivals_;
+  const Clock::time_point start_ = Clock::now();
+  std::optional<Clock::time_point> last_arrival_;
+  diagnostic_updater::Updater updater_;  ///< last: it refers to everything above
+};
+
+}  // namespace visual_localization

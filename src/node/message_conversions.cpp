@@ -1,0 +1,251 @@
+#include "node/message_conversions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include <sensor_msgs/point_cloud2_iterator.h>
+
+namespace visual_localization {
+namespace {
+
+constexpr std::size_t kRow = 6;              ///< of a pose's covariance: x, y, z and three rotations
+constexpr double kUnknownAltitude_m2 = 1e6;  ///< the map is flat and says nothing about height
+
+geometry_msgs::Pose poseOf(const Eigen::Vector2d& position_m, double yaw_rad) {
+  geometry_msgs::Pose pose;
+  pose.position.x = position_m.x();
+  pose.position.y = position_m.y();
+  pose.orientation = quaternionFromYaw(yaw_rad);
+  return pose;
+}
+
+geometry_msgs::Pose poseOf(const Particle& particle) {
+  const bool moves = particle.velocity_m.squaredNorm() > 0.0;
+  return poseOf(particle.position_m, moves ? std::atan2(particle.velocity_m.y(), particle.velocity_m.x()) : 0.0);
+}
+
+bool positionIsKnown(LocalizationState state) {
+  return state == LocalizationState::kTracking || state == LocalizationState::kUncertain;
+}
+
+std::uint32_t count(std::size_t number) {
+  constexpr std::size_t kMax = std::numeric_limits<std::uint32_t>::max();
+  return static_cast<std::uint32_t>(number < kMax ? number : kMax);
+}
+
+constexpr double kPlaceDiameter_m = 0.6;
+constexpr double kHeadingLength_m = 1.5;
+constexpr double kHeadingWidth_m = 0.12;
+/// Of a larger map only every so many-th image is shown: a message of a million poses would stop rviz.
+constexpr std::size_t kMostShown = 20000;
+
+std::size_t strideThrough(const TrainingMap& map) { return (map.size() + kMostShown - 1) / kMostShown; }
+
+struct Colour {
+  float r, g, b;
+};
+
+/// One a session; readable on white and for colour-blind eyes (Okabe and Ito).
+constexpr std::array<Colour, 6> kSessionColours{{{0.00F, 0.45F, 0.70F},
+                                                 {0.84F, 0.37F, 0.00F},
+                                                 {0.00F, 0.62F, 0.45F},
+                                                 {0.80F, 0.47F, 0.65F},
+                                                 {0.90F, 0.62F, 0.00F},
+                                                 {0.34F, 0.71F, 0.91F}}};
+
+geometry_msgs::Point pointAt(const Eigen::Vector2d& position_m) {
+  geometry_msgs::Point point;
+  point.x = position_m.x();
+  point.y = position_m.y();
+  return point;
+}
+
+visualization_msgs::Marker emptyMarker(const std::string& frame_id, const std::string& name_space, int session,
+                                       int type) {
+  visualization_msgs::Marker marker;
+  marker.header.frame_id = frame_id;
+  marker.ns = name_space;
+  marker.id = session;
+  marker.type = type;
+  marker.action = visualization_msgs::Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  const Colour& colour = kSessionColours[static_cast<std::size_t>(session) % kSessionColours.size()];
+  marker.color.r = colour.r;
+  marker.color.g = colour.g;
+  marker.color.b = colour.b;
+  marker.color.a = 1.0F;
+  return marker;
+}
+
+visualization_msgs::Marker emptyPlaces(int session, const std::string& frame_id) {
+  auto marker = emptyMarker(frame_id, "places", session, visualization_msgs::Marker::SPHERE_LIST);
+  marker.scale.x = marker.scale.y = marker.scale.z = kPlaceDiameter_m;
+  return marker;
+}
+
+visualization_msgs::Marker emptyHeadings(int session, const std::string& frame_id) {
+  auto marker = emptyMarker(frame_id, "headings", session, visualization_msgs::Marker::LINE_LIST);
+  marker.scale.x = kHeadingWidth_m;
+  return marker;
+}
+
+}  // namespace
+
+geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad) {
+  geometry_msgs::Quaternion rotation;
+  rotation.z = std::sin(0.5 * yaw_rad);
+  rotation.w = std::cos(0.5 * yaw_rad);
+  return rotation;
+}
+
+bool isFinite(const Estimate& estimate) {
+  const PoseEstimate& pose = estimate.pose;
+  return pose.position_m.allFinite() && pose.covariance_m2.allFinite() && std::isfinite(pose.yaw_rad) &&
+         std::isfinite(pose.yaw_variance_rad2) && std::isfinite(pose.geodetic.latitude_deg) &&
+         std::isfinite(pose.geodetic.longitude_deg) && std::isfinite(pose.geodetic.altitude_m) &&
+         std::isfinite(estimate.best.similarity) && estimate.spread_m.allFinite() &&
+         std::isfinite(estimate.place_ratio) && std::isfinite(estimate.course_residual_m);
+}
+
+bool isFinite(const Particle& particle) {
+  return particle.position_m.allFinite() && particle.velocity_m.allFinite() && std::isfinite(particle.weight);
+}
+
+geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header) {
+  geometry_msgs::PoseWithCovarianceStamped message;
+  message.header = header;
+  message.pose.pose = poseOf(estimate.pose.position_m, estimate.pose.yaw_rad);
+  const Eigen::Matrix2d& covariance = estimate.pose.covariance_m2;
+  message.pose.covariance[0] = covariance(0, 0);
+  message.pose.covariance[1] = covariance(0, 1);
+  message.pose.covariance[kRow] = covariance(1, 0);
+  message.pose.covariance[kRow + 1] = covariance(1, 1);
+  message.pose.covariance[5 * kRow + 5] = estimate.pose.yaw_variance_rad2;
+  return message;
+}
+
+sensor_msgs::NavSatFix toFix(const Estimate& estimate, const std_msgs::Header& header) {
+  sensor_msgs::NavSatFix message;
+  message.header = header;
+  message.status.status = positionIsKnown(estimate.state) ? sensor_msgs::NavSatStatus::STATUS_FIX
+                                                          : sensor_msgs::NavSatStatus::STATUS_NO_FIX;
+  message.latitude = estimate.pose.geodetic.latitude_deg;
+  message.longitude = estimate.pose.geodetic.longitude_deg;
+  message.altitude = estimate.pose.geodetic.altitude_m;
+  const Eigen::Matrix2d& covariance = estimate.pose.covariance_m2;
+  message.position_covariance = {
+      covariance(0, 0), covariance(0, 1), 0.0, covariance(1, 0), covariance(1, 1), 0.0, 0.0, 0.0, kUnknownAltitude_m2};
+  message.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_APPROXIMATED;
+  return message;
+}
+
+LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& header) {
+  LocalizationStatus message;
+  message.header = header;
+  message.state = static_cast<std::uint8_t>(estimate.state);
+  message.state_name = toString(estimate.state);
+  message.best_similarity = estimate.best.similarity;
+  message.best_matches = count(estimate.best.matches);
+  message.best_scale = estimate.best.scale;
+  message.best_image = estimate.comparisons > 0 ? static_cast<std::int64_t>(estimate.best_image) : -1;
+  message.features = static_cast<std::uint8_t>(estimate.features);
+  message.comparisons = count(estimate.comparisons);
+  message.features_extracted = count(estimate.features_extracted);
+  message.features_kept = count(estimate.features_kept);
+  message.place_ratio = estimate.place_ratio;
+  message.course_residual = estimate.course_residual_m;
+  message.v0 = estimate.tuning.v0;
+  message.speed_ema = estimate.tuning.speed_ema;
+  message.quantum_share = estimate.tuning.quantum_share;
+  message.phi2 = estimate.tuning.phi2;
+  message.sigma_x = estimate.spread_m.x();
+  message.sigma_y = estimate.spread_m.y();
+  message.extract_ms = estimate.times.extract_ms;
+  message.match_ms = estimate.times.match_ms;
+  message.update_ms = estimate.times.update_ms;
+  return message;
+}
+
+geometry_msgs::PoseArray toPoseArray(const std::vector<Particle>& particles, const std_msgs::Header& header) {
+  geometry_msgs::PoseArray message;
+  message.header = header;
+  message.poses.reserve(particles.size());
+  for (const Particle& particle : particles) message.poses.push_back(poseOf(particle));
+  return message;
+}
+
+Swarm toSwarm(const std::vector<Particle>& particles, const std_msgs::Header& header) {
+  Swarm message;
+  message.header = header;
+  message.particles.reserve(particles.size());
+  for (const Particle& particle : particles) {
+    SwarmParticle one;
+    one.pose = poseOf(particle);
+    one.velocity.x = particle.velocity_m.x();
+    one.velocity.y = particle.velocity_m.y();
+    one.weight = particle.weight;
+    one.kind = static_cast<std::uint8_t>(particle.kind);
+    message.particles.push_back(one);
+  }
+  return message;
+}
+
+sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, const std_msgs::Header& header) {
+  sensor_msgs::PointCloud2 message;
+  message.header = header;
+  sensor_msgs::PointCloud2Modifier modifier(message);
+  constexpr int kFloat = sensor_msgs::PointField::FLOAT32;
+  modifier.setPointCloud2Fields(4, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "intensity", 1, kFloat);
+  modifier.resize(particles.size());
+  if (particles.empty()) return message;  // the iterator takes the address of the first point
+  sensor_msgs::PointCloud2Iterator<float> point(message, "x");
+  for (const Particle& particle : particles) {
+    point[0] = static_cast<float>(particle.position_m.x());
+    point[1] = static_cast<float>(particle.position_m.y());
+    point[2] = 0.0F;
+    point[3] = static_cast<float>(particle.weight);
+    ++point;
+  }
+  return message;
+}
+
+nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id) {
+  nav_msgs::Path path;
+  path.header.frame_id = frame_id;
+  path.poses.reserve(std::min(map.size(), kMostShown));
+  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
+    geometry_msgs::PoseStamped pose;
+    pose.header.frame_id = frame_id;
+    pose.pose.position = pointAt(map.position_m(i));
+    pose.pose.orientation = quaternionFromYaw(map.yaw_rad(i));
+    path.poses.push_back(pose);
+  }
+  return path;
+}
+
+visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::string& frame_id) {
+  visualization_msgs::MarkerArray markers;
+  markers.markers.push_back(emptyMarker(frame_id, "places", 0, visualization_msgs::Marker::SPHERE_LIST));
+  markers.markers.back().action = visualization_msgs::Marker::DELETEALL;
+  const auto sessions = static_cast<int>(map.header().sessions.size());
+  for (int session = 0; session < sessions; ++session) {
+    markers.markers.push_back(emptyPlaces(session, frame_id));
+    markers.markers.push_back(emptyHeadings(session, frame_id));
+  }
+  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
+    const TrainingPlace place = map.place(i);
+    const auto session = static_cast<std::size_t>(place.session);
+    const Eigen::Vector2d direction(std::cos(place.yaw_rad), std::sin(place.yaw_rad));
+    markers.markers[2 * session + 1].points.push_back(pointAt(place.position_m));
+    auto& heading = markers.markers[2 * session + 2].points;
+    heading.push_back(pointAt(place.position_m));
+    heading.push_back(pointAt(place.position_m + kHeadingLength_m * direction));
+  }
+  return markers;
+}
+
+}  // namespace visual_localization

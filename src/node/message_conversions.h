@@ -1,0 +1,54 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <geometry_msgs/PoseArray.h>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <geometry_msgs/Quaternion.h>
+#include <nav_msgs/Path.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
+#include <visual_localization/LocalizationStatus.h>
+#include <visual_localization/Swarm.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/particles.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// Rotation about z, ROS convention: 0 = along x (east), counter-clockwise.
+geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad);
+
+/// True when every number that would be published is finite.
+bool isFinite(const Estimate& estimate);
+bool isFinite(const Particle& particle);
+
+/// Position, heading and their covariance; height, roll and pitch are zero. `header`: map frame.
+geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header);
+
+/// The same position as latitude and longitude. No fix while the position is not known yet or lost. `header`:
+/// frame of the robot, as for a receiver.
+sensor_msgs::NavSatFix toFix(const Estimate& estimate, const std_msgs::Header& header);
+
+/// Everything but what only the node knows: latency and counts of images.
+LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& header);
+
+/// Particles in the map frame. Heading is the direction of the velocity, zero for a particle at rest.
+geometry_msgs::PoseArray toPoseArray(const std::vector<Particle>& particles, const std_msgs::Header& header);
+Swarm toSwarm(const std::vector<Particle>& particles, const std_msgs::Header& header);
+/// Fields x, y, z and intensity (the weight), 32-bit floats, so that rviz can colour by weight.
+sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, const std_msgs::Header& header);
+
+/// The recorded path, image by image; the sessions follow each other. Of a map with more than 20000 images every
+/// second one, or every third, and so on: here and in the markers.
+nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id);
+
+/// Per session the places of the training images and the direction each one looks at. Begins with a marker
+/// that deletes those of an earlier map.
+visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::string& frame_id);
+
+}  // namespace visual_localization

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+#include <ros/node_handle.h>
+#include <xmlrpcpp/XmlRpcValue.h>
+
+#include "node/node_config.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+
+/// Nested values of a parameter server as flat ones, "dpso/particles". Throws ParameterError naming the
+/// parameter for anything that is neither a struct nor a scalar.
+ParameterValues flatten(const XmlRpc::XmlRpcValue& tree);
+
+/// Writes values into a node's private namespace. False, and nothing is written, when there is no master: roscpp would
+/// wait for it.
+bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values);
+
+/// True for parameters that stand in a node's private namespace but belong to others: diagnostic_updater,
+/// bond, the nodelet manager, plugins of image_transport.
+bool belongsToOthers(const std::string& name);
+
+/// Reads and checks the whole private namespace. Throws ParameterError at the first parameter that is
+/// unknown or not allowed.
+NodeParameters loadParameters(const ros::NodeHandle& private_node);
+
+}  // namespace visual_localization

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include <dynamic_reconfigure/Config.h>
+#include <dynamic_reconfigure/ConfigDescription.h>
+#include <dynamic_reconfigure/Reconfigure.h>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <ros/service_server.h>
+
+#include "node/node_config.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+
+/// What tools like rqt_reconfigure need to know of every parameter that can change while the node runs: type, range,
+/// meaning and present value as default. Names are the full ones, "dpso/particles", as on the parameter server; the
+/// group "dpso/" holds all that begin so.
+dynamic_reconfigure::ConfigDescription toDescription(const parameters::Declaration& declare);
+
+/// The present values of the same parameters.
+dynamic_reconfigure::Config toConfig(const parameters::Declaration& declare);
+
+/// The values that a message names. Throws ParameterError, with name and value, for one that is read at the start only.
+ParameterValues toValues(const dynamic_reconfigure::Config& config, const parameters::Declaration& declare);
+
+/// The parameters while the node runs, by the protocol of dynamic_reconfigure. Its own server template wants a class
+/// that a .cfg file generates; here everything comes from the declarations that also check the start. The parameter
+/// server is kept in step, so that `rosparam dump` holds what the node does. Thread-safe.
+class ReconfigureServer {
+ public:
+  /// Puts parameters into effect; throws when that cannot be done, and then nothing has changed. `changed`: the
+  /// values that differ from before, never empty.
+  using Apply = std::function<void(const NodeParameters& parameters, const ParameterValues& changed)>;
+  /// Told why a request was refused.
+  using Warn = std::function<void(const std::string& reason)>;
+
+  /// Requests are answered in the callback queue of `private_node`.
+  ReconfigureServer(const ros::NodeHandle& private_node, const NodeParameters& parameters, Apply apply, Warn warn);
+
+  /// The node has loaded another map: the parameter `map` names it from now on, so that a restart finds it.
+  void setMap(const std::string& path);
+
+ private:
+  bool onSet(dynamic_reconfigure::Reconfigure::Request& request, dynamic_reconfigure::Reconfigure::Response& response);
+
+  std::mutex mutex_;
+  ros::NodeHandle private_node_;
+  NodeParameters parameters_;
+  Apply apply_;
+  Warn warn_;
+  ros::Publisher descriptions_;
+  ros::Publisher updates_;
+  ros::ServiceServer service_;  ///< last: it refers to everything above
+};
+
+}  // namespace visual_localization

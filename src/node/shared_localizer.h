@@ -1,0 +1,83 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <opencv2/core.hpp>
+
+#include "visual_localization/features/sift_features.h"
+#include "visual_localization/geo/local_frame.h"
+#include "visual_localization/localization/localizer.h"
+
+namespace visual_localization {
+
+/// A Localizer for several threads, whose map may be absent and may be replaced.
+class SharedLocalizer {
+ public:
+  /// A position with its uncertainty, as people give it.
+  struct Guess {
+    Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
+    Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();
+  };
+
+  /// Everything about one image, copied out so that it can be published without holding up the next one.
+  struct Result {
+    Estimate estimate;
+    std::vector<Particle> particles;
+    SiftFeatures sift;  ///< of the image, after pruning; empty when they were not needed
+    MatchConfig match;  ///< how it was compared
+    std::shared_ptr<const TrainingMap> map;
+  };
+
+  explicit SharedLocalizer(const LocalizerConfig& config) : config_(config) {}
+
+  /// Other parameters from the next image on, and for later maps; see Localizer::configure. Throws ParameterError when
+  /// `config` is invalid, and then nothing has changed.
+  void configure(const LocalizerConfig& config);
+
+  /// Starts anew in `map`, or around the guess that has been waiting for a map.
+  void setMap(std::shared_ptr<const TrainingMap> map);
+  std::shared_ptr<const TrainingMap> map() const;
+  /// Never waits, unlike map(), which waits for the end of the image that is being processed.
+  bool hasMap() const { return has_map_; }
+
+  /// See Localizer::process. Nothing without a map. Throws std::invalid_argument for an unusable image.
+  std::optional<Result> process(std::int64_t stamp_ns, const cv::Mat& grey);
+
+  /// See Localizer::doubt. Nothing without a map.
+  std::optional<LocalizationState> doubt();
+
+  /// False without a map. Throws std::invalid_argument for a prior that is none (see prior.h).
+  bool relocalizeAnywhere();
+  bool relocalizeAround(const Eigen::Vector2d& centre_m, double radius_m);
+  /// Without a map the guess is kept for the next one, and false is returned.
+  bool relocalizeAt(const Guess& guess);
+
+ private:
+  LocalizerConfig configuration() const;
+
+  mutable std::mutex mutex_;
+  LocalizerConfig config_;
+  std::shared_ptr<const TrainingMap> map_;
+  std::unique_ptr<Localizer> localizer_;
+  std::optional<Guess> waiting_guess_;
+  std::atomic<bool> has_map_{false};
+};
+
+/// Position and its covariance from an initial pose. The heading is not used: the training images give it.
+/// Throws std::invalid_argument with the reason in words when the frame is not `global_frame`, a number is not
+/// finite or the covariance of x and y is not symmetric and positive semi-definite.
+SharedLocalizer::Guess guessFrom(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& global_frame);
+
+/// Throws std::invalid_argument, with the reason in words, unless centre and radius are finite, on a local map and
+/// the radius is positive.
+void requireDisc(const Eigen::Vector2d& centre_m, double radius_m);
+
+}  // namespace visual_localization

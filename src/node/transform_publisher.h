@@ -1,0 +1,48 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <ros/node_handle.h>
+#include <ros/time.h>
+#include <tf2/LinearMath/Transform.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_broadcaster.h>
+#include <tf2_ros/transform_listener.h>
+
+#include "node/node_config.h"
+#include "visual_localization/localization/estimate.h"
+
+namespace visual_localization {
+
+/// odom_in_map, such that odometry and map agree on where the robot is.
+tf2::Transform odomInMap(const tf2::Transform& base_in_map, const tf2::Transform& base_in_odom);
+
+/// Broadcasts the estimate on tf as NodeConfig::tf_mode says. The tolerance may be set by any thread. When odometry is
+/// needed and missing it broadcasts nothing: a guess would move the robot for everyone.
+class TransformPublisher {
+ public:
+  TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node);
+
+  void setTolerance(double transform_tolerance_s) { tolerance_s_ = transform_tolerance_s; }
+  /// Time has gone back: what was heard of odometry is from the future.
+  void forget();
+  /// `stamp` of the image. Returns why nothing could be broadcast, and an empty text otherwise.
+  std::string publish(const PoseEstimate& pose, const ros::Time& stamp);
+
+ private:
+  std::optional<tf2::Transform> baseInOdom(const ros::Time& stamp, std::string& reason) const;
+  void broadcast(const tf2::Transform& child_in_map, const std::string& child, const ros::Time& stamp);
+
+  const NodeConfig config_;
+  std::atomic<double> tolerance_s_;
+  tf2_ros::Buffer buffer_;
+  std::unique_ptr<tf2_ros::TransformListener> listener_;  ///< only with odometry
+  tf2_ros::TransformBroadcaster broadcaster_;
+  ros::Time last_stamp_;
+  std::string last_reason_;  ///< why nothing was broadcast for that stamp
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,174 @@
+#include "survey/ambiguous_places.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "map/same_view.h"
+#include "visual_localization/localization/scores.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::size_t kNearImages = 16;      ///< looked at
+constexpr std::size_t kMostLookedAt = 1024;  ///< where many images face another way
+constexpr std::size_t kNearCompared = 4;
+
+struct Alike {
+  std::size_t image = 0;
+  double similarity = 0.0;
+};
+
+bool isMoreAlike(const Alike& a, const Alike& b) {
+  return a.similarity != b.similarity ? a.similarity > b.similarity : a.image < b.image;
+}
+
+/// Keeps the `count` most alike, best first.
+void keepBest(std::size_t count, std::vector<Alike>& images) {
+  const auto end = images.begin() + static_cast<std::ptrdiff_t>(std::min(count, images.size()));
+  std::partial_sort(images.begin(), end, images.end(), isMoreAlike);
+  images.erase(end, images.end());
+}
+
+class Search {
+ public:
+  Search(const TrainingMap& map, const AmbiguityConfig& config)
+      : map_(map),
+        config_(config),
+        global_(config.similarity),
+        sift_(config.match, config.similarity),
+        work_left_(config.most_work) {
+    result_.stride = std::max<std::size_t>(1, (map.size() + config.most_images - 1) / config.most_images);
+    for (std::size_t i = 0; i < map.size(); i += result_.stride) globals_.push_back(map.global(i));
+  }
+
+  std::size_t images() const { return globals_.size(); }
+
+  /// Asks about the image `number` of images().
+  void ask(std::size_t number) {
+    const std::size_t image = number * result_.stride;
+    const std::vector<Alike> near = nearImages(image);
+    if (near.empty()) {
+      ++result_.unjudged;
+      return;
+    }
+    const std::vector<Alike> far = farImages(number);
+    if (!far.empty() && near.front().similarity > 0.0 &&
+        far.front().similarity >= config_.global_nearly_as_good * near.front().similarity) {
+      ++result_.global_only;
+    }
+    if (!takeWork(image, near, far)) {
+      ++result_.unasked;
+      return;
+    }
+    ++result_.asked;
+    AmbiguousImage answer{image, image, 0.0, 0.0};
+    for (const Alike& other : near)
+      answer.near_similarity = std::max(answer.near_similarity, bySift(image, other.image));
+    for (const Alike& other : far) {
+      const double similarity = bySift(image, other.image);
+      if (similarity > answer.similarity) {
+        answer.twin = other.image;
+        answer.similarity = similarity;
+      }
+    }
+    if (isAmbiguous(answer)) result_.images.push_back(answer);
+  }
+
+  AmbiguousPlaces result() && {
+    const auto belongs = [this](std::size_t image) { return wasAmbiguous(image); };
+    result_.stretches = stretchesOf(map_, config_.far_m, belongs);
+    return std::move(result_);
+  }
+
+ private:
+  std::vector<Alike> nearImages(std::size_t image) {
+    std::vector<Alike> near;
+    const auto global = map_.global(image);
+    for (std::size_t count = kNearImages; near.empty(); count *= 4) {
+      map_.nearest(map_.position_m(image), count, neighbours_);
+      for (const Neighbour& neighbour : neighbours_) {
+        const std::size_t other = neighbour.image;
+        if (other == image || neighbour.distance_m > config_.near_m) continue;
+        if (!faceAlike(map_.yaw_rad(image), map_.yaw_rad(other))) continue;
+        near.push_back({other, globally(*global, *map_.global(other))});
+      }
+      const bool all = neighbours_.size() < count || neighbours_.back().distance_m > config_.near_m;
+      if (all || count == kMostLookedAt) break;
+    }
+    keepBest(kNearCompared, near);
+    return near;
+  }
+
+  std::vector<Alike> farImages(std::size_t number) {
+    std::vector<Alike> far;
+    const Eigen::Vector2d here_m = map_.position_m(number * result_.stride);
+    for (std::size_t other = 0; other < globals_.size(); ++other) {
+      const std::size_t image = other * result_.stride;
+      if ((map_.position_m(image) - here_m).norm() <= config_.far_m) continue;
+      far.push_back({image, globally(*globals_[number], *globals_[other])});
+    }
+    keepBest(config_.shortlist, far);
+    return far;
+  }
+
+  double globally(const GlobalFeatures& a, const GlobalFeatures& b) const { return global_.compare(a, b).similarity; }
+  double bySift(std::size_t a, std::size_t b) const { return sift_.compare(*map_.sift(a), *map_.sift(b)).similarity; }
+
+  /// What the places say saves reading what is too much; what the features are is what counts.
+  bool takeWork(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far) {
+    const auto said = [this](std::size_t i) { return map_.featureCount(i); };
+    if (workOf(image, near, far, said) > work_left_) return false;
+    const std::uint64_t work = workOf(image, near, far, [this](std::size_t i) { return map_.sift(i)->size(); });
+    if (work > work_left_) return false;
+    work_left_ -= work;
+    return true;
+  }
+
+  /// Pairs of descriptors.
+  template <class SizeOf>
+  static std::uint64_t workOf(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far,
+                              SizeOf sizeOf) {
+    std::uint64_t others = 0;
+    for (const Alike& other : near) others += sizeOf(other.image);
+    for (const Alike& other : far) others += sizeOf(other.image);
+    return others * sizeOf(image);
+  }
+
+  bool isAmbiguous(const AmbiguousImage& answer) const {
+    return answer.similarity >= config_.least_similarity && answer.similarity > 0.0 &&
+           answer.similarity >= config_.nearly_as_good * answer.near_similarity;
+  }
+
+  /// Images in between that were not asked about do not end a stretch, but for those of another session.
+  bool wasAmbiguous(std::size_t image) const {
+    const std::size_t asked = image - image % result_.stride;
+    const auto found = std::lower_bound(result_.images.begin(), result_.images.end(), asked,
+                                        [](const AmbiguousImage& a, std::size_t b) { return a.image < b; });
+    return found != result_.images.end() && found->image == asked &&
+           map_.place(asked).session == map_.place(image).session;
+  }
+
+  const TrainingMap& map_;
+  AmbiguityConfig config_;
+  GlobalSimilarity global_;
+  SiftSimilarity sift_;
+  std::uint64_t work_left_;
+  std::vector<std::shared_ptr<const GlobalFeatures>> globals_;  ///< of every stride_-th image
+  std::vector<Neighbour> neighbours_;
+  AmbiguousPlaces result_;
+};
+
+}  // namespace
+
+AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfig& config,
+                                    const AmbiguityProgress& progress) {
+  Search search(map, config);
+  for (std::size_t number = 0; number < search.images(); ++number) {
+    search.ask(number);
+    if (progress) progress(number + 1, search.images());
+  }
+  return std::move(search).result();
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,127 @@
+#include "survey/map_survey.h"
+
+#include <algorithm>
+#include <optional>
+
+namespace visual_localization {
+namespace {
+
+using LastOfSession = std::vector<std::optional<std::size_t>>;
+
+/// Calls `use(image, image before it in its session or nothing)` for all images.
+template <class Use>
+void forEachStep(const TrainingMap& map, Use use) {
+  LastOfSession last(map.header().sessions.size());
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    auto& before = last[static_cast<std::size_t>(map.place(i).session)];
+    use(i, before);
+    before = i;
+  }
+}
+
+double between_m(const TrainingMap& map, std::size_t a, std::size_t b) {
+  return (map.position_m(a) - map.position_m(b)).norm();
+}
+
+SightGrid gridOf(const TrainingMap& map, const OfImage& belongs) {
+  SightGrid grid;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (belongs(i)) grid.add(map.position_m(i), map.yaw_rad(i), map.place(i).session);
+  }
+  return grid;
+}
+
+void addImage(const TrainingPlace& place, SessionSurvey& session) {
+  session.first_ns = session.images == 0 ? place.stamp_ns : std::min(session.first_ns, place.stamp_ns);
+  session.last_ns = session.images == 0 ? place.stamp_ns : std::max(session.last_ns, place.stamp_ns);
+  ++session.images;
+}
+
+/// Lengths of steps: quantiles and the longest. Reorders.
+void summarise(std::vector<Step>& steps, std::size_t most_listed, MapSurvey& result) {
+  if (steps.empty()) return;
+  // Of equally long ones the first in the map, so that the answer does not depend on the algorithm.
+  std::sort(steps.begin(), steps.end(), [](const Step& a, const Step& b) {
+    return a.length_m != b.length_m ? a.length_m > b.length_m : a.to < b.to;
+  });
+  result.median_step_m = steps[steps.size() / 2].length_m;
+  result.long_step_m = steps[steps.size() / 20].length_m;
+  steps.resize(std::min(steps.size(), most_listed));
+  result.longest_steps = std::move(steps);
+}
+
+void addStep(const TrainingPlace& place, double length_m, const SightGrid& grid, MapSurvey& result) {
+  SessionSurvey& session = result.sessions[static_cast<std::size_t>(place.session)];
+  const bool shared = grid.otherSession(place.position_m, place.yaw_rad, place.session);
+  result.driven_m += length_m;
+  session.driven_m += length_m;
+  if (shared) session.shared_m += length_m;
+  result.heading_m[static_cast<std::size_t>(octantOf(place.yaw_rad))] += length_m;
+  if (!grid.oppositeWay(place.position_m, place.yaw_rad)) result.one_way_m += length_m;
+  if (grid.earlierSession(place.position_m, place.yaw_rad, place.session)) return;
+  result.route_m += length_m;
+  if (shared) result.shared_m += length_m;
+}
+
+}  // namespace
+
+std::vector<Stretch> stretchesOf(const TrainingMap& map, double gap_m, const OfImage& belongs,
+                                 const OfImage& seen_elsewhere) {
+  std::vector<Stretch> stretches;
+  std::vector<std::optional<std::size_t>> open(map.header().sessions.size());  // of each session: into `stretches`
+  forEachStep(map, [&](std::size_t i, std::optional<std::size_t> before) {
+    const int session = map.place(i).session;
+    auto& current = open[static_cast<std::size_t>(session)];
+    if (!belongs(i)) {
+      current.reset();
+      return;
+    }
+    const double step_m = before ? between_m(map, *before, i) : 0.0;
+    if (!current || step_m > gap_m) {
+      current = stretches.size();
+      stretches.push_back({session, i, i, 0, 0.0, map.featureCount(i), 0});
+    } else {
+      stretches[*current].length_m += step_m;
+    }
+    Stretch& stretch = stretches[*current];
+    stretch.last = i;
+    ++stretch.images;
+    if (seen_elsewhere && seen_elsewhere(i)) ++stretch.seen_elsewhere;
+    stretch.least_features = std::min(stretch.least_features, map.featureCount(i));
+  });
+  return stretches;
+}
+
+MapSurvey survey(const TrainingMap& map, const SurveyConfig& config) {
+  MapSurvey result;
+  result.sessions.resize(map.header().sessions.size());
+  const auto is_weak = [&](std::size_t i) { return map.featureCount(i) < config.few_features; };
+  const SightGrid all = gridOf(map, [](std::size_t) { return true; });
+  result.cells = all.cells();
+  std::vector<Step> steps;
+  forEachStep(map, [&](std::size_t i, std::optional<std::size_t> before) {
+    const TrainingPlace place = map.place(i);
+    SessionSurvey& session = result.sessions[static_cast<std::size_t>(place.session)];
+    addImage(place, session);
+    if (is_weak(i)) ++result.weak_images;
+    if (!before) return;
+    const double length_m = between_m(map, *before, i);
+    session.path_m += length_m;
+    steps.push_back({place.session, *before, i, length_m});
+    if (length_m > config.gap_m) {
+      ++result.gaps;
+    } else {
+      addStep(place, length_m, all, result);
+    }
+  });
+  summarise(steps, config.most_listed, result);
+  result.one_way = stretchesOf(map, config.gap_m,
+                               [&](std::size_t i) { return !all.oppositeWay(map.position_m(i), map.yaw_rad(i)); });
+  const SightGrid sound = gridOf(map, [&](std::size_t i) { return !is_weak(i); });
+  result.weak = stretchesOf(map, config.gap_m, is_weak, [&](std::size_t i) {
+    return sound.otherSession(map.position_m(i), map.yaw_rad(i), map.place(i).session);
+  });
+  return result;
+}
+
+}  // namespace visual_localization

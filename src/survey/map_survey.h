@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "survey/sight_grid.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// What one recorded round brought.
+struct SessionSurvey {
+  std::size_t images = 0;
+  std::int64_t first_ns = 0;  ///< earliest stamp
+  std::int64_t last_ns = 0;   ///< latest stamp
+  double path_m = 0.0;        ///< along its images, gaps included
+  double driven_m = 0.0;      ///< the same without gaps
+  double shared_m = 0.0;      ///< of it: another session has driven the same way there
+};
+
+/// Successive images of one session that have something in common.
+struct Stretch {
+  int session = 0;
+  std::size_t first = 0;  ///< images of the map
+  std::size_t last = 0;
+  std::size_t images = 0;
+  double length_m = 0.0;           ///< along the images; 0 for a single one
+  std::size_t least_features = 0;  ///< of one of its images
+  std::size_t seen_elsewhere = 0;  ///< images near to which another session has one without the flaw, facing alike
+};
+
+/// A step from one image of a session to the next.
+struct Step {
+  int session = 0;
+  std::size_t from = 0;
+  std::size_t to = 0;
+  double length_m = 0.0;
+};
+
+/// When something is worth a line.
+struct SurveyConfig {
+  std::size_t few_features = 50;  ///< an image with fewer is weak
+  double gap_m = 10.0;          ///< a longer step is a gap: nothing was recorded in it, and it is no part of the route
+  std::size_t most_listed = 5;  ///< of steps
+};
+
+/// What a map covers, how densely, in which directions and where it is weak. Of n images in time n log n.
+struct MapSurvey {
+  std::vector<SessionSurvey> sessions;
+  double driven_m = 0.0;                     ///< by all sessions, without gaps
+  double route_m = 0.0;                      ///< without what an earlier session had driven the same way
+  double shared_m = 0.0;                     ///< of the route: driven the same way by more than one session
+  std::size_t cells = 0;                     ///< of SightGrid::kCell_m that have an image
+  double median_step_m = 0.0;                ///< from one image of a session to the next
+  double long_step_m = 0.0;                  ///< 95 % are not longer
+  std::vector<Step> longest_steps;           ///< the longest first
+  std::size_t gaps = 0;                      ///< steps longer than SurveyConfig::gap_m
+  std::array<double, kOctants> heading_m{};  ///< driven in each direction, see octantOf()
+  double one_way_m = 0.0;                    ///< of what was driven: nobody has driven there the other way
+  std::vector<Stretch> one_way;
+  std::vector<Stretch> weak;  ///< few features
+  std::size_t weak_images = 0;
+};
+
+MapSurvey survey(const TrainingMap& map, const SurveyConfig& config = {});
+
+/// Whether an image belongs into a stretch.
+using OfImage = std::function<bool(std::size_t image)>;
+
+/// Successive images of each session for which `belongs` holds, in order of the map. A gap ends a stretch. Those for
+/// which `seen_elsewhere` holds are counted.
+std::vector<Stretch> stretchesOf(const TrainingMap& map, double gap_m, const OfImage& belongs,
+                                 const OfImage& seen_elsewhere = {});
+
+}  // namespace visual_localization

@@ -1,0 +1,247 @@
+#include "visual_localization/features/front_end.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "map/extraction_pool.h"
+#include "test/localization/wall_street.h"
+#include "visual_localization/localization/scores.h"
+
+namespace visual_localization {
+namespace {
+
+using test::kSecond;
+
+class FrontEndTest : public test::WallStreet {
+ protected:
+  static FrontEnd makeFrontEnd(bool prune = true) { return {SiftConfig(), MatchConfig(), {320, 240}, prune, 5.0}; }
+};
+
+TEST_F(FrontEndTest, OnlyAnImageThatFollowsIsPruned) {
+  FrontEnd front_end = makeFrontEnd();
+  double along_m = 10.0;
+  const auto pruned = [&](std::int64_t stamp_ns) {
+    front_end.setImage(stamp_ns, viewAt(along_m += 0.6));
+    return front_end.sift().size() < front_end.siftExtracted();
+  };
+  EXPECT_FALSE(pruned(0)) << "the first image has none before it";
+  EXPECT_TRUE(pruned(1 * kSecond));
+  EXPECT_FALSE(pruned(7 * kSecond)) << "after a gap";
+  EXPECT_TRUE(pruned(8 * kSecond));
+  EXPECT_FALSE(pruned(8 * kSecond)) << "a stamp that stands still";
+  EXPECT_FALSE(pruned(2 * kSecond)) << "a stamp that goes back";
+  front_end.setImage(3 * kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  EXPECT_FALSE(pruned(4 * kSecond)) << "the image before was black";
+}
+
+TEST_F(FrontEndTest, ExtractsOnlyWhatIsAskedFor) {
+  FrontEnd front_end = makeFrontEnd();
+  for (int i = 0; i < 3; ++i) {
+    front_end.setImage(i * kSecond, viewAt(10.0 + i));
+    EXPECT_EQ(front_end.global().wgoh, GlobalExtractor().extract(viewAt(10.0 + i)).wgoh);
+    EXPECT_FALSE(front_end.siftIfExtracted());
+    EXPECT_EQ(front_end.siftExtracted(), 0U);
+  }
+  const SiftFeatures& sift = front_end.sift();
+  ASSERT_TRUE(front_end.siftIfExtracted());
+  EXPECT_EQ(front_end.siftIfExtracted()->descriptors(), sift.descriptors());
+  EXPECT_GT(front_end.siftExtracted(), sift.size());
+  front_end.setImage(3 * kSecond, viewAt(13.0));
+  EXPECT_FALSE(front_end.siftIfExtracted()) << "a new image forgets the features of the last one";
+  EXPECT_EQ(front_end.siftExtracted(), 0U);
+}
+
+TEST_F(FrontEndTest, AfterGlobalFeaturesSiftIsPrunedByTheImageBeforeAllTheSame) {
+  FrontEnd always = makeFrontEnd();
+  FrontEnd switching = makeFrontEnd();
+  for (int i = 0; i < 4; ++i) {
+    always.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+    switching.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+    always.sift();
+    if (i < 3) switching.global();
+  }
+  EXPECT_EQ(switching.sift().descriptors(), always.sift().descriptors());
+  EXPECT_LT(switching.sift().size(), switching.siftExtracted());
+}
+
+TEST_F(FrontEndTest, KeepsThePreviousImageWhenTheCamerasBufferIsUsedAgain) {
+  FrontEnd own_buffers = makeFrontEnd();
+  FrontEnd shared_buffer = makeFrontEnd();
+  cv::Mat buffer;
+  for (int i = 0; i < 3; ++i) {
+    const cv::Mat view = viewAt(10.0 + 0.5 * i);
+    view.copyTo(buffer);
+    own_buffers.setImage(i * kSecond, view);
+    shared_buffer.setImage(i * kSecond, buffer);
+    buffer.setTo(0);
+  }
+  EXPECT_GT(own_buffers.sift().size(), 50U);
+  EXPECT_EQ(shared_buffer.sift().descriptors(), own_buffers.sift().descriptors());
+  EXPECT_EQ(shared_buffer.global().wgii, own_buffers.global().wgii);
+}
+
+TEST_F(FrontEndTest, AnImageThatRepeatsTheOneBeforeIsThatOneSeenLonger) {
+  FrontEnd front_end = makeFrontEnd();
+  FrontEnd undisturbed = makeFrontEnd();
+  for (FrontEnd* each : {&front_end, &undisturbed}) {
+    each->setImage(0, viewAt(10.0));
+    EXPECT_FALSE(each->isRepeated()) << "the first image";
+    each->setImage(kSecond, viewAt(10.6));
+    EXPECT_FALSE(each->isRepeated());
+  }
+  const SiftFeatures before = front_end.sift();
+  for (int i = 2; i < 4; ++i) {
+    front_end.setImage(i * kSecond, viewAt(10.6));
+    EXPECT_TRUE(front_end.isRepeated());
+    EXPECT_EQ(front_end.sift().descriptors(), before.descriptors()) << "not pruned by itself";
+  }
+  cv::Mat other_bit = viewAt(10.6);
+  other_bit.at<std::uint8_t>(239, 319) ^= 1;
+  for (FrontEnd* each : {&front_end, &undisturbed}) each->setImage(4 * kSecond, other_bit);
+  EXPECT_FALSE(front_end.isRepeated());
+  EXPECT_EQ(front_end.sift().descriptors(), undisturbed.sift().descriptors());
+}
+
+TEST_F(FrontEndTest, AnImageOfAnotherSizeIsARepetitionWhenItIsResizedToTheSame) {
+  FrontEnd front_end = makeFrontEnd();
+  cv::Mat large;
+  cv::resize(viewAt(10.0), large, cv::Size(640, 480), 0, 0, cv::INTER_CUBIC);
+  front_end.setImage(0, large);
+  front_end.setImage(kSecond, large);
+  EXPECT_TRUE(front_end.isRepeated());
+  EXPECT_EQ(front_end.look().stretch, 1.0);
+  front_end.setImage(2 * kSecond, large(cv::Rect(0, 60, 640, 360)));
+  EXPECT_FALSE(front_end.isRepeated());
+  EXPECT_NEAR(front_end.look().stretch, 4.0 / 3.0, 1e-9);
+}
+
+TEST_F(FrontEndTest, ADullImageShowsWhatABrightOneDoes) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, viewAt(10.0));
+  const std::size_t bright = front_end.sift().size();
+  cv::Mat dull;
+  viewAt(10.0).convertTo(dull, CV_8U, 0.15, 30.0);
+  for (int i = 1; i < 3; ++i) {
+    front_end.setImage(i * 100 * kSecond, dull);
+    EXPECT_GT(static_cast<double>(front_end.sift().size()), 0.8 * static_cast<double>(bright));
+    EXPECT_LT(front_end.look().contrast, 15.0) << "as it was";
+    EXPECT_EQ(front_end.isRepeated(), i == 2);
+  }
+}
+
+TEST_F(FrontEndTest, ADullImageIsTheSameInTraining) {
+  for (const double gain : {0.1, 0.2, 0.3, 1.0}) {
+    cv::Mat dull;
+    viewAt(10.0).convertTo(dull, CV_8U, gain, 20.0);
+    FrontEnd front_end = makeFrontEnd();
+    front_end.setImage(0, dull);
+    ExtractionPool pool(SiftConfig(), kNativeSift, 0, 1);
+    const std::vector<TrainingImage> training = pool.extract({RawImage{TrainingPlace(), dull}});
+    EXPECT_EQ(front_end.sift().descriptors(), training.front().sift.descriptors()) << gain;
+    EXPECT_EQ(front_end.global().wgii, training.front().global.wgii) << gain;
+  }
+}
+
+TEST_F(FrontEndTest, AnImageThatStaysIsPrunedAsTheNewParametersSay) {
+  FrontEnd front_end = makeFrontEnd();
+  for (int i = 0; i < 2; ++i) front_end.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+  const std::size_t pruned = front_end.sift().size();
+  EXPECT_LT(pruned, front_end.siftExtracted());
+  front_end.configure(MatchConfig(), false, 5.0);
+  front_end.setImage(2 * kSecond, viewAt(10.5));
+  ASSERT_TRUE(front_end.isRepeated());
+  EXPECT_EQ(front_end.sift().size(), front_end.siftExtracted());
+}
+
+TEST_F(FrontEndTest, NoiseIsNotSpread) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, noisy(cv::Mat(240, 320, CV_8UC1, cv::Scalar(20)), 1, 2.0));
+  EXPECT_LT(front_end.sift().size(), 10U);
+}
+
+TEST_F(FrontEndTest, SaysWhatTheImageIsLike) {
+  FrontEnd front_end = makeFrontEnd();
+  cv::Mat halves(240, 320, CV_8UC1, cv::Scalar(10));
+  halves.colRange(0, 160).setTo(50);
+  front_end.setImage(0, halves);
+  EXPECT_DOUBLE_EQ(front_end.look().mean_grey, 30.0);
+  EXPECT_DOUBLE_EQ(front_end.look().contrast, 20.0);
+  front_end.setImage(kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(255)));
+  EXPECT_DOUBLE_EQ(front_end.look().mean_grey, 255.0);
+  EXPECT_DOUBLE_EQ(front_end.look().contrast, 0.0);
+}
+
+TEST_F(FrontEndTest, WithoutPruningAllFeaturesAreKept) {
+  FrontEnd front_end = makeFrontEnd(false);
+  for (int i = 0; i < 3; ++i) {
+    front_end.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
+    EXPECT_GT(front_end.sift().size(), 50U);
+    EXPECT_EQ(front_end.sift().size(), front_end.siftExtracted());
+  }
+}
+
+TEST_F(FrontEndTest, BothKindsSeeTheImageInTheMapsSize) {
+  FrontEnd front_end = makeFrontEnd();
+  cv::Mat large;
+  cv::resize(viewAt(10.0), large, cv::Size(640, 480), 0, 0, cv::INTER_CUBIC);
+  cv::Mat small;
+  cv::resize(large, small, cv::Size(320, 240), 0, 0, cv::INTER_AREA);
+  front_end.setImage(0, large);
+  EXPECT_EQ(front_end.global().wgoh, GlobalExtractor().extract(small).wgoh);
+  EXPECT_EQ(front_end.sift().descriptors(), makeSiftExtractor(SiftConfig())->extract(small).descriptors());
+}
+
+TEST_F(FrontEndTest, ARefusedImageChangesNothing) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, viewAt(10.0));
+  front_end.setImage(kSecond, viewAt(10.5));
+  const SiftFeatures before = front_end.sift();
+  EXPECT_THROW(front_end.setImage(2 * kSecond, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
+  EXPECT_EQ(front_end.sift().descriptors(), before.descriptors());
+  FrontEnd undisturbed = makeFrontEnd();
+  undisturbed.setImage(kSecond, viewAt(10.5));
+  for (FrontEnd* each : {&front_end, &undisturbed}) each->setImage(3 * kSecond, viewAt(11.0));
+  EXPECT_EQ(front_end.sift().descriptors(), undisturbed.sift().descriptors());
+}
+
+TEST_F(FrontEndTest, TheTimeCountsWhatWasExtracted) {
+  FrontEnd front_end = makeFrontEnd();
+  front_end.setImage(0, viewAt(10.0));
+  const double none_ms = front_end.extract_ms();
+  front_end.global();
+  const double global_ms = front_end.extract_ms();
+  EXPECT_GT(global_ms, none_ms);
+  front_end.global();
+  EXPECT_EQ(front_end.extract_ms(), global_ms);
+  front_end.sift();
+  const double both_ms = front_end.extract_ms();
+  EXPECT_GT(both_ms, global_ms);
+  front_end.sift();
+  EXPECT_EQ(front_end.extract_ms(), both_ms);
+}
+
+TEST_F(FrontEndTest, ALiveImageComparesByTheKindThatIsAskedFor) {
+  FrontEnd front_end = makeFrontEnd();
+  const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
+  const GlobalSimilarity global{SimilarityConfig()};
+  front_end.setImage(0, viewAt(12.0 + 1e-9));
+  LiveImage image(front_end, *map(), sift, global);
+  EXPECT_FALSE(front_end.siftIfExtracted()) << "nothing was asked for yet";
+
+  const Score by_global = image.compare(FeatureKind::kGlobal, 20);
+  EXPECT_FALSE(front_end.siftIfExtracted()) << "global features need no SIFT";
+  EXPECT_EQ(by_global.similarity, 1.0);  // training image 20 was taken here
+  EXPECT_EQ(by_global.matches, 0U);
+  EXPECT_LT(image.compare(FeatureKind::kGlobal, 40).similarity, 0.9);
+  const double global_ms = image.match_ms();
+  EXPECT_GT(global_ms, 0.0);
+
+  const Score by_sift = image.compare(FeatureKind::kSift, 20);
+  EXPECT_EQ(by_sift.similarity, sift.compare(front_end.sift(), map()->image(20).sift).similarity);
+  EXPECT_GT(by_sift.matches, 50U);
+  EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kSift, 50).matches);
+  EXPECT_GT(image.match_ms(), global_ms);
+}
+
+}  // namespace
+}  // namespace visual_localization

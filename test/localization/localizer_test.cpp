@@ -1,0 +1,220 @@
+#include "visual_localization/localization/localizer.h"
+
+#include <string>
+#include <tuple>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "test/localization/wall_street.h"
+#include "test/support/synthetic.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+namespace {
+
+using test::kSecond;
+
+using LocalizerTest = test::WallStreet;
+
+TEST_F(LocalizerTest, AnEstimateAgreesWithItself) {
+  Localizer localizer(map(), LocalizerConfig());
+  Estimate estimate;
+  for (int i = 0; i < 10; ++i) {
+    estimate = localizer.process(i * kSecond, viewAt(0.5 * i + 0.3));
+    EXPECT_EQ(estimate.stamp_ns, i * kSecond);
+  }
+  EXPECT_GT(estimate.features_kept, 0U);
+  EXPECT_LT(estimate.features_kept, estimate.features_extracted);
+  EXPECT_GE(estimate.pose.covariance_m2(0, 0), 0.25);
+  const Eigen::Vector2d geodetic = map()->frame().toEastNorth(estimate.pose.geodetic);
+  EXPECT_LT((geodetic - estimate.pose.position_m).norm(), 1e-6);
+}
+
+/// Every tracker with every choice of features.
+class EveryCombination : public test::WallStreet,
+                         public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {};
+
+INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, EveryCombination,
+                         ::testing::Combine(::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+                                            ::testing::Values("sift", "global", "hybrid")),
+                         [](const auto& combination) {
+                           return std::string(std::get<0>(combination.param)) + "_" + std::get<1>(combination.param);
+                         });
+
+TEST_P(EveryCombination, TracksACameraAlongTheStreet) {
+  LocalizerConfig config;
+  std::tie(config.tracker, config.features) = GetParam();
+  Localizer localizer(map(), config);
+  Estimate estimate;
+  int by_sift = 0;
+  double error_sum_m = 0.0;
+  for (int i = 0; i < 45; ++i) {
+    const double along_m = 0.6 * i + 0.3;
+    estimate = localizer.process(i * kSecond, viewAt(along_m));
+    const bool sift = estimate.features == FeatureKind::kSift;
+    by_sift += sift ? 1 : 0;
+    EXPECT_EQ(estimate.features_extracted > 0, sift) << "global features need no SIFT";
+    EXPECT_EQ(localizer.lastSift().size(), estimate.features_kept);
+    EXPECT_EQ(estimate.best.matches > 0, sift);
+    if (i >= 15) error_sum_m += (estimate.pose.position_m - Eigen::Vector2d(along_m, 0.0)).norm();
+  }
+  EXPECT_LT(error_sum_m / 30.0, 1.5);
+  EXPECT_EQ(estimate.state, LocalizationState::kTracking);
+  EXPECT_GT(estimate.best.similarity, config.features == "sift" ? 0.2 : 0.8);
+  EXPECT_LE(estimate.comparisons, map()->size());
+  const bool hybrid = config.features == "hybrid";
+  EXPECT_GE(by_sift, hybrid ? 1 : config.features == "sift" ? 45 : 0);
+  EXPECT_LE(by_sift, hybrid ? 10 : config.features == "sift" ? 45 : 0);
+}
+
+TEST_P(EveryCombination, FogIsNeverATrackedPosition) {
+  LocalizerConfig config;
+  std::tie(config.tracker, config.features) = GetParam();
+  Localizer localizer(map(), config);
+  const cv::Mat fog(240, 320, CV_8UC1, cv::Scalar(90));
+  for (int i = 0; i < 20; ++i) {
+    const Estimate estimate = localizer.process(i * kSecond, noisy(fog, i));
+    EXPECT_NE(estimate.state, LocalizationState::kTracking);
+    EXPECT_TRUE(estimate.pose.position_m.allFinite());
+    EXPECT_TRUE(estimate.pose.covariance_m2.allFinite());
+  }
+}
+
+TEST_F(LocalizerTest, TheSameSeedGivesTheSameTrack) {
+  Localizer first(map(), LocalizerConfig());
+  Localizer second(map(), LocalizerConfig());
+  for (int i = 0; i < 10; ++i) {
+    const cv::Mat view = viewAt(0.5 * i);
+    EXPECT_EQ(first.process(i * kSecond, view).pose.position_m, second.process(i * kSecond, view).pose.position_m);
+  }
+}
+
+/// By SIFT only: by global features two walls of the same blocks are alike.
+TEST_F(LocalizerTest, AnotherPlaceIsNeverATrackedPosition) {
+  const cv::Mat elsewhere = test::wall(1000, 240, 99);
+  for (const char* tracker : {"dpso", "pf_gaussian", "pf_linear"}) {
+    LocalizerConfig config;
+    config.tracker = tracker;
+    Localizer localizer(map(), config);
+    for (int i = 0; i < 30; ++i) {
+      EXPECT_NE(localizer.process(i * kSecond, test::viewOf(elsewhere, 15 * i)).state, LocalizationState::kTracking);
+    }
+  }
+}
+
+TEST_F(LocalizerTest, RelocalizeForgetsAndFindsAgain) {
+  Localizer localizer(map(), LocalizerConfig());
+  for (int i = 0; i < 20; ++i) localizer.process(i * kSecond, noisy(viewAt(5.0), i));
+  localizer.relocalize(around({30.0, 0.0}, 3.0));
+  const Estimate first = localizer.process(20 * kSecond, noisy(viewAt(30.0), 20));
+  EXPECT_EQ(first.state, LocalizationState::kInitializing);
+  EXPECT_NEAR(first.pose.position_m.x(), 30.0, 3.0);
+  Estimate last = first;
+  for (int i = 21; i < 40; ++i) last = localizer.process(i * kSecond, noisy(viewAt(30.0), i));
+  EXPECT_EQ(last.state, LocalizationState::kTracking);
+  EXPECT_NEAR(last.pose.position_m.x(), 30.0, 1.5);
+}
+
+TEST_F(LocalizerTest, HybridBeginsWithSiftWheneverThePositionIsUnknown) {
+  LocalizerConfig config;
+  config.features = "hybrid";
+  Localizer localizer(map(), config);
+  int shown = 0;
+  const auto next = [&] {
+    ++shown;
+    return localizer.process(shown * kSecond, noisy(viewAt(12.0), shown));
+  };
+  for (const bool with_prior : {false, true}) {
+    EXPECT_EQ(next().features, FeatureKind::kSift);
+    Estimate estimate;
+    for (int i = 0; i < 9; ++i) estimate = next();  // the next one is looked after by SIFT
+    EXPECT_EQ(estimate.features, FeatureKind::kGlobal);
+    EXPECT_EQ(estimate.features_extracted, 0U);
+    EXPECT_TRUE(localizer.lastSift().empty());
+    with_prior ? localizer.relocalize(around({12.0, 0.0}, 1.0)) : localizer.relocalize();
+  }
+  EXPECT_EQ(next().features, FeatureKind::kSift);
+}
+
+/// An image that counts what it is asked for.
+class CountingImage final : public ComparableImage {
+ public:
+  explicit CountingImage(double similarity) : similarity_(similarity) {}
+  Score compare(FeatureKind kind, std::size_t) override {
+    ++(kind == FeatureKind::kSift ? by_sift : by_global);
+    return {similarity_, similarity_, 50, similarity_ > 0.5};
+  }
+  std::size_t siftFeatures() override { return 100; }
+  std::size_t by_sift = 0;
+  std::size_t by_global = 0;
+
+ private:
+  double similarity_;
+};
+
+TEST_F(LocalizerTest, ALargeMapIsWeighedOnlyWhileThePositionIsUnknown) {
+  LocalizerConfig config;
+  config.max_proposal_images = 20;
+  config.state.place_check = false;
+  Localizer localizer(map(), config);
+  for (int i = 0; i < 3; ++i) {
+    CountingImage unknown(0.1);
+    const Estimate estimate = localizer.process(i * kSecond, unknown);
+    EXPECT_EQ(unknown.by_global, 20U);
+    EXPECT_EQ(unknown.by_sift, estimate.comparisons) << "weighing the map is no comparison";
+  }
+  CountingImage known(0.9);
+  localizer.process(3 * kSecond, known);
+  CountingImage still_known(0.9);
+  localizer.process(4 * kSecond, still_known);
+  EXPECT_EQ(still_known.by_global, 0U);
+  EXPECT_GT(still_known.by_sift, 0U);
+}
+
+TEST_F(LocalizerTest, TheWholeMapIsAskedOnlyWhenTheMatchIsNotSure) {
+  LocalizerConfig config;
+  config.dpso.recovery = "none";
+  config.state.place_check_images = 15;
+  config.state.max_distance_m = 1000.0;  // alike everywhere, so the best match may be anywhere
+  Localizer localizer(map(), config);
+  CountingImage sure(0.9);
+  EXPECT_EQ(localizer.process(0, sure).place_ratio, 1.0);
+  EXPECT_EQ(sure.by_global, 0U);
+  CountingImage weak(0.1);
+  EXPECT_EQ(localizer.process(kSecond, weak).place_ratio, 1.0) << "alike everywhere";
+  EXPECT_GE(weak.by_global, 15U);
+  EXPECT_LE(weak.by_global, 15U + 32U) << "every fourth image, and those around the estimate";
+}
+
+TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {
+  Localizer localizer(map(), LocalizerConfig());
+  cv::Mat large;
+  Estimate estimate;
+  for (int i = 0; i < 30; ++i) {
+    cv::resize(noisy(viewAt(10.0), i), large, cv::Size(640, 480), 0, 0, cv::INTER_CUBIC);
+    estimate = localizer.process(i * kSecond, large);
+  }
+  EXPECT_EQ(estimate.state, LocalizationState::kTracking);
+  EXPECT_NEAR(estimate.pose.position_m.x(), 10.0, 1.5);
+}
+
+TEST_F(LocalizerTest, RefusesABadImageAndGoesOn) {
+  Localizer localizer(map(), LocalizerConfig());
+  EXPECT_THROW(localizer.process(0, cv::Mat()), std::invalid_argument);
+  EXPECT_THROW(localizer.process(0, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
+  EXPECT_THROW(localizer.process(0, cv::Mat(4, 4, CV_8UC1)), std::invalid_argument);
+  EXPECT_NO_THROW(localizer.process(0, viewAt(10.0)));
+}
+
+TEST_F(LocalizerTest, RefusesABadConfiguration) {
+  LocalizerConfig config;
+  config.dpso.particles = 0;
+  EXPECT_THROW(Localizer(map(), config), ParameterError);
+  config = LocalizerConfig();
+  config.tracker = "crystal_ball";
+  EXPECT_THROW(Localizer(map(), config), ParameterError);
+}
+
+}  // namespace
+}  // namespace visual_localization

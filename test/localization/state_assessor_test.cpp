@@ -1,0 +1,209 @@
+#include <gtest/gtest.h>
+
+#include "visual_localization/localization/state.h"
+
+namespace visual_localization {
+namespace {
+
+TrackerEstimate seen(double similarity, std::size_t matches, double x = 0.0) {
+  TrackerEstimate estimate;
+  estimate.best = {similarity, similarity, matches, similarity >= 0.05};
+  estimate.position_m = {x, 0.0};
+  return estimate;
+}
+
+const TrackerEstimate kGood = seen(0.3, 30);
+const TrackerEstimate kBad = seen(0.01, 1);
+
+Evidence sift() { return {0, FeatureKind::kSift}; }
+Evidence global() { return {0, FeatureKind::kGlobal}; }
+Evidence lost() { return {0, FeatureKind::kSift, true}; }
+Evidence placeRatio(double ratio) { return {0, FeatureKind::kSift, false, ratio}; }
+Evidence blind() { return {0, FeatureKind::kSift, false, 1.0, true}; }
+
+LocalizationState afterGood(StateAssessor& assessor, int images) {
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < images; ++i) state = assessor.assess(kGood, sift());
+  return state;
+}
+
+TEST(StateAssessor, EnoughGoodImagesConfirmAPosition) {
+  StateAssessor assessor{StateConfig()};
+  EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kInitializing);
+  EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, OneBadImageIsForgivenTwoAreNot) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kTracking);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(kBad, lost()), LocalizationState::kRecovering);
+}
+
+TEST(StateAssessor, AfterALossThePositionMustBeConfirmedAgain) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  for (int i = 0; i < 5; ++i) assessor.assess(kBad, lost());
+  EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kUncertain);
+  EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, AJumpVoidsEarlierConfirmations) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.assess(seen(0.3, 30, 60.0), sift()), LocalizationState::kUncertain);
+}
+
+TEST(StateAssessor, AShareOfFewFeaturesIsNoEvidence) {
+  StateAssessor assessor{StateConfig()};
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(assessor.assess(seen(0.5, 2), sift()), LocalizationState::kInitializing);
+}
+
+TEST(StateAssessor, WhatLooksMuchLargerOrSmallerIsSeenFromElsewhere) {
+  const auto stateAt = [](double scale) {
+    StateAssessor assessor{StateConfig()};
+    TrackerEstimate estimate = kGood;
+    estimate.best.scale = scale;
+    LocalizationState state = LocalizationState::kNoMap;
+    for (int i = 0; i < 9; ++i) state = assessor.assess(estimate, sift());
+    return state;
+  };
+  for (const double scale : {0.84, 1.0, 1.19}) EXPECT_EQ(stateAt(scale), LocalizationState::kTracking) << scale;
+  for (const double scale : {0.5, 0.83, 1.21, 3.0})
+    EXPECT_EQ(stateAt(scale), LocalizationState::kInitializing) << scale;
+}
+
+TEST(StateAssessor, AMatchedPlaceIsNotOffTheMap) {
+  StateAssessor assessor{StateConfig()};
+  // Every second image matches: too few for TRACKING, but a robot off the map would see nothing it knows.
+  for (int i = 0; i < 18; ++i) {
+    EXPECT_EQ(assessor.assess(i % 2 == 0 ? kGood : kBad, sift()), LocalizationState::kInitializing) << i;
+  }
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kOffMap) << "ten of them matched nothing";
+}
+
+/// After nine images of this similarity by global features, which count no matches.
+LocalizationState afterGlobal(double similarity, double best_distance_m = 0.0) {
+  StateAssessor assessor{StateConfig()};
+  TrackerEstimate estimate = seen(similarity, 0);
+  estimate.best_distance_m = best_distance_m;
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 9; ++i) state = assessor.assess(estimate, global());
+  return state;
+}
+
+TEST(StateAssessor, GlobalFeaturesConfirmByTheirOwnThreshold) {
+  EXPECT_EQ(afterGlobal(0.65), LocalizationState::kTracking);
+  EXPECT_EQ(afterGlobal(0.649), LocalizationState::kInitializing) << "more than enough for SIFT";
+  EXPECT_EQ(afterGlobal(0.9, 5.01), LocalizationState::kInitializing) << "elsewhere";
+}
+
+TEST(StateAssessor, BothKindsOfEvidenceAddUp) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 2);
+  EXPECT_EQ(assessor.assess(seen(0.7, 0), global()), LocalizationState::kInitializing);
+  EXPECT_EQ(assessor.assess(seen(0.7, 0), global()), LocalizationState::kTracking);
+  for (int i = 0; i < 2; ++i) assessor.assess(seen(0.3, 0), global());
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kUncertain);
+}
+
+TEST(StateAssessor, AMatchElsewhereDoesNotConfirmThisPlace) {
+  StateAssessor assessor{StateConfig()};
+  TrackerEstimate estimate = seen(0.3, 30);
+  estimate.best_distance_m = 20.0;
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(assessor.assess(estimate, sift()), LocalizationState::kInitializing);
+}
+
+TEST(StateAssessor, ResetForgets) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  assessor.reset();
+  EXPECT_EQ(assessor.assess(kGood, sift()), LocalizationState::kInitializing);
+}
+
+TEST(StateAssessor, AnImageThatLooksMoreLikeAnotherPlaceCastsDoubt) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.assess(kGood, placeRatio(0.94)), LocalizationState::kTracking) << "mean of five: 0.988";
+  EXPECT_FALSE(assessor.isDoubtful());
+  EXPECT_EQ(assessor.assess(kGood, placeRatio(0.94)), LocalizationState::kUncertain);
+  EXPECT_TRUE(assessor.isDoubtful());
+  EXPECT_EQ(afterGood(assessor, 4), LocalizationState::kTracking) << "one of the two is out of the window";
+}
+
+TEST(StateAssessor, AnEstimateThatJumpsToAndFroIsNotTrusted) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 6; ++i) state = assessor.assess(seen(0.3, 30, i % 2 == 0 ? 8.0 : 0.0), sift());
+  EXPECT_EQ(state, LocalizationState::kUncertain);
+  EXPECT_GT(assessor.courseResidual_m(), 2.5);
+}
+
+TEST(StateAssessor, AFastRobotIsNotARestlessOne) {
+  StateAssessor assessor{StateConfig()};
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 10; ++i) state = assessor.assess(seen(0.3, 30, 9.5 * i), sift());
+  EXPECT_EQ(state, LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, LongWithoutConfirmationIsOffTheMap) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  assessor.assess(kBad, lost());  // forgiven
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(assessor.assess(kBad, lost()), LocalizationState::kRecovering);
+  EXPECT_EQ(assessor.assess(kBad, lost()), LocalizationState::kOffMap);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kOffMap);
+  EXPECT_EQ(afterGood(assessor, 4), LocalizationState::kTracking) << "back on the map";
+}
+
+TEST(StateAssessor, ACoveredCameraIsNotOffTheMap) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 30; ++i) state = assessor.assess(kBad, blind());
+  EXPECT_EQ(state, LocalizationState::kUncertain);
+}
+
+TEST(StateAssessor, InDoubtThePositionMustBeConfirmedAnew) {
+  StateAssessor assessor{StateConfig()};
+  EXPECT_EQ(assessor.doubt(false), LocalizationState::kInitializing);
+  afterGood(assessor, 10);
+  EXPECT_EQ(assessor.doubt(false), LocalizationState::kUncertain);
+  EXPECT_EQ(assessor.assess(kBad, sift()), LocalizationState::kUncertain);
+  EXPECT_EQ(afterGood(assessor, 3), LocalizationState::kUncertain);
+  EXPECT_EQ(afterGood(assessor, 1), LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, OtherThresholdsKeepWhatTheLastImagesSaid) {
+  StateAssessor assessor{StateConfig()};
+  afterGood(assessor, 10);
+  StateConfig stricter;
+  stricter.window = 2;
+  stricter.images_to_confirm = 2;
+  stricter.min_similarity = 0.9;
+  assessor.configure(stricter);
+  EXPECT_EQ(assessor.assess(kGood, sift()), LocalizationState::kUncertain);
+  stricter.min_similarity = StateConfig().min_similarity;
+  assessor.configure(stricter);
+  assessor.assess(kGood, sift());
+  EXPECT_EQ(assessor.assess(kGood, sift()), LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, AnImpossibleWindowIsNamedWithBothValues) {
+  StateConfig config;
+  config.window = 3;
+  ASSERT_EQ(config.violations().size(), 1U);
+  EXPECT_EQ(config.violations().front(),
+            "parameter 'state/images_to_confirm' = 4 is not allowed: must not exceed 'state/window' = 3");
+}
+
+TEST(StateAssessor, NamesOfTheStates) {
+  EXPECT_EQ(toString(LocalizationState::kOffMap), "OFF_MAP");
+  EXPECT_EQ(toString(LocalizationState::kNoMap), "NO_MAP");
+  EXPECT_EQ(toString(LocalizationState::kRecovering), "RECOVERING");
+}
+
+}  // namespace
+}  // namespace visual_localization

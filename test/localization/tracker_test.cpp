@@ -1,0 +1,86 @@
+#include "visual_localization/localization/tracker.h"
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "localization/dpso.h"
+#include "test/support/world.h"
+#include "visual_localization/localization/particle_filter.h"
+
+namespace visual_localization {
+namespace {
+
+using test::onCircle;
+using test::roundWorld;
+using test::World;
+
+/// What holds for every tracker.
+class TrackerTest : public ::testing::TestWithParam<const char*> {
+ protected:
+  static std::unique_ptr<Tracker> makeTracker(const World& world, std::uint32_t seed) {
+    if (GetParam() == std::string("dpso")) {
+      return std::make_unique<Dpso>(world.map(), DpsoConfig(), FitnessConfig(), seed);
+    }
+    const ParticleFilterConfig config;
+    return std::make_unique<ParticleFilter>(world.map(), makeMotionModel(GetParam(), config, world.map()), config,
+                                            FitnessConfig(), seed);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Trackers, TrackerTest, ::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+                         [](const auto& tracker) { return std::string(tracker.param); });
+
+TEST_P(TrackerTest, TheSameSeedGivesTheSameTrack) {
+  World world = roundWorld();
+  const auto first = makeTracker(world, 3);
+  const auto second = makeTracker(world, 3);
+  const auto other = makeTracker(world, 4);
+  bool differs = false;
+  for (int step = 0; step < 30; ++step) {
+    const auto seen = [&] { return step % 8 == 7 ? world.inTheDark() : world.from(onCircle(0.6 * step)); };
+    const Eigen::Vector2d position = first->update(seen()).position_m;
+    EXPECT_EQ(position, second->update(seen()).position_m);
+    differs = differs || position != other->update(seen()).position_m;
+  }
+  EXPECT_TRUE(differs);
+}
+
+TEST_P(TrackerTest, WeightsSumToOneWhateverIsSeen) {
+  World world = roundWorld();
+  const auto tracker = makeTracker(world, 2);
+  const std::size_t count = tracker->particles().size();
+  for (int step = 0; step < 50; ++step) {
+    const TrackerEstimate estimate =
+        tracker->update(step % 5 == 4 ? world.inTheDark() : world.from(onCircle(0.6 * step)));
+    EXPECT_TRUE(estimate.position_m.allFinite());
+    EXPECT_NEAR(test::sumOfWeights(tracker->particles()), 1.0, 1e-9);
+    EXPECT_EQ(tracker->particles().size(), count);
+    for (const Particle& particle : tracker->particles()) {
+      ASSERT_TRUE(particle.position_m.allFinite());
+      ASSERT_GE(particle.weight, 0.0);
+    }
+  }
+}
+
+TEST_P(TrackerTest, ResetDrawsFromThePriorAndWithoutOneFromTheWholeMap) {
+  World world = roundWorld();
+  const auto tracker = makeTracker(world, 1);
+  for (int step = 0; step < 20; ++step) tracker->update(world.from(onCircle(0.0)));
+  tracker->reset(around({20.0, 5.0}, 2.0));
+  const auto reach_m = [&] {
+    double farthest_m = 0.0;
+    for (const Particle& particle : tracker->particles()) {
+      farthest_m = std::max(farthest_m, (particle.position_m - Eigen::Vector2d(20.0, 5.0)).norm());
+    }
+    return farthest_m;
+  };
+  EXPECT_LE(reach_m(), 2.0);
+  tracker->reset();
+  EXPECT_GT(reach_m(), 40.0);
+}
+
+}  // namespace
+}  // namespace visual_localization

@@ -1,0 +1,287 @@
+#include "visual_localization/map/map_file.h"
+
+#include <cstring>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sqlite3.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "test/support/example_map.h"
+#include "test/support/temporary_folder.h"
+
+namespace visual_localization {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+TrainingMap exampleMap(std::size_t images = 12, std::size_t features = 20, unsigned seed = 1) {
+  return {test::exampleHeader(), test::exampleImages(images, features, seed)};
+}
+
+/// Bit by bit, but for the sign of a zero.
+void expectSame(const TrainingMap& a, const TrainingMap& b) {
+  EXPECT_EQ(a.header().datum.latitude_deg, b.header().datum.latitude_deg);
+  EXPECT_EQ(a.header().datum.longitude_deg, b.header().datum.longitude_deg);
+  EXPECT_EQ(a.header().datum.altitude_m, b.header().datum.altitude_m);
+  EXPECT_EQ(a.header().image_size, b.header().image_size);
+  EXPECT_EQ(a.header().sessions, b.header().sessions);
+  EXPECT_EQ(a.header().sift.contrast_threshold, b.header().sift.contrast_threshold);
+  EXPECT_EQ(a.header().sift.max_features, b.header().sift.max_features);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a.image(i).stamp_ns, b.image(i).stamp_ns);
+    EXPECT_EQ(a.image(i).session, b.image(i).session);
+    EXPECT_EQ(a.image(i).position_m, b.image(i).position_m);
+    EXPECT_EQ(a.image(i).yaw_rad, b.image(i).yaw_rad);
+    EXPECT_EQ(a.image(i).preview_jpeg, b.image(i).preview_jpeg);
+    EXPECT_EQ(a.image(i).global.wgoh, b.image(i).global.wgoh);
+    EXPECT_EQ(a.image(i).global.wgii, b.image(i).global.wgii);
+    EXPECT_EQ(a.image(i).sift.descriptors(), b.image(i).sift.descriptors());
+    ASSERT_EQ(a.image(i).sift.size(), b.image(i).sift.size());
+    if (a.image(i).sift.empty()) continue;
+    EXPECT_EQ(0, std::memcmp(a.image(i).sift.keypoints().data(), b.image(i).sift.keypoints().data(),
+                             a.image(i).sift.size() * sizeof(SiftKeypoint)));
+  }
+}
+
+/// The one-line reason why the file is refused; empty when it is not.
+std::string refusal(const std::string& path) {
+  try {
+    loadMap(path);
+    return {};
+  } catch (const MapStoreError& error) {
+    const std::string text = error.what();
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+    EXPECT_EQ(text.rfind(path, 0), 0U) << text;
+    return text;
+  }
+}
+
+std::string saveRefusal(const std::string& path) {
+  try {
+    saveMap(exampleMap(), path);
+    return {};
+  } catch (const MapStoreError& error) {
+    return error.what();
+  }
+}
+
+class MapStore : public testing::Test {
+ protected:
+  void SetUp() override { saveMap(exampleMap(), path_); }
+
+  /// Changes the stored map with SQL, as an attacker could.
+  void tamper(const std::string& sql) const {
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
+    char* message = nullptr;
+    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+    sqlite3_close(database);
+  }
+
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_ / "a map?#%20.map";
+};
+
+TEST_F(MapStore, RoundTripIsIdentical) {
+  expectSame(exampleMap(), *loadMap(path_));
+  EXPECT_NO_THROW(checkMap(path_));
+  EXPECT_FALSE(packageVersionOf(path_).empty());
+}
+
+TEST_F(MapStore, SavingAgainWritesTheSameBytes) {
+  const std::string again = folder_ / "again.map";
+  saveMap(*loadMap(path_), again);
+  EXPECT_EQ(test::readAll(path_), test::readAll(again));
+}
+
+TEST_F(MapStore, ReplacesAnExistingMap) {
+  saveMap(exampleMap(3, 7, 9), path_);
+  expectSame(exampleMap(3, 7, 9), *loadMap(path_));
+}
+
+TEST_F(MapStore, LeavesNoOtherFileBehind) {
+  loadMap(path_);
+  EXPECT_EQ(folder_.names().size(), 1U);
+}
+
+TEST_F(MapStore, ReadsFromAReadOnlyFolder) {
+  std::filesystem::permissions(folder_.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  EXPECT_EQ(refusal(path_), "");
+  std::filesystem::permissions(folder_.path(), std::filesystem::perms::owner_all);
+}
+
+TEST_F(MapStore, SaysWhyAFileIsNoMap) {
+  EXPECT_THAT(refusal(folder_ / "absent"), HasSubstr("No such file"));
+  EXPECT_THAT(refusal(folder_.path()), HasSubstr("is a folder"));
+  test::writeAll(folder_ / "empty", "");
+  EXPECT_THAT(refusal(folder_ / "empty"), HasSubstr("is empty"));
+  test::writeAll(folder_ / "text", std::string(5000, 'x'));
+  EXPECT_THAT(refusal(folder_ / "text"), HasSubstr("is not a map"));
+  EXPECT_THAT(refusal("/dev/null"), HasSubstr("not a regular file"));
+}
+
+TEST_F(MapStore, RefusesAnotherSqliteFile) {
+  tamper("PRAGMA application_id = 0");
+  EXPECT_THAT(refusal(path_), HasSubstr("SQLite file, but not a map"));
+}
+
+TEST_F(MapStore, NamesBothVersions) {
+  tamper("PRAGMA user_version = 7");
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("version 3")));
+}
+
+TEST_F(MapStore, RefusesEveryTruncation) {
+  const std::string whole = test::readAll(path_);
+  for (std::size_t length = 0; length < whole.size(); length += 1 + whole.size() / 150) {
+    test::writeAll(path_, whole.substr(0, length));
+    EXPECT_NE(refusal(path_), "") << length;
+  }
+  test::writeAll(path_, whole + "x");
+  EXPECT_NE(refusal(path_), "");
+}
+
+TEST_F(MapStore, FlippedBytesAreRefusedOrHarmless) {
+  const std::string whole = test::readAll(path_);
+  std::mt19937 random(11);
+  std::uniform_int_distribution<std::size_t> place(0, whole.size() - 1);
+  std::uniform_int_distribution<int> mask(1, 255);
+  std::size_t refused = 0;
+  for (int round = 0; round < 400; ++round) {
+    std::string damaged = whole;
+    // Half of the flips in the first page, where the structure is.
+    const std::size_t at = round % 2 == 0 ? place(random) : place(random) % 4096;
+    damaged[at] = static_cast<char>(damaged[at] ^ mask(random));
+    test::writeAll(path_, damaged);
+    if (refusal(path_).empty()) {
+      expectSame(exampleMap(), *loadMap(path_));
+    } else {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 100U);
+}
+
+TEST_F(MapStore, RefusesAnyOtherSchema) {
+  const std::string whole = test::readAll(path_);
+  for (const char* sql :
+       {"CREATE TRIGGER t AFTER INSERT ON images BEGIN DELETE FROM meta; END", "CREATE VIEW v AS SELECT * FROM images",
+        "CREATE TABLE other(a)", "CREATE INDEX i ON images(session)", "ALTER TABLE images ADD COLUMN more",
+        "DROP TABLE previews", "DROP TABLE images; CREATE VIEW images AS SELECT 1"}) {
+    test::writeAll(path_, whole);
+    tamper(sql);
+    EXPECT_NE(refusal(path_), "") << sql;
+  }
+}
+
+TEST_F(MapStore, RefusesChangedContent) {
+  const std::string whole = test::readAll(path_);
+  for (const char* sql : {"UPDATE images SET east_m = 9e999 WHERE id = 3",
+                          "UPDATE images SET feature_count = -1 WHERE id = 3",
+                          "UPDATE images SET feature_count = 9000000000000000000 WHERE id = 3",
+                          "UPDATE images SET id = -5 WHERE id = 3",
+                          "UPDATE images SET session = 4294967296 WHERE id = 3",
+                          "DELETE FROM images WHERE id = 3",
+                          "DELETE FROM images",
+                          "UPDATE images SET north_m = 'north' WHERE id = 3",
+                          "UPDATE images SET east_m = east_m + 1 WHERE id = 3",
+                          "UPDATE meta SET value = -1 WHERE key = 'image/width_px'",
+                          "DELETE FROM meta WHERE key = 'checksum'",
+                          "UPDATE meta SET value = 'x' WHERE key = 'checksum'",
+                          "UPDATE meta SET value = 1e99 WHERE key = 'sift/sigma'",
+                          "INSERT INTO meta VALUES('extra', 1)",
+                          "DELETE FROM meta",
+                          "DELETE FROM features WHERE image = 3",
+                          "UPDATE features SET keypoints = zeroblob(320) WHERE image = 3",
+                          "UPDATE features SET descriptors = zeroblob(10000000) WHERE image = 3",
+                          "INSERT INTO features VALUES(99, x'', x'', 0)",
+                          "DELETE FROM previews WHERE image = 3",
+                          "INSERT INTO previews VALUES(99, x'00', 0)",
+                          "UPDATE globals SET wgoh = x'00' WHERE image = 3"}) {
+    test::writeAll(path_, whole);
+    tamper(sql);
+    EXPECT_NE(refusal(path_), "") << sql;
+  }
+}
+
+/// `count` floats as an SQL blob; the last one has these bytes in the file, in hexadecimal digits.
+std::string histogramBlob(std::size_t count, const std::string& last) {
+  return "x'" + std::string(8 * (count - 1), '0') + last + "'";
+}
+
+TEST_F(MapStore, RefusesWhatIsNoHistogram) {
+  const std::string whole = test::readAll(path_);
+  const std::string one = "0000803F";  // 1.0F, little-endian
+  const struct {
+    std::string blob, reason;
+  } cases[] = {{histogramBlob(127, one), "global descriptor has a wrong size"},
+               {histogramBlob(129, one), "global descriptor has a wrong size"},
+               {histogramBlob(128, one + "00"), "global descriptor has a wrong size"},
+               {"x''", "global descriptor has a wrong size"},
+               {histogramBlob(128, "0000C07F"), "global descriptor is not finite"},              // NaN
+               {histogramBlob(128, "0000807F"), "global descriptor is not finite"},              // infinity
+               {histogramBlob(128, "000080BF"), "global descriptor is not finite or negative"},  // -1.0F
+               {histogramBlob(128, "01000080"), "global descriptor is not finite or negative"},  // the smallest below 0
+               {histogramBlob(128, one), "do not agree with their checksum"}};  // a good one, but not that image's
+  for (const char* column : {"wgoh", "wgii"}) {
+    for (const auto& [blob, reason] : cases) {
+      test::writeAll(path_, whole);
+      tamper(std::string("UPDATE globals SET ") + column + " = " + blob + " WHERE image = 3");
+      EXPECT_THAT(refusal(path_), HasSubstr(reason)) << column << " " << blob;
+    }
+  }
+}
+
+TEST_F(MapStore, SaysWhyAFileCannotBeWritten) {
+  EXPECT_THAT(saveRefusal(folder_.path()), AllOf(StartsWith(folder_.path()), HasSubstr("is a folder")));
+  EXPECT_THAT(saveRefusal(folder_ / "absent/a.map"), HasSubstr("folder does not exist"));
+  EXPECT_THAT(saveRefusal(path_ + "/a.map"), HasSubstr("is not a folder"));
+  EXPECT_THAT(saveRefusal("/dev/null"), HasSubstr("not a regular file"));
+  EXPECT_THAT(saveRefusal(""), HasSubstr("empty"));
+  EXPECT_EQ(folder_.names().size(), 1U);
+}
+
+TEST_F(MapStore, FullDiskLeavesTheOldMap) {
+  // In a process of its own, because the limit is for a whole process.
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{20000, 20000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    const std::string text = saveRefusal(path_);
+    ::_exit(text.rfind(path_ + ": cannot be written", 0) == 0 && folder_.names().size() == 1 ? 0 : 1);
+  }
+  int status = -1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  expectSame(exampleMap(), *loadMap(path_));
+}
+
+TEST_F(MapStore, KilledWhileSavingLeavesTheOldMapOrTheNewOne) {
+  const TrainingMap old_map = exampleMap(20, 300, 2);
+  const TrainingMap new_map = exampleMap(30, 300, 3);
+  for (int round = 0; round < 25; ++round) {
+    saveMap(old_map, path_);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      saveMap(new_map, path_);
+      ::_exit(0);
+    }
+    ::usleep(static_cast<useconds_t>(round * 400));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    const auto left = loadMap(path_);
+    expectSame(left->size() == old_map.size() ? old_map : new_map, *left);
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization

@@ -1,0 +1,93 @@
+#include "node/dashboard.h"
+
+#include <limits>
+
+#include <gtest/gtest.h>
+
+namespace visual_localization {
+namespace {
+
+LocalizationStatus statusOf(std::uint8_t state, double similarity = 0.2) {
+  LocalizationStatus status;
+  status.state = state;
+  status.state_name = "STATE";
+  status.best_image = 3;
+  status.best_similarity = similarity;
+  status.place_ratio = 1.0;
+  status.latency_ms = 20.0;
+  return status;
+}
+
+/// Pixels of a picture that have the colour of a state, within `area` of it.
+int pixelsOf(const cv::Mat& picture, std::uint8_t state, const cv::Rect& area) {
+  cv::Mat same;
+  cv::inRange(picture(area), colourOfState(state), colourOfState(state), same);
+  return cv::countNonZero(same);
+}
+
+cv::Rect topOf(const cv::Mat& picture) { return {0, 0, picture.cols, picture.rows / 6}; }
+cv::Rect bottomOf(const cv::Mat& picture) { return {0, 5 * picture.rows / 6, picture.cols, picture.rows / 6}; }
+
+TEST(Dashboard, IsDarkAndOfTheSameSizeWithoutAnImage) {
+  Dashboard dashboard;
+  const cv::Mat empty = dashboard.draw();
+  EXPECT_EQ(empty.type(), CV_8UC3);
+  dashboard.add(statusOf(LocalizationStatus::TRACKING));
+  EXPECT_EQ(dashboard.draw().size(), empty.size());
+}
+
+TEST(Dashboard, BearsTheColourOfTheNewestState) {
+  Dashboard dashboard;
+  for (const std::uint8_t state :
+       {LocalizationStatus::NO_MAP, LocalizationStatus::INITIALIZING, LocalizationStatus::TRACKING,
+        LocalizationStatus::UNCERTAIN, LocalizationStatus::RECOVERING, LocalizationStatus::OFF_MAP}) {
+    dashboard.add(statusOf(state));
+    const cv::Mat picture = dashboard.draw();
+    EXPECT_GT(pixelsOf(picture, state, topOf(picture)), topOf(picture).area() / 2) << static_cast<int>(state);
+  }
+}
+
+TEST(Dashboard, ShowsNoFiguresOfAStatusThatAnswersNoImage) {
+  Dashboard dashboard;
+  LocalizationStatus status = statusOf(LocalizationStatus::UNCERTAIN);
+  status.best_image = -1;
+  dashboard.add(status);
+  const cv::Mat silent = dashboard.draw();
+  status.comparisons = 77777;
+  Dashboard other;
+  other.add(status);
+  const cv::Mat left_half = other.draw()(cv::Rect(0, 0, silent.cols / 2, silent.rows));
+  EXPECT_EQ(cv::norm(left_half, silent(cv::Rect(0, 0, silent.cols / 2, silent.rows))), 0.0);
+}
+
+TEST(Dashboard, StatesDifferInColour) {
+  for (std::uint8_t a = 0; a < 6; ++a) {
+    for (std::uint8_t b = 0; b < a; ++b) EXPECT_GT(cv::norm(colourOfState(a), colourOfState(b)), 40.0);
+  }
+}
+
+TEST(Dashboard, RemembersTheLastImagesOnly) {
+  Dashboard dashboard;
+  dashboard.add(statusOf(LocalizationStatus::RECOVERING));
+  for (std::size_t i = 1; i < Dashboard::kShown; ++i) dashboard.add(statusOf(LocalizationStatus::TRACKING));
+  cv::Mat picture = dashboard.draw();
+  EXPECT_GT(pixelsOf(picture, LocalizationStatus::RECOVERING, bottomOf(picture)), 0);
+  dashboard.add(statusOf(LocalizationStatus::TRACKING));
+  picture = dashboard.draw();
+  EXPECT_EQ(pixelsOf(picture, LocalizationStatus::RECOVERING, bottomOf(picture)), 0);
+}
+
+TEST(Dashboard, ShowsOddFiguresWithoutFailing) {
+  Dashboard dashboard;
+  LocalizationStatus status = statusOf(LocalizationStatus::TRACKING, 0.0);
+  for (const double odd :
+       {-1.0, 0.0, 1e300, -1e300, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    status.latency_ms = status.sigma_x = status.best_similarity = status.place_ratio = odd;
+    status.comparisons = std::numeric_limits<std::uint32_t>::max();
+    dashboard.add(status);
+    EXPECT_NO_THROW(dashboard.draw());
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization

@@ -1,0 +1,92 @@
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "node/shared_localizer.h"
+
+namespace visual_localization {
+namespace {
+
+using Pose = geometry_msgs::PoseWithCovarianceStamped;
+
+Pose goodPose() {
+  Pose pose;
+  pose.header.frame_id = "map";
+  pose.pose.pose.position.x = 10.0;
+  pose.pose.pose.position.y = -20.0;
+  pose.pose.pose.orientation.w = 1.0;
+  pose.pose.covariance[0] = 4.0;
+  pose.pose.covariance[1] = 1.0;
+  pose.pose.covariance[6] = 1.0;
+  pose.pose.covariance[7] = 9.0;
+  return pose;
+}
+
+/// The reason for refusing a good pose after `spoil`; empty when it was not refused.
+std::string refusal(const std::function<void(Pose&)>& spoil) {
+  Pose pose = goodPose();
+  spoil(pose);
+  try {
+    guessFrom(pose, "map");
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(InitialPose, TakesPositionAndItsCovariance) {
+  const auto guess = guessFrom(goodPose(), "map");
+  EXPECT_EQ(guess.mean_m, Eigen::Vector2d(10.0, -20.0));
+  EXPECT_EQ(guess.covariance_m2, (Eigen::Matrix2d() << 4.0, 1.0, 1.0, 9.0).finished());
+}
+
+TEST(InitialPose, ALeadingSlashIsTheSameFrame) {
+  EXPECT_EQ(refusal([](Pose& pose) { pose.header.frame_id = "/map"; }), "");
+}
+
+TEST(InitialPose, ZeroCovarianceIsAPlace) {
+  EXPECT_EQ(refusal([](Pose& pose) { pose.pose.covariance.assign(0.0); }), "");
+}
+
+TEST(InitialPose, AnotherFrameIsRefused) {
+  EXPECT_NE(refusal([](Pose& pose) { pose.header.frame_id = "odom"; }).find("'odom'"), std::string::npos);
+  EXPECT_NE(refusal([](Pose& pose) { pose.header.frame_id = ""; }), "");
+}
+
+TEST(InitialPose, AFrameOfSeveralLinesIsNamedInOne) {
+  const std::string reason = refusal([](Pose& pose) { pose.header.frame_id = "a\nb" + std::string(100'000, 'x'); });
+  EXPECT_EQ(reason.find('\n'), std::string::npos);
+  EXPECT_LT(reason.size(), 200U);
+}
+
+TEST(InitialPose, NumbersThatAreNotFiniteAreRefused) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.position.x = kNan; }), "");
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.position.y = kInfinity; }), "");
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.orientation.z = kNan; }), "");
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[7] = kNan; }), "");
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[35] = kInfinity; }), "");
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.position.x = 1e300; }), "");
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[0] = 1e300; }), "");
+}
+
+TEST(InitialPose, CovarianceMustBePositiveSemiDefinite) {
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[0] = -1.0; }).find("semi-definite"), std::string::npos);
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[1] = pose.pose.covariance[6] = 10.0; }), "");
+  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[1] = 0.5; }).find("symmetric"), std::string::npos);
+}
+
+TEST(RequireDisc, RefusesWhatIsNone) {
+  EXPECT_NO_THROW(requireDisc({0.0, 0.0}, 10.0));
+  EXPECT_THROW(requireDisc({0.0, 0.0}, 0.0), std::invalid_argument);
+  EXPECT_THROW(requireDisc({0.0, 0.0}, -1.0), std::invalid_argument);
+  EXPECT_THROW(requireDisc({0.0, 0.0}, std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
+  EXPECT_THROW(requireDisc({0.0, std::numeric_limits<double>::infinity()}, 1.0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace visual_localization

@@ -1,0 +1,150 @@
+#include "node/shared_localizer.h"
+
+#include <atomic>
+#include <limits>
+#include <stdexcept>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "test/node/small_map.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1000000000;
+
+cv::Mat noise() {
+  cv::Mat image(240, 320, CV_8UC1);
+  cv::randu(image, 0, 255);
+  return image;
+}
+
+TEST(SharedLocalizer, WithoutMapThereIsNoResult) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  EXPECT_FALSE(localizer.process(kSecond_ns, noise()).has_value());
+  EXPECT_FALSE(localizer.relocalizeAnywhere());
+  EXPECT_FALSE(localizer.relocalizeAround({0.0, 0.0}, 5.0));
+  EXPECT_EQ(localizer.map(), nullptr);
+}
+
+TEST(SharedLocalizer, WithMapEveryImageHasAResult) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  const auto result = localizer.process(kSecond_ns, noise());
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->estimate.stamp_ns, kSecond_ns);
+  EXPECT_EQ(result->particles.size(), static_cast<std::size_t>(LocalizerConfig{}.dpso.particles));
+  EXPECT_EQ(result->map, localizer.map());
+}
+
+TEST(SharedLocalizer, AGuessWaitsForTheMap) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  const SharedLocalizer::Guess guess{{2.0, 20.0}, Eigen::Matrix2d::Zero()};
+  EXPECT_FALSE(localizer.relocalizeAt(guess));
+  localizer.setMap(test::smallMap());
+  const auto result = localizer.process(kSecond_ns, noise());
+  ASSERT_TRUE(result.has_value());
+  for (const Particle& particle : result->particles) {
+    if (particle.kind == ParticleKind::kQuantum) continue;
+    EXPECT_NEAR(particle.position_m.y(), 20.0, 5.0);
+  }
+}
+
+TEST(SharedLocalizer, AGuessThatIsNoneIsRefusedAndNotKept) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(localizer.relocalizeAt({{kNan, 0.0}, Eigen::Matrix2d::Identity()}), std::invalid_argument);
+  EXPECT_THROW(localizer.relocalizeAt({{0.0, 0.0}, -Eigen::Matrix2d::Identity()}), std::invalid_argument);
+  EXPECT_NO_THROW(localizer.setMap(test::smallMap()));
+}
+
+TEST(SharedLocalizer, AnUnusableImageChangesNothing) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat()), std::invalid_argument);
+  EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
+  EXPECT_TRUE(localizer.process(kSecond_ns, noise()).has_value());
+}
+
+/// Positions of all particles, to see whether they moved.
+std::vector<Eigen::Vector2d> cloudOf(const std::optional<SharedLocalizer::Result>& result) {
+  std::vector<Eigen::Vector2d> positions;
+  for (const Particle& particle : result->particles) positions.push_back(particle.position_m);
+  return positions;
+}
+
+TEST(SharedLocalizer, ARepeatedImageGetsTheAnswerItHad) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  const cv::Mat image = noise();
+  localizer.process(kSecond_ns, noise());
+  const auto first = localizer.process(2 * kSecond_ns, image);
+  EXPECT_EQ(cloudOf(localizer.process(2 * kSecond_ns, image.clone())), cloudOf(first));
+  EXPECT_NE(cloudOf(localizer.process(2 * kSecond_ns, noise())), cloudOf(first))
+      << "the stamp alone does not repeat it";
+}
+
+TEST(SharedLocalizer, ARepeatedImageIsLookedAtAnewAfterARelocalization) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  const cv::Mat image = noise();
+  const auto first = localizer.process(kSecond_ns, image);
+  localizer.relocalizeAnywhere();
+  EXPECT_NE(cloudOf(localizer.process(kSecond_ns, image)), cloudOf(first));
+  EXPECT_EQ(localizer.doubt(), LocalizationState::kInitializing);
+}
+
+TEST(SharedLocalizer, ParametersHoldForThisMapAndForTheNext) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  LocalizerConfig config;
+  config.dpso.particles = 40;
+  localizer.setMap(test::smallMap());
+  localizer.configure(config);
+  EXPECT_EQ(localizer.process(kSecond_ns, noise())->particles.size(), 40U);
+  localizer.setMap(test::smallMap());
+  EXPECT_EQ(localizer.process(kSecond_ns, noise())->particles.size(), 40U);
+  config.dpso.v0 = 2.0;
+  EXPECT_THROW(localizer.configure(config), ParameterError);
+  EXPECT_EQ(localizer.process(2 * kSecond_ns, noise())->particles.size(), 40U);
+}
+
+TEST(SharedLocalizer, ParametersAndMapsMayChangeWhileImagesAreProcessed) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  std::atomic<bool> done{false};
+  std::thread replacer([&] {
+    while (!done) localizer.setMap(test::smallMap());
+  });
+  std::thread tuner([&] {
+    LocalizerConfig config;
+    while (!done) {
+      config.tracker = config.tracker == "dpso" ? "pf_linear" : "dpso";
+      config.dpso.particles = config.dpso.particles == 80 ? 40 : 80;
+      localizer.configure(config);
+    }
+  });
+  for (int i = 1; i <= 20; ++i) EXPECT_TRUE(localizer.process(i * kSecond_ns, noise()).has_value());
+  done = true;
+  replacer.join();
+  tuner.join();
+}
+
+TEST(SharedLocalizer, MapsMayBeReplacedWhileImagesAreProcessed) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  std::atomic<bool> done{false};
+  std::thread replacer([&] {
+    while (!done) {
+      localizer.setMap(test::smallMap());
+      localizer.relocalizeAnywhere();
+    }
+  });
+  for (int i = 1; i <= 20; ++i) EXPECT_TRUE(localizer.process(i * kSecond_ns, noise()).has_value());
+  done = true;
+  replacer.join();
+}
+
+}  // namespace
+}  // namespace visual_localization

@@ -1,0 +1,29 @@
+#include "node/transform_publisher.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace visual_localization {
+namespace {
+
+tf2::Transform transform(double x_m, double y_m, double yaw_rad) {
+  return tf2::Transform(tf2::Quaternion(tf2::Vector3(0.0, 0.0, 1.0), yaw_rad), tf2::Vector3(x_m, y_m, 0.0));
+}
+
+TEST(OdomInMap, OdometryThenLeadsToTheEstimate) {
+  const auto base_in_map = transform(10.0, 20.0, 1.2);
+  const auto base_in_odom = transform(-3.0, 0.5, -0.7);
+  const auto again = odomInMap(base_in_map, base_in_odom) * base_in_odom;
+  EXPECT_NEAR((again.getOrigin() - base_in_map.getOrigin()).length(), 0.0, 1e-9);
+  EXPECT_NEAR(again.getRotation().angleShortestPath(base_in_map.getRotation()), 0.0, 1e-6);
+}
+
+TEST(OdomInMap, AtTheStartOfOdometryItIsTheRobot) {
+  const auto odom_in_map = odomInMap(transform(5.0, 6.0, 0.0), transform(0.0, 0.0, 0.0));
+  EXPECT_NEAR(odom_in_map.getOrigin().x(), 5.0, 1e-12);
+  EXPECT_NEAR(odom_in_map.getOrigin().y(), 6.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace visual_localization
