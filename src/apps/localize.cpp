@@ -104,27 +104,30 @@ struct Totals {
   std::size_t unusable = 0;
   std::size_t tracking = 0;
   double comparisons = 0.0;
-  StageTimes times;
+  double swept = 0.0;
+  double extract_ms = 0.0;
+  double match_ms = 0.0;
+  double update_ms = 0.0;
 
   void add(const Estimate& estimate) {
     ++images;
     if (estimate.state == LocalizationState::kTracking) ++tracking;
     comparisons += static_cast<double>(estimate.comparisons);
-    times.extract_ms += estimate.times.extract_ms;
-    times.match_ms += estimate.times.match_ms;
-    times.update_ms += estimate.times.update_ms;
+    swept += static_cast<double>(estimate.swept);
+    extract_ms += estimate.image.extract_ms;
+    match_ms += estimate.image.match_ms;
+    update_ms += estimate.update_ms;
   }
 };
 
 void print(const Totals& totals) {
   const auto images = static_cast<double>(totals.images);
-  const StageTimes& times = totals.times;
   std::printf("images %zu, not usable %zu, TRACKING %.1f %%\n", totals.images, totals.unusable,
               100.0 * static_cast<double>(totals.tracking) / images);
-  std::printf("comparisons per image %.1f\n", totals.comparisons / images);
+  std::printf("comparisons per image %.1f, swept %.1f\n", totals.comparisons / images, totals.swept / images);
   std::printf("ms per image %.2f (extract %.2f, match %.2f, update %.3f)\n",
-              (times.extract_ms + times.match_ms + times.update_ms) / images, times.extract_ms / images,
-              times.match_ms / images, times.update_ms / images);
+              (totals.extract_ms + totals.match_ms + totals.update_ms) / images, totals.extract_ms / images,
+              totals.match_ms / images, totals.update_ms / images);
 }
 
 void print(const ErrorStatistics& errors) {

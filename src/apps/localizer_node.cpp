@@ -1,4 +1,6 @@
+#include <functional>
 #include <iostream>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -22,10 +24,12 @@ const char* const kHelp =
     "Usage: localizer_node [image:=TOPIC] [_map:=FILE] [_PARAMETER:=VALUE ...]\n"
     "Localises with one camera in a map of training images; the nodelet\n"
     "visual_localization/LocalizerNodelet standing alone. Needs a roscore.\n\n"
-    "  --help        this text\n"
-    "  --version     the version\n"
-    "  --parameters  every parameter with its default, range and meaning, in Markdown\n\n"
-    "Topics, services and parameters: README.md and config/localizer.yaml.\n";
+    "  --help                this text\n"
+    "  --version             the version\n"
+    "  --parameters          every parameter with its default, range and meaning, in Markdown\n"
+    "  --localizer-config    config/localizer.yaml: every parameter of the localizer with its default\n"
+    "  --map-builder-config  config/map_builder.yaml, the same of the map builder\n\n"
+    "Topics, services and parameters: doc/node.md and config/localizer.yaml.\n";
 
 /// Arguments that are not for ROS, without the program's name.
 std::vector<std::string> ownArguments(int argc, char** argv) {
@@ -36,20 +40,21 @@ std::vector<std::string> ownArguments(int argc, char** argv) {
 }
 
 int answer(const std::string& argument) {
-  if (argument == "--help" || argument == "-h") {
-    std::cout << kHelp;
-    return 0;
+  const std::map<std::string, std::function<std::string()>> answers = {
+      {"--help", [] { return kHelp; }},
+      {"-h", [] { return kHelp; }},
+      {"--version", [] { return "localizer_node " VISUAL_LOCALIZATION_VERSION "\n"; }},
+      {"--parameters", visual_localization::parametersPage},
+      {"--localizer-config", visual_localization::localizerYaml},
+      {"--map-builder-config", visual_localization::mapBuilderYaml},
+  };
+  const auto found = answers.find(argument);
+  if (found == answers.end()) {
+    std::cerr << "localizer_node: unknown argument '" << argument << "'; see --help\n";
+    return kBadUsage;
   }
-  if (argument == "--version") {
-    std::cout << "localizer_node " << VISUAL_LOCALIZATION_VERSION << "\n";
-    return 0;
-  }
-  if (argument == "--parameters") {
-    std::cout << visual_localization::parametersPage();
-    return 0;
-  }
-  std::cerr << "localizer_node: unknown argument '" << argument << "'; see --help\n";
-  return kBadUsage;
+  std::cout << found->second();
+  return 0;
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 namespace visual_localization {
 
-
 std::size_t characterBytes(const std::string& text, std::size_t at) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
   const unsigned first = byte(at);

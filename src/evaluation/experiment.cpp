@@ -168,7 +168,10 @@ MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const
       entry.parameters[key] = parameters::parseScalar(value);
       continue;
     }
-    if (!YAML::convert<double>::decode(YAML::Node(value), method.speed)) method.speed = 0.0;
+    const ParameterValue speed = parameters::parseScalar(value);
+    const auto* whole = std::get_if<std::int64_t>(&speed);
+    const auto* real = std::get_if<double>(&speed);
+    method.speed = whole != nullptr ? static_cast<double>(*whole) : real != nullptr ? *real : 0.0;
     if (!(method.speed >= kSlowest && method.speed <= kFastest)) {
       yaml.refuse("sweep", "speed = " + value + " must be a number in [1/64, 64]");
     }

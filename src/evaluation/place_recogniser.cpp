@@ -48,13 +48,6 @@ void PlaceRecogniserConfig::declare(ParameterVisitor& visitor) {
   bayes.declare(visitor);
 }
 
-std::vector<std::string> PlaceRecogniserConfig::violations() const {
-  std::vector<std::string> wrong = rangeViolations(*this);
-  for (const auto& violation : sequence.violations()) wrong.push_back(violation);
-  for (const auto& violation : bayes.violations()) wrong.push_back(violation);
-  return wrong;
-}
-
 const std::vector<std::string>& placeRecogniserNames() {
   static const std::vector<std::string> kNames = {"exhaustive", "sequence", "topological"};
   return kNames;
@@ -62,7 +55,7 @@ const std::vector<std::string>& placeRecogniserNames() {
 
 std::unique_ptr<PlaceRecogniser> makePlaceRecogniser(const std::string& name, const PlaceRecogniserConfig& config,
                                                      bool closed) {
-  const std::vector<std::string> wrong = config.violations();
+  const std::vector<std::string> wrong = violationsOf(config);
   if (!wrong.empty()) throw std::invalid_argument(wrong.front());
   if (name == "exhaustive") return std::make_unique<BestSingleImage>();
   if (name == "sequence") return std::make_unique<SequenceMatcher>(config.sequence, closed);

@@ -16,7 +16,6 @@ struct PlaceRecogniserConfig {
   TopologicalBayesConfig bayes;
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const;
 };
 
 /// What makePlaceRecogniser knows: "exhaustive", "sequence", "topological".

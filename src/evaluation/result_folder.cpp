@@ -4,9 +4,8 @@
 #include <system_error>
 #include <utility>
 
-#include <yaml-cpp/yaml.h>
-
 #include "base/files.h"
+#include "parameters/yaml_map.h"
 
 namespace visual_localization {
 namespace {
@@ -19,10 +18,8 @@ const char* const kProvenance = "/provenance.csv";
 /// The part of an experiment's YAML that decides about results: no comments, no words for the report.
 std::string decisivePart(const std::string& yaml, const std::string& path) {
   try {
-    YAML::Node node = YAML::Load(yaml);
-    for (const char* words : {"title", "source", "discussion"}) node.remove(words);
-    return YAML::Dump(node);
-  } catch (const YAML::Exception&) {
+    return parameters::withoutKeys(yaml, {"title", "source", "discussion"});
+  } catch (const ParameterError&) {
     throw ResultError(path + ": is damaged: not an experiment");
   }
 }

@@ -57,8 +57,10 @@ class DriveRecorder {
   void add(std::int64_t stamp_ns, const cv::Mat& grey, const std::optional<GeodeticPoint>& truth) {
     if (!front_end_) {
       drive_.image_size = grey.size();
-      front_end_.emplace(sift_, config_.match, grey.size(), config_.prune, config_.max_image_gap_s,
-                         config_.sift_backend);
+      MapHeader like_the_map;
+      like_the_map.image_size = grey.size();
+      like_the_map.sift = sift_;
+      front_end_.emplace(frontEndConfigOf(config_, like_the_map));
     }
     front_end_->setImage(stamp_ns, grey);
     const CpuStopwatch sift_watch;

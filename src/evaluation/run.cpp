@@ -1,5 +1,7 @@
 #include "evaluation/run.h"
 
+#include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -10,6 +12,25 @@
 namespace visual_localization {
 namespace {
 
+/// What a method under test says after one image.
+struct Verdict {
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< in the map frame
+  double confidence = 0.0;                               ///< the larger the surer
+  FeatureKind features = FeatureKind::kSift;
+  std::size_t comparisons = 0;       ///< training images compared
+  std::optional<Estimate> estimate;  ///< of a tracker, for tracing
+};
+
+/// A method under test in one run.
+class Contestant {
+ public:
+  virtual ~Contestant() = default;
+  /// After the image that is shown now.
+  virtual Verdict process(std::int64_t stamp_ns) = 0;
+  /// Mean distance between two particles, metres; 0 for a method without particles. Not cheap.
+  virtual double diversity_m() const { return 0.0; }
+};
+
 LocalizerConfig seeded(LocalizerConfig config, std::uint32_t seed) {
   config.seed = static_cast<int>(seed);
   return config;
@@ -18,13 +39,14 @@ LocalizerConfig seeded(LocalizerConfig config, std::uint32_t seed) {
 /// A tracker, run by the localizer that runs on the robot.
 class TrackerContestant final : public Contestant {
  public:
-  TrackerContestant(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
-      : similarity_(config.similarity), localizer_(std::move(map), config) {}
+  TrackerContestant(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config,
+                    std::shared_ptr<RecordedImage> image)
+      : similarity_(config.similarity), localizer_(std::move(map), config, std::move(image)) {}
 
-  Verdict process(std::int64_t stamp_ns, RecordedImage& image) override {
-    const Estimate estimate = localizer_.process(stamp_ns, image);
+  Verdict process(std::int64_t stamp_ns) override {
+    const Estimate estimate = localizer_.process(stamp_ns, cv::Mat());
     confidence_ += kNewest * (evidenceOf(estimate) - confidence_);
-    return {estimate.pose.position_m, confidence_, estimate.features, estimate.comparisons, estimate};
+    return {estimate.pose.position_m, confidence_, estimate.evidence.features, estimate.comparisons, estimate};
   }
 
   double diversity_m() const override {
@@ -45,10 +67,11 @@ class TrackerContestant final : public Contestant {
   /// the match is not where the estimate is.
   double evidenceOf(const Estimate& estimate) const {
     constexpr double kNear_m = 5.0;
-    if (estimate.best_distance_m > kNear_m) return 0.0;
+    const TrackerEstimate& tracked = estimate.tracked;
+    if (tracked.best_distance_m > kNear_m) return 0.0;
     const double recognised =
-        estimate.features == FeatureKind::kSift ? similarity_.sift_recognised : similarity_.global_recognised;
-    return recognised > 0.0 ? estimate.best.similarity / recognised : estimate.best.similarity;
+        estimate.evidence.features == FeatureKind::kSift ? similarity_.sift_recognised : similarity_.global_recognised;
+    return recognised > 0.0 ? tracked.best.similarity / recognised : tracked.best.similarity;
   }
 
   SimilarityConfig similarity_;
@@ -58,19 +81,22 @@ class TrackerContestant final : public Contestant {
 
 class RecogniserContestant final : public Contestant {
  public:
-  RecogniserContestant(std::shared_ptr<const TrainingMap> map, const MethodSpec& method, bool closed)
+  RecogniserContestant(std::shared_ptr<const TrainingMap> map, const MethodSpec& method, bool closed,
+                       std::shared_ptr<RecordedImage> image)
       : map_(std::move(map)),
+        image_(std::move(image)),
         features_(method.localizer.features == "global" ? FeatureKind::kGlobal : FeatureKind::kSift),
         recogniser_(makePlaceRecogniser(method.tracker, method.recogniser, closed)) {}
 
-  Verdict process(std::int64_t, RecordedImage& image) override {
-    image.row(features_, row_);
+  Verdict process(std::int64_t) override {
+    image_->row(features_, row_);
     const Recognition recognition = recogniser_->update(row_);
     return {map_->position_m(recognition.training_image), recognition.confidence, features_, row_.size(), {}};
   }
 
  private:
   std::shared_ptr<const TrainingMap> map_;
+  std::shared_ptr<RecordedImage> image_;
   FeatureKind features_;
   std::unique_ptr<PlaceRecogniser> recogniser_;
   std::vector<double> row_;
@@ -120,18 +146,21 @@ std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
   return (static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start)) & kLargest;
 }
 
-}  // namespace
-
+/// `seed` makes the runs of one method differ. `closed`: the route is a loop.
 std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::shared_ptr<const TrainingMap> map,
-                                           std::uint32_t seed, bool closed) {
-  if (method.isTracker()) return std::make_unique<TrackerContestant>(std::move(map), seeded(method.localizer, seed));
-  return std::make_unique<RecogniserContestant>(std::move(map), method, closed);
+                                           std::uint32_t seed, bool closed, std::shared_ptr<RecordedImage> image) {
+  if (!method.isTracker()) {
+    return std::make_unique<RecogniserContestant>(std::move(map), method, closed, std::move(image));
+  }
+  return std::make_unique<TrackerContestant>(std::move(map), seeded(method.localizer, seed), std::move(image));
 }
 
+}  // namespace
+
 RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace) {
-  const SiftSimilarity sift(method.localizer.match, method.localizer.similarity);
-  const GlobalSimilarity global(method.localizer.similarity);
-  const auto contestant = makeContestant(method, context.map.map, seedOf(method, start), context.closed);
+  const auto image = std::make_shared<RecordedImage>(context.table, context.map.images, method.localizer.match,
+                                                     method.localizer.similarity);
+  const auto contestant = makeContestant(method, context.map.map, seedOf(method, start), context.closed, image);
   const std::vector<std::size_t> order =
       imageOrder(context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped});
   RunRecord record;
@@ -142,13 +171,11 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
       covered_from + static_cast<std::size_t>(method.covered * static_cast<double>(order.size()));
   for (std::size_t i = 0; i < order.size(); ++i) {
     const DriveImage& shown = context.drive.images[order[i]];
-    RecordedImage image(context.table, order[i], sift, global);
-    image.restrictTo(context.map.images);
-    if (i >= covered_from && i < covered_until) image.cover();
+    image->show(order[i], i >= covered_from && i < covered_until);
     const CpuStopwatch stopwatch;
-    const Verdict verdict = contestant->process(shown.stamp_ns, image);
+    const Verdict verdict = contestant->process(shown.stamp_ns);
     record.method_ms += stopwatch.elapsed_ms();
-    counter.add(image, record);
+    counter.add(*image, record);
     StepRecord step;
     step.confidence = static_cast<float>(verdict.confidence);
     step.comparisons = static_cast<std::uint32_t>(verdict.comparisons);

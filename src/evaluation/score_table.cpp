@@ -47,15 +47,30 @@ ScoreTable::ScoreTable(const Drive& drive, const TrainingMap& map, const MatchCo
   }
 }
 
+RecordedImage::RecordedImage(const ScoreTable& table, const std::vector<std::size_t>& training_images,
+                             const MatchConfig& match, const SimilarityConfig& similarity)
+    : table_(table), training_images_(training_images), sift_(match, similarity), global_(similarity) {}
+
+void RecordedImage::show(std::size_t drive_image, bool covered) {
+  drive_image_ = drive_image;
+  covered_ = covered;
+  sift_comparisons_ = 0;
+  global_comparisons_ = 0;
+}
+
+void RecordedImage::configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) {
+  sift_ = SiftSimilarity(front_end.match, similarity);
+  global_ = GlobalSimilarity(similarity);
+}
+
 std::size_t RecordedImage::trainingImages() const {
-  return training_images_ == nullptr || training_images_->empty() ? table_.trainingImages() : training_images_->size();
+  return training_images_.empty() ? table_.trainingImages() : training_images_.size();
 }
 
 const ScoreTable::Entry& RecordedImage::entry(std::size_t training_image) const {
   static const ScoreTable::Entry kNothing;
   if (covered_) return kNothing;
-  const bool all = training_images_ == nullptr || training_images_->empty();
-  return table_.at(drive_image_, all ? training_image : (*training_images_)[training_image]);
+  return table_.at(drive_image_, training_images_.empty() ? training_image : training_images_[training_image]);
 }
 
 Score RecordedImage::compare(FeatureKind kind, std::size_t training_image) {

@@ -68,35 +68,40 @@ class ScoreTable {
   double global_compare_ms_ = 0.0;
 };
 
-/// One recorded image whose scores are looked up instead of computed. Counts what a live image would have cost.
-class RecordedImage final : public ComparableImage {
+/// Recorded images whose scores are looked up instead of computed. Counts what live images would have cost.
+class RecordedImage final : public QueryImage {
  public:
-  /// All parts must outlive it.
-  RecordedImage(const ScoreTable& table, std::size_t drive_image, const SiftSimilarity& sift,
-                const GlobalSimilarity& global)
-      : table_(table), drive_image_(drive_image), sift_(sift), global_(global) {}
+  /// `table` must outlive it. Of its training images only `training_images` are in the map, and counted by their place
+  /// in this list, which must outlive it too; all when it is empty.
+  RecordedImage(const ScoreTable& table, const std::vector<std::size_t>& training_images, const MatchConfig& match,
+                const SimilarityConfig& similarity);
 
-  /// Of the training images only these are in the map, and counted by their place in this list; all when it is empty.
-  void restrictTo(const std::vector<std::size_t>& training_images) { training_images_ = &training_images; }
-  /// Nothing can be seen.
-  void cover() { covered_ = true; }
-
-  Score compare(FeatureKind kind, std::size_t training_image) override;
-  std::size_t siftFeatures() override { return covered_ ? 0 : table_.siftFeatures(drive_image_); }
+  /// The next image. `covered`: nothing can be seen in it.
+  void show(std::size_t drive_image, bool covered);
   /// Similarities to all training images.
   void row(FeatureKind kind, std::vector<double>& similarities);
   std::size_t siftComparisons() const { return sift_comparisons_; }
   std::size_t globalComparisons() const { return global_comparisons_; }
 
+  /// There are no pixels: show() says what comes.
+  void set(std::int64_t, const cv::Mat&) override {}
+  /// An image that a slow drive shows again counts as another one.
+  bool isRepeated() const override { return false; }
+  Score compare(FeatureKind kind, std::size_t training_image) override;
+  std::size_t siftFeatures() override { return covered_ ? 0 : table_.siftFeatures(drive_image_); }
+  ImageReport report() const override { return {}; }
+  const SiftFeatures* sift() const override { return nullptr; }
+  void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) override;
+
  private:
-  const ScoreTable& table_;
-  std::size_t drive_image_;
-  const SiftSimilarity& sift_;
-  const GlobalSimilarity& global_;
   std::size_t trainingImages() const;
   const ScoreTable::Entry& entry(std::size_t training_image) const;
 
-  const std::vector<std::size_t>* training_images_ = nullptr;
+  const ScoreTable& table_;
+  const std::vector<std::size_t>& training_images_;
+  SiftSimilarity sift_;
+  GlobalSimilarity global_;
+  std::size_t drive_image_ = 0;
   bool covered_ = false;
   std::size_t sift_comparisons_ = 0;
   std::size_t global_comparisons_ = 0;

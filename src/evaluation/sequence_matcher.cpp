@@ -58,11 +58,7 @@ void SequenceConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"sequence/speed_step", "1", "between the speeds that are tried (V_step)"}, speed_step, 0.01, 100.0);
   visitor.integer({"sequence/uniqueness_radius", "1", "training images this close to the best one are no rivals of it"},
                   uniqueness_radius, 0, 100000);
-}
-
-std::vector<std::string> SequenceConfig::violations() const {
-  if (min_speed <= max_speed) return {};
-  return {"parameter 'sequence/min_speed' must not exceed 'sequence/max_speed'"};
+  visitor.atMost("sequence/min_speed", min_speed, "sequence/max_speed", max_speed);
 }
 
 SequenceMatcher::SequenceMatcher(const SequenceConfig& config, bool closed)

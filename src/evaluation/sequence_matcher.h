@@ -21,7 +21,6 @@ struct SequenceConfig {
   int uniqueness_radius = 10;     ///< training images this close to the best one are no rivals of it
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const;
 };
 
 /// Recognises short sequences instead of single images, in the manner of SeqSLAM (Milford and Wyeth, "SeqSLAM:

@@ -32,11 +32,8 @@ void TopologicalBayesConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"bayes/delta", "1", "likelihood ratio between very similar and very different training images"}, delta,
                1.0, 1e6);
   visitor.integer({"bayes/window", "1", "training images that count as one place, an odd number"}, window, 1, 99999);
-}
-
-std::vector<std::string> TopologicalBayesConfig::violations() const {
-  if (window % 2 != 0) return {};
-  return {"parameter 'bayes/window' must be odd: as many training images before as after the middle one"};
+  visitor.require(window % 2 != 0, "bayes/window", std::to_string(window),
+                  "odd: as many training images before as after the middle one");
 }
 
 TopologicalBayesFilter::TopologicalBayesFilter(const TopologicalBayesConfig& config, bool closed)

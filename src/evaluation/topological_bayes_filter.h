@@ -18,7 +18,6 @@ struct TopologicalBayesConfig {
   int window = 15;       ///< training images that count as one place, odd
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const;
 };
 
 /// A discrete Bayes filter whose states are the training images, in the manner of the topological filter of Xu,

@@ -23,7 +23,7 @@ std::string seconds(std::int64_t stamp_ns) {
 
 std::string trackCsvHeader() {
   return "stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,extract_ms,"
-         "match_ms,update_ms\n";
+         "match_ms,update_ms,swept\n";
 }
 
 std::string trackCsvRow(const Estimate& estimate) {
@@ -33,8 +33,9 @@ std::string trackCsvRow(const Estimate& estimate) {
   const PoseEstimate& pose = estimate.pose;
   out << seconds(estimate.stamp_ns) << ',' << pose.position_m.x() << ',' << pose.position_m.y() << ',' << pose.yaw_rad
       << ',' << pose.geodetic.latitude_deg << ',' << pose.geodetic.longitude_deg << ',' << toString(estimate.state)
-      << ',' << estimate.best.similarity << ',' << toString(estimate.features) << ',' << estimate.comparisons << ','
-      << estimate.times.extract_ms << ',' << estimate.times.match_ms << ',' << estimate.times.update_ms << '\n';
+      << ',' << estimate.tracked.best.similarity << ',' << toString(estimate.evidence.features) << ','
+      << estimate.comparisons << ',' << estimate.image.extract_ms << ',' << estimate.image.match_ms << ','
+      << estimate.update_ms << ',' << estimate.swept << '\n';
   return out.str();
 }
 

@@ -63,7 +63,7 @@ void add(const StepRecord& step, StepSums& sums) {
 std::string traceRow(const RunRecord& run, std::size_t step) {
   const TraceRecord& trace = run.trace[step];
   const Estimate& estimate = trace.estimate;
-  const TrackerTuning& tuning = estimate.tuning;
+  const TrackerTuning& tuning = estimate.tracked.tuning;
   std::ostringstream out = numbers();
   out << run.start << ',' << step << ',' << trace.image << ',';
   if (!std::isnan(run.steps[step].error_m)) out << run.steps[step].error_m;
@@ -72,9 +72,9 @@ std::string traceRow(const RunRecord& run, std::size_t step) {
   } else {
     out << ",,,,";  // a particle filter has nothing to tune
   }
-  out << ',' << (tuning.recovering ? 1 : 0) << ',' << estimate.spread_m.x() << ',' << estimate.spread_m.y() << ','
-      << trace.diversity_m << ',' << estimate.best.similarity << ',' << estimate.comparisons << ','
-      << toString(estimate.features);
+  out << ',' << (tuning.recovering ? 1 : 0) << ',' << estimate.tracked.spread_m.x() << ','
+      << estimate.tracked.spread_m.y() << ',' << trace.diversity_m << ',' << estimate.tracked.best.similarity << ','
+      << estimate.comparisons << ',' << toString(estimate.evidence.features);
   return out.str();
 }
 

@@ -52,31 +52,26 @@ const cv::Mat& withUsualContrast(const cv::Mat& grey, const GreyLevels& levels, 
   return buffer;
 }
 
-FrontEnd::FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune,
-                   double max_image_gap_s, const std::string& sift_backend)
-    : match_(match),
-      image_size_(image_size),
-      prune_(prune),
-      max_image_gap_s_(max_image_gap_s),
-      sift_extractor_(makeSiftExtractor(sift, sift_backend)) {}
+FrontEnd::FrontEnd(const FrontEndConfig& config)
+    : config_(config), sift_extractor_(makeSiftExtractor(config.sift, config.sift_backend)) {}
 
-void FrontEnd::configure(const MatchConfig& match, bool prune, double max_image_gap_s) {
-  match_ = match;
-  prune_ = prune;
-  max_image_gap_s_ = max_image_gap_s;
+void FrontEnd::configure(const FrontEndConfig& config) {
+  config_.match = config.match;
+  config_.prune = config.prune;
+  config_.max_image_gap_s = config.max_image_gap_s;
   has_pruned_ = false;
 }
 
 void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   requireExtractable(grey);
-  const cv::Mat& fitting = fitted(grey, image_size_, resized_);
+  const cv::Mat& fitting = fitted(grey, config_.image_size, resized_);
   const GreyLevels levels = greyLevelsOf(fitting);
   const cv::Mat& image = withUsualContrast(fitting, levels, spread_);
   is_repeated_ = current_ && areIdentical(image, current_->grey);
   if (!is_repeated_) takeImage(image);
   current_->stamp_ns = stamp_ns;
-  look_ = {levels.mean, levels.contrast, stretchOf(image_size_, grey.size())};
+  statistics_ = {levels.mean, levels.contrast, stretchOf(config_.image_size, grey.size())};
   extract_ms_ = stopwatch.elapsed_ms();
 }
 
@@ -94,9 +89,9 @@ const SiftFeatures& FrontEnd::sift() {
   const Stopwatch stopwatch;
   const SiftFeatures& all = unprunedSift(*current_);
   constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
-  const bool prunable = prune_ && previousIsClose() && unprunedSift(*previous_).size() >= kLeast;
+  const bool prunable = config_.prune && previousIsClose() && unprunedSift(*previous_).size() >= kLeast;
   if (prunable) {
-    keepSeenIn(all, previous_->sift, match_.max_angle_ratio, pruned_);
+    keepSeenIn(all, previous_->sift, config_.match.max_angle_ratio, pruned_);
   } else {
     pruned_ = all;
   }
@@ -122,7 +117,7 @@ const SiftFeatures& FrontEnd::unprunedSift(Image& image) {
 bool FrontEnd::previousIsClose() const {
   if (!previous_) return false;
   const double gap_s = secondsBetween(previous_->stamp_ns, current_->stamp_ns);
-  return gap_s > 0.0 && gap_s <= max_image_gap_s_;
+  return gap_s > 0.0 && gap_s <= config_.max_image_gap_s;
 }
 
 }  // namespace visual_localization

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "visual_localization/localization/particles.h"
-#include "visual_localization/localization/tracker_factory.h"
 
 namespace visual_localization {
 namespace {
@@ -84,7 +83,7 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   for (Particle& particle : particles_) {
     if (particle.kind == ParticleKind::kQuantum && isGuided()) {
       particle.velocity_m.setZero();
-      particle.position_m = map_.position_m(input.places.draw(random_));
+      particle.position_m = map_.position_m(input.sweep.draw(input.scores, random_));
     } else if (seen_an_image_) {
       particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
     }
@@ -99,6 +98,7 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   adaptDiversity(result.best);
   assignKinds();
   centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
+  result.tuning = tuning_;
   return result;
 }
 
@@ -144,7 +144,7 @@ bool Dpso::isGuided() const {
   return tuning_.recovering || (config_.guided_start && position_unknown_);
 }
 
-std::size_t Dpso::evaluate(ScoreCache& scores) {
+std::size_t Dpso::evaluate(Scores& scores) {
   std::size_t best = 0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     fitness_[i] = evaluateFitness(particles_[i].position_m, map_, scores, fitness_config_);

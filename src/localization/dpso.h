@@ -3,7 +3,6 @@
 #include <optional>
 #include <vector>
 
-#include "visual_localization/localization/dpso_config.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/tracker.h"
 
@@ -29,7 +28,7 @@ class Dpso final : public Tracker {
   void move(Particle& particle);
   void moveQuantum(Particle& particle);
   bool isGuided() const;
-  std::size_t evaluate(ScoreCache& scores);
+  std::size_t evaluate(Scores& scores);
   TrackerEstimate estimate() const;
   void adaptSpeed();
   void adaptDiversity(const Score& best);

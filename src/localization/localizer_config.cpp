@@ -2,10 +2,7 @@
 
 #include <limits>
 
-#include "visual_localization/parameters/parameters.h"
-
 namespace visual_localization {
-
 namespace {
 
 constexpr bool kAtStartOnly = true;
@@ -29,9 +26,11 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"min_position_std", "m", "no pose claims to be more accurate than this"}, min_position_std_m, 0.0,
                1000.0);
   visitor.real({"min_yaw_std", "rad", "no heading claims to be more accurate than this"}, min_yaw_std_rad, 0.0, 3.2);
-  visitor.integer(
-      {"max_proposal_images", "1", "of a larger map a guided recovery weighs only so many images per image"},
-      max_proposal_images, 1, std::numeric_limits<int>::max());
+  visitor.integer({"sweep_images", "1",
+                   "of a larger map, guided recovery and the place check compare at most this number per image"},
+                  sweep_images, 1, std::numeric_limits<int>::max());
+  visitor.renamed("max_proposal_images", "sweep_images");
+  visitor.renamed("state/place_check_images", "sweep_images");
   match.declare(visitor);
   similarity.declare(visitor);
   hybrid.declare(visitor);
@@ -41,11 +40,8 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   pf.declare(visitor);
 }
 
-std::vector<std::string> LocalizerConfig::violations() const {
-  std::vector<std::string> wrong = rangeViolations(*this);
-  for (const auto& violation : state.violations()) wrong.push_back(violation);
-  for (const auto& violation : dpso.violations()) wrong.push_back(violation);
-  return wrong;
+FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map) {
+  return {map.image_size, map.sift, config.match, config.prune, config.max_image_gap_s, config.sift_backend};
 }
 
 }  // namespace visual_localization

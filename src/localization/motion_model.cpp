@@ -1,4 +1,4 @@
-#include "visual_localization/localization/motion_model.h"
+#include "localization/motion_model.h"
 
 #include <cmath>
 #include <utility>

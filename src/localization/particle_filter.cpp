@@ -1,4 +1,4 @@
-#include "visual_localization/localization/particle_filter.h"
+#include "localization/particle_filter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,25 +7,8 @@
 
 #include "base/angles.h"
 #include "visual_localization/localization/particles.h"
-#include "visual_localization/localization/tracker_factory.h"
 
 namespace visual_localization {
-
-void ParticleFilterConfig::declare(ParameterVisitor& visitor) {
-  visitor.integer({"pf/particles", "1", "number of particles (m)"}, particles, 2, 100000);
-  visitor.real({"pf/pull", "1", "share of the way to its nearest training image that a particle is moved"}, pull, 0.0,
-               1.0);
-  visitor.real({"pf/random_share", "1", "worst particles that are replaced by random ones after each image"},
-               random_share, 0.0, 1.0);
-  visitor.real({"pf/gaussian_std", "m", "step of pf_gaussian per image and axis"}, gaussian_std_m, 0.0, 1000.0);
-  visitor.real({"pf/rotation_std", "deg", "how much pf_linear turns per image (sigma_rot)"}, rotation_std_deg, 0.0,
-               180.0);
-  visitor.real(
-      {"pf/acceleration_std", "1", "how much the logarithm of pf_linear's speed changes per image (sigma_acc)"},
-      acceleration_std, 0.0, 1.0);
-  visitor.real({"pf/initial_speed", "m", "first speed of pf_linear's particles per image (v_init)"}, initial_speed_m,
-               0.0, 1000.0);
-}
 
 std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
                                              const TrainingMap& map) {
@@ -97,7 +80,7 @@ void ParticleFilter::resample() {
   particles_.swap(drawn_);
 }
 
-void ParticleFilter::weigh(ScoreCache& scores) {
+void ParticleFilter::weigh(Scores& scores) {
   best_ = Fitness();
   for (Particle& particle : particles_) {
     const Fitness fitness = evaluateFitness(particle.position_m, map_, scores, fitness_config_);

@@ -3,11 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "base/time.h"
-#include "visual_localization/features/global_features.h"
-#include "visual_localization/localization/score.h"
 
 namespace visual_localization {
 
@@ -53,18 +50,12 @@ Score GlobalSimilarity::scoreOf(double similarity) const {
   return {similarity, std::pow(similarity, config_.global_exponent), 0, similarity >= config_.global_recognised};
 }
 
-void ScoreCache::startImage(Compare compare) {
-  compare_ = std::move(compare);
-  entries_.clear();
-}
+LiveImage::LiveImage(const TrainingMap& map, const FrontEndConfig& front_end, const SimilarityConfig& similarity)
+    : map_(map), front_end_(front_end), sift_similarity_(front_end.match, similarity), global_similarity_(similarity) {}
 
-Score ScoreCache::operator[](std::size_t training_image) {
-  std::uint32_t& entry = entry_of_.at(training_image);
-  if (entry < entries_.size() && entries_[entry].training_image == training_image) return entries_[entry].score;
-  const Score score = compare_(training_image);
-  entry = static_cast<std::uint32_t>(entries_.size());
-  entries_.push_back({training_image, score});
-  return score;
+void LiveImage::set(std::int64_t stamp_ns, const cv::Mat& grey) {
+  front_end_.setImage(stamp_ns, grey);
+  match_ms_ = 0.0;
 }
 
 Score LiveImage::compare(FeatureKind kind, std::size_t training_image) {
@@ -72,15 +63,107 @@ Score LiveImage::compare(FeatureKind kind, std::size_t training_image) {
   if (kind == FeatureKind::kSift) {
     const SiftFeatures& current = front_end_.sift();
     const Stopwatch stopwatch;
-    const Score score = sift_.compare(current, *map_.sift(training_image));
+    const Score score = sift_similarity_.compare(current, *map_.sift(training_image));
     match_ms_ += stopwatch.elapsed_ms();
     return score;
   }
   const GlobalFeatures& current = front_end_.global();
   const Stopwatch stopwatch;
-  const Score score = global_.compare(current, *map_.global(training_image));
+  const Score score = global_similarity_.compare(current, *map_.global(training_image));
   match_ms_ += stopwatch.elapsed_ms();
   return score;
+}
+
+ImageReport LiveImage::report() const {
+  return {front_end_.statistics(), front_end_.siftExtracted(), sift() == nullptr ? 0 : sift()->size(),
+          front_end_.extract_ms(), match_ms_};
+}
+
+void LiveImage::configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) {
+  front_end_.configure(front_end);
+  sift_similarity_ = SiftSimilarity(front_end.match, similarity);
+  global_similarity_ = GlobalSimilarity(similarity);
+}
+
+Scores::Cache::Entry& Scores::Cache::at(FeatureKind kind, std::size_t training_image, const Compare& compare) {
+  std::uint32_t& entry = entry_of_.at(training_image);
+  if (entry < entries_.size() && entries_[entry].training_image == training_image) return entries_[entry];
+  const Score score = compare(kind, training_image);
+  entry = static_cast<std::uint32_t>(entries_.size());
+  entries_.push_back({training_image, score, false});
+  return entries_.back();
+}
+
+void Scores::startImage(FeatureKind kind, Compare compare) {
+  kind_ = kind;
+  compare_ = std::move(compare);
+  sift_.clear();
+  global_.clear();
+  comparisons_ = 0;
+}
+
+Score Scores::operator[](std::size_t training_image) {
+  Cache& cache = kind_ == FeatureKind::kSift ? sift_ : global_;
+  Cache::Entry& entry = cache.at(kind_, training_image, compare_);
+  if (!entry.counted) ++comparisons_;
+  entry.counted = true;
+  return entry.score;
+}
+
+Score Scores::global(std::size_t training_image) {
+  return global_.at(FeatureKind::kGlobal, training_image, compare_).score;
+}
+
+std::size_t Scores::swept() const { return global_.size() - (kind_ == FeatureKind::kGlobal ? comparisons_ : 0); }
+
+MapSweep::MapSweep(const TrainingMap& map, std::size_t max_images, std::size_t max_kept)
+    : map_(map), max_kept_(max_kept) {
+  configure(max_images);
+}
+
+void MapSweep::configure(std::size_t max_images) {
+  stride_ = map_.size() / max_images + (map_.size() % max_images == 0 ? 0 : 1);
+  const std::size_t swept = (map_.size() + stride_ - 1) / stride_;
+  offsets_ = std::clamp<std::size_t>(max_kept_ / swept, 1, stride_);
+  startImage();
+}
+
+void MapSweep::sweep(Scores& scores) {
+  if (!cumulated_.empty()) return;
+  offset_ = (offset_ + 1) % offsets_;
+  first_ = offset_ * stride_ / offsets_;
+  double total = 0.0;
+  for (std::size_t i = first_; i < map_.size(); i += stride_) {
+    total += scores.global(i).weight;
+    cumulated_.push_back(total);
+  }
+  if (total > 0.0) return;
+  for (std::size_t i = 0; i < cumulated_.size(); ++i) cumulated_[i] = static_cast<double>(i + 1);
+}
+
+std::size_t MapSweep::draw(Scores& scores, Random& random) {
+  sweep(scores);
+  const double target = random.uniform(0.0, cumulated_.back());
+  const auto found = std::upper_bound(cumulated_.begin(), cumulated_.end(), target);
+  return imageAt(std::min(cumulated_.size() - 1, static_cast<std::size_t>(found - cumulated_.begin())));
+}
+
+double MapSweep::ratio(Scores& scores, const Eigen::Vector2d& position_m, double near_m) {
+  constexpr std::size_t kNeighbours = 32;  // these are always asked; more of them when the sweep reaches them
+  double here = 0.0;
+  map_.nearest(position_m, kNeighbours, neighbours_);
+  for (const Neighbour& neighbour : neighbours_) {
+    if (neighbour.distance_m <= near_m) here = std::max(here, scores.global(neighbour.image).similarity);
+  }
+  double anywhere = here;
+  sweep(scores);
+  for (std::size_t i = first_; i < map_.size(); i += stride_) {
+    const double similarity = scores.global(i).similarity;
+    anywhere = std::max(anywhere, similarity);
+    // With several sessions there are more than kNeighbours here, and those are no rivals.
+    if ((map_.position_m(i) - position_m).norm() <= near_m) here = std::max(here, similarity);
+  }
+  return anywhere > 0.0 ? here / anywhere : 1.0;
 }
 
 }  // namespace visual_localization

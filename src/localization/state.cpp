@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <numeric>
 
-#include "visual_localization/localization/estimate.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -37,12 +36,12 @@ std::string toString(LocalizationState state) {
   return "UNKNOWN";
 }
 
-void Course::add(std::int64_t stamp_ns, const Eigen::Vector2d& position_m) {
+void MotionConsistency::add(std::int64_t stamp_ns, const Eigen::Vector2d& position_m) {
   points_.push_back({stamp_ns, position_m});
   if (points_.size() > length_) points_.erase(points_.begin());
 }
 
-double Course::residual_m() const {
+double MotionConsistency::residual_m() const {
   if (points_.size() < 3) return 0.0;
   const bool timed = stampsRise();
   const auto count = static_cast<double>(points_.size());
@@ -69,7 +68,7 @@ double Course::residual_m() const {
   return std::sqrt(std::max(0.0, squares - products.squaredNorm() / times) / count);
 }
 
-bool Course::stampsRise() const {
+bool MotionConsistency::stampsRise() const {
   const auto falls = [](const Point& a, const Point& b) { return b.stamp_ns <= a.stamp_ns; };
   return std::adjacent_find(points_.begin(), points_.end(), falls) == points_.end();
 }
@@ -99,12 +98,10 @@ void StateConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"state/min_place_ratio", "1",
                 "global similarity here over the best anywhere, mean over the window; below, the position is in doubt"},
                min_place_ratio, 0.0, 1.0);
-  visitor.integer({"state/place_check_images", "1", "of a larger map the place check looks at so many images only"},
-                  place_check_images, 1, 100'000'000);
-  visitor.integer({"state/course_length", "1", "so many of the last estimates must follow a steady motion"},
-                  course_length, 2, 1000);
-  visitor.real({"state/max_course_residual", "m", "up to this root mean square distance from it"},
-               max_course_residual_m, 0.0, 10000.0);
+  visitor.integer({"state/motion_length", "1", "number of the last estimates that must follow a steady motion"},
+                  motion_length, 2, 1000);
+  visitor.real({"state/max_motion_residual", "m", "up to this root mean square distance from it"},
+               max_motion_residual_m, 0.0, 10000.0);
   visitor.integer(
       {"state/off_map_images", "1", "so many images that confirm nothing, with no TRACKING in between, mean OFF_MAP"},
       off_map_images, 1, 100000);
@@ -118,16 +115,15 @@ void StateConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"state/frozen_time", "s",
                 "but only once they span so much time: a stream may repeat each image to reach its rate"},
                frozen_time_s, 0.0, 3600.0);
-}
-
-std::vector<std::string> StateConfig::violations() const {
-  if (images_to_confirm <= window) return {};
-  return {parameters::exceeds("state/images_to_confirm", std::int64_t{images_to_confirm}, "'state/window'",
-                              std::int64_t{window})};
+  visitor.atMost("state/images_to_confirm", images_to_confirm, "state/window", window);
+  visitor.renamed("state/course_length", "state/motion_length");
+  visitor.renamed("state/max_course_residual", "state/max_motion_residual");
 }
 
 void StateAssessor::configure(const StateConfig& config) {
-  if (config.course_length != config_.course_length) course_ = Course(static_cast<std::size_t>(config.course_length));
+  if (config.motion_length != config_.motion_length) {
+    motion_ = MotionConsistency(static_cast<std::size_t>(config.motion_length));
+  }
   config_ = config;
 }
 
@@ -138,15 +134,16 @@ LocalizationState StateAssessor::doubt(bool recovering) {
   return stateOf(false, recovering);
 }
 
-LocalizationState StateAssessor::assess(const TrackerEstimate& estimate, const Evidence& evidence) {
-  remember(estimate, evidence);
+LocalizationState StateAssessor::update(std::int64_t stamp_ns, const TrackerEstimate& estimate,
+                                        const Evidence& evidence) {
+  remember(stamp_ns, estimate, evidence);
   const bool certain = isCertain();
   ever_confirmed_ = ever_confirmed_ || certain;
   // Matched local features are of a mapped place, even while the position is not certain.
   const bool sees_map = lastConfirms() && evidence.features == FeatureKind::kSift;
   if (certain) unconfirmed_ = 0;
   if (!certain && !evidence.blind && !sees_map) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
-  return stateOf(certain, evidence.recovering);
+  return stateOf(certain, estimate.tuning.recovering);
 }
 
 LocalizationState StateAssessor::stateOf(bool certain, bool recovering) const {
@@ -156,10 +153,10 @@ LocalizationState StateAssessor::stateOf(bool certain, bool recovering) const {
   return ever_confirmed_ ? LocalizationState::kUncertain : LocalizationState::kInitializing;
 }
 
-void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& evidence) {
+void StateAssessor::remember(std::int64_t stamp_ns, const TrackerEstimate& estimate, const Evidence& evidence) {
   if (last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m) forget();
   last_position_m_ = estimate.position_m;
-  course_.add(evidence.stamp_ns, estimate.position_m);
+  motion_.add(stamp_ns, estimate.position_m);
   confirmations_.push_back(confirms(estimate, evidence.features) ? 1 : 0);
   place_ratios_.push_back(evidence.place_ratio);
   const auto window = static_cast<std::size_t>(config_.window);
@@ -170,13 +167,13 @@ void StateAssessor::remember(const TrackerEstimate& estimate, const Evidence& ev
 void StateAssessor::forget() {
   confirmations_.clear();
   place_ratios_.clear();
-  course_.clear();
+  motion_.clear();
 }
 
 bool StateAssessor::isCertain() const {
   const auto confirmed = std::count(confirmations_.begin(), confirmations_.end(), 1);
   return confirmed >= config_.images_to_confirm && !isDoubtful() &&
-         course_.residual_m() <= config_.max_course_residual_m;
+         motion_.residual_m() <= config_.max_motion_residual_m;
 }
 
 bool StateAssessor::isDoubtful() const {

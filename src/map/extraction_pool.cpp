@@ -38,7 +38,8 @@ ExtractionPool::ExtractionPool(const SiftConfig& sift, const std::string& sift_b
 ExtractionPool::~ExtractionPool() = default;
 
 TrainingImage ExtractionPool::extract(const RawImage& image, Worker& worker) const {
-  const cv::Mat& grey = withUsualContrast(image.grey, greyLevelsOf(image.grey), worker.spread);
+  const GreyLevels levels = greyLevelsOf(image.grey);  // named: GCC 13 and later take the result for a part of it
+  const cv::Mat& grey = withUsualContrast(image.grey, levels, worker.spread);
   return {image.place, worker.sift->extract(grey), worker.global.extract(grey),
           previewOf(image.grey, preview_width_px_)};
 }

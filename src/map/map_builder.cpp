@@ -81,12 +81,6 @@ std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<co
   return pointers;
 }
 
-MapBuilderConfig validated(const MapBuilderConfig& config) {
-  const std::vector<std::string> wrong = config.violations();
-  if (!wrong.empty()) throw ParameterError(wrong.front());
-  return config;
-}
-
 }  // namespace
 
 void MapBuilderConfig::declare(ParameterVisitor& visitor) {
@@ -104,16 +98,8 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   trajectory.declare(visitor);
 }
 
-std::vector<std::string> MapBuilderConfig::violations() const {
-  std::vector<std::string> wrong = rangeViolations(*this);
-  for (const auto& part : {sift.violations(), match.violations(), trajectory.violations()}) {
-    wrong.insert(wrong.end(), part.begin(), part.end());
-  }
-  return wrong;
-}
-
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources)
-    : config_(validated(config)),
+    : config_(requireValid(config)),
       extraction_(std::make_unique<ExtractionPool>(config_.sift, config_.sift_backend, config_.preview_width_px,
                                                    resources.threads)),
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),

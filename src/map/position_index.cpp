@@ -69,6 +69,29 @@ class OrderedResults {
   std::vector<Neighbour>& found_;
 };
 
+/// The indices of the positions nearer than a radius, in the order of the search. The elements of nanoflann's own
+/// result set changed their type between its versions 1.4 and 1.7.
+class IndicesWithin {
+ public:
+  using DistanceType = double;
+
+  IndicesWithin(double squared_radius_m2, std::vector<std::uint32_t>& found)
+      : squared_radius_m2_(squared_radius_m2), found_(found) {}
+
+  std::size_t size() const { return found_.size(); }
+  bool full() const { return true; }
+  bool addPoint(double squared_m2, std::uint32_t index) {
+    if (squared_m2 < squared_radius_m2_) found_.push_back(index);
+    return true;
+  }
+  double worstDist() const { return squared_radius_m2_; }
+  void sort() {}
+
+ private:
+  double squared_radius_m2_;
+  std::vector<std::uint32_t>& found_;
+};
+
 /// Positions up to this number get a grid; building one for a city would take longer than it saves.
 constexpr std::size_t kLargestGrid = 20000;
 
@@ -132,11 +155,9 @@ class PositionIndex::Tree {
 
   /// In order of index.
   std::vector<std::uint32_t> within(const Eigen::Vector2d& centre_m, double radius_m) const {
-    std::vector<std::pair<std::uint32_t, double>> found;
-    tree_.radiusSearch(centre_m.data(), radius_m * radius_m, found, {});
     std::vector<std::uint32_t> indices;
-    indices.reserve(found.size());
-    for (const auto& [index, squared_m2] : found) indices.push_back(index);
+    IndicesWithin results(radius_m * radius_m, indices);
+    tree_.findNeighbors(results, centre_m.data(), {});
     std::sort(indices.begin(), indices.end());
     return indices;
   }

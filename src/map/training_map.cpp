@@ -1,10 +1,12 @@
 #include "visual_localization/map/training_map.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "base/angles.h"
 #include "map/feature_store.h"
 #include "map/position_index.h"
 
@@ -126,7 +128,8 @@ TrainingPlace TrainingMap::place(std::size_t i) const {
 }
 
 TrainingImage TrainingMap::image(std::size_t i) const {
-  return {place(i), *store_->sift(i), *store_->global(i), store_->preview(i)};
+  const TrainingPlace taken_at = place(i);  // GCC 9 and 10 crash at an unnamed one
+  return {taken_at, *store_->sift(i), *store_->global(i), store_->preview(i)};
 }
 
 Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const { return index_->nearest(position_m); }
@@ -139,6 +142,30 @@ std::vector<Neighbour> TrainingMap::nearest(const Eigen::Vector2d& position_m, s
 
 void TrainingMap::nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
   index_->nearest(position_m, count, found);
+}
+
+Heading headingAt(const TrainingMap& map, const Eigen::Vector2d& position_m, std::optional<std::size_t> recognised,
+                  std::vector<Neighbour>& neighbours) {
+  constexpr std::size_t kNeighbours = 5;
+  // A robot that comes round a corner has images of both its sides; one that comes back is turned by about pi.
+  constexpr double kFacesAway_rad = 2.0 / 3.0 * kPi;
+  const auto sameWay = [&](const Neighbour& neighbour) {
+    return !recognised ||
+           std::abs(angleDifference(map.yaw_rad(*recognised), map.yaw_rad(neighbour.image))) <= kFacesAway_rad;
+  };
+  map.nearest(position_m, kNeighbours, neighbours);
+  Heading heading;
+  heading.yaw_rad = map.yaw_rad(sameWay(neighbours.front()) ? neighbours.front().image : *recognised);
+  const bool any_same_way = std::any_of(neighbours.begin(), neighbours.end(), sameWay);
+  std::size_t counted = 0;
+  for (const Neighbour& neighbour : neighbours) {
+    if (any_same_way && !sameWay(neighbour)) continue;
+    const double difference = angleDifference(heading.yaw_rad, map.yaw_rad(neighbour.image));
+    heading.variance_rad2 += difference * difference;
+    ++counted;
+  }
+  heading.variance_rad2 /= static_cast<double>(counted);
+  return heading;
 }
 
 }  // namespace visual_localization

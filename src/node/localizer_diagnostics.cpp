@@ -15,31 +15,31 @@ constexpr double kBright = 235.0;
 constexpr double kDull = 8.0;
 constexpr double kStretched = 0.05;
 
-const char* guessAt(const ImageLook& look) {
+const char* guessAt(const ImageStatistics& look) {
   if (look.mean_grey < kDark) return ": dark or covered?";
   if (look.mean_grey > kBright) return ": overexposed?";
   if (look.contrast < kDull) return ": fog, or something before the lens?";
   return ": blurred, or fewer than the image before showed as well?";
 }
 
-std::string brightness(const ImageLook& look) {
+std::string brightness(const ImageStatistics& look) {
   char text[80];
   std::snprintf(text, sizeof text, "mean grey level %.0f of 255, contrast %.0f", look.mean_grey, look.contrast);
   return text + std::string(guessAt(look));
 }
 
 std::string features(const Estimate& estimate) {
-  if (estimate.features != FeatureKind::kSift) return "Hardly anything in the image";
-  const std::string kept = std::to_string(estimate.features_kept);
-  if (estimate.features_kept == estimate.features_extracted) return kept + " features in the image";
-  return kept + " of " + std::to_string(estimate.features_extracted) + " features in the image are of use";
+  if (estimate.evidence.features != FeatureKind::kSift) return "Hardly anything in the image";
+  const std::string kept = std::to_string(estimate.image.features_kept);
+  if (estimate.image.features_kept == estimate.image.features_extracted) return kept + " features in the image";
+  return kept + " of " + std::to_string(estimate.image.features_extracted) + " features in the image are of use";
 }
 
-bool looksBad(const ImageLook& look) {
+bool looksBad(const ImageStatistics& look) {
   return look.mean_grey < kDark || look.mean_grey > kBright || look.contrast < kDull;
 }
 
-std::string stretched(const ImageLook& look) {
+std::string stretched(const ImageStatistics& look) {
   char text[120];
   std::snprintf(text, sizeof text, "Images are of another shape than the map's, stretched by %.2f: another camera?",
                 look.stretch > 1.0 ? look.stretch : 1.0 / look.stretch);
@@ -58,11 +58,13 @@ std::string imageTrouble(const Estimate& estimate) {
   if (estimate.frozen) {
     const std::string times = std::to_string(estimate.repeats + 1) + " times";
     const std::string sent = "The camera has sent the same image " + times;
-    return looksBad(estimate.look) ? sent + ", " + brightness(estimate.look) : sent + ": frozen?";
+    return looksBad(estimate.image.statistics) ? sent + ", " + brightness(estimate.image.statistics)
+                                               : sent + ": frozen?";
   }
   if (estimate.state == LocalizationState::kTracking) return {};
-  if (estimate.blind || looksBad(estimate.look)) return features(estimate) + ", " + brightness(estimate.look);
-  if (std::abs(estimate.look.stretch - 1.0) > kStretched) return stretched(estimate.look);
+  if (estimate.evidence.blind || looksBad(estimate.image.statistics))
+    return features(estimate) + ", " + brightness(estimate.image.statistics);
+  if (std::abs(estimate.image.statistics.stretch - 1.0) > kStretched) return stretched(estimate.image.statistics);
   return {};
 }
 
@@ -137,16 +139,16 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
   status.summary(state == LocalizationState::kTracking ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
                  toString(state));
   if (!estimate_) return;
-  status.add("Best similarity", estimate_->best.similarity);
-  status.add("Matched features", estimate_->best.matches);
-  status.addf("They look so many times larger", "%.2f", estimate_->best.scale);
-  status.add("Features kept", estimate_->features_kept);
-  status.addf("Looks like here, of the best anywhere", "%.3f", estimate_->place_ratio);
-  status.addf("Residual of the course (m)", "%.2f", estimate_->course_residual_m);
+  status.add("Best similarity", estimate_->tracked.best.similarity);
+  status.add("Matched features", estimate_->tracked.best.matches);
+  status.addf("They look so many times larger", "%.2f", estimate_->tracked.best.scale);
+  status.add("Features kept", estimate_->image.features_kept);
+  status.addf("Looks like here, of the best anywhere", "%.3f", estimate_->evidence.place_ratio);
+  status.addf("Motion residual (m)", "%.2f", estimate_->motion_residual_m);
   status.add("Images compared", estimate_->comparisons);
-  status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->spread_m.x(), estimate_->spread_m.y());
-  status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->times.extract_ms, estimate_->times.match_ms,
-              estimate_->times.update_ms);
+  status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->tracked.spread_m.x(), estimate_->tracked.spread_m.y());
+  status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->image.extract_ms, estimate_->image.match_ms,
+              estimate_->update_ms);
 }
 
 void LocalizerDiagnostics::reportImages(Wrapper& status) {
@@ -170,7 +172,8 @@ void LocalizerDiagnostics::reportImages(Wrapper& status) {
   status.add("Late", counts_.late);
   status.add("Refused", counts_.refused);
   if (!estimate_) return;
-  status.addf("Mean grey level, contrast (of 255)", "%.0f, %.0f", estimate_->look.mean_grey, estimate_->look.contrast);
+  status.addf("Mean grey level, contrast (of 255)", "%.0f, %.0f", estimate_->image.statistics.mean_grey,
+              estimate_->image.statistics.contrast);
   status.add("Repeats of the last image", estimate_->repeats);
 }
 

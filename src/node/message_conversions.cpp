@@ -107,8 +107,8 @@ bool isFinite(const Estimate& estimate) {
   return pose.position_m.allFinite() && pose.covariance_m2.allFinite() && std::isfinite(pose.yaw_rad) &&
          std::isfinite(pose.yaw_variance_rad2) && std::isfinite(pose.geodetic.latitude_deg) &&
          std::isfinite(pose.geodetic.longitude_deg) && std::isfinite(pose.geodetic.altitude_m) &&
-         std::isfinite(estimate.best.similarity) && estimate.spread_m.allFinite() &&
-         std::isfinite(estimate.place_ratio) && std::isfinite(estimate.course_residual_m);
+         std::isfinite(estimate.tracked.best.similarity) && estimate.tracked.spread_m.allFinite() &&
+         std::isfinite(estimate.evidence.place_ratio) && std::isfinite(estimate.motion_residual_m);
 }
 
 bool isFinite(const Particle& particle) {
@@ -148,25 +148,26 @@ LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& he
   message.header = header;
   message.state = static_cast<std::uint8_t>(estimate.state);
   message.state_name = toString(estimate.state);
-  message.best_similarity = estimate.best.similarity;
-  message.best_matches = count(estimate.best.matches);
-  message.best_scale = estimate.best.scale;
-  message.best_image = estimate.comparisons > 0 ? static_cast<std::int64_t>(estimate.best_image) : -1;
-  message.features = static_cast<std::uint8_t>(estimate.features);
+  message.best_similarity = estimate.tracked.best.similarity;
+  message.best_matches = count(estimate.tracked.best.matches);
+  message.best_scale = estimate.tracked.best.scale;
+  message.best_image = estimate.comparisons > 0 ? static_cast<std::int64_t>(estimate.tracked.best_image) : -1;
+  message.features = static_cast<std::uint8_t>(estimate.evidence.features);
   message.comparisons = count(estimate.comparisons);
-  message.features_extracted = count(estimate.features_extracted);
-  message.features_kept = count(estimate.features_kept);
-  message.place_ratio = estimate.place_ratio;
-  message.course_residual = estimate.course_residual_m;
-  message.v0 = estimate.tuning.v0;
-  message.speed_ema = estimate.tuning.speed_ema;
-  message.quantum_share = estimate.tuning.quantum_share;
-  message.phi2 = estimate.tuning.phi2;
-  message.sigma_x = estimate.spread_m.x();
-  message.sigma_y = estimate.spread_m.y();
-  message.extract_ms = estimate.times.extract_ms;
-  message.match_ms = estimate.times.match_ms;
-  message.update_ms = estimate.times.update_ms;
+  message.swept = count(estimate.swept);
+  message.features_extracted = count(estimate.image.features_extracted);
+  message.features_kept = count(estimate.image.features_kept);
+  message.place_ratio = estimate.evidence.place_ratio;
+  message.motion_residual = estimate.motion_residual_m;
+  message.v0 = estimate.tracked.tuning.v0;
+  message.speed_ema = estimate.tracked.tuning.speed_ema;
+  message.quantum_share = estimate.tracked.tuning.quantum_share;
+  message.phi2 = estimate.tracked.tuning.phi2;
+  message.sigma_x = estimate.tracked.spread_m.x();
+  message.sigma_y = estimate.tracked.spread_m.y();
+  message.extract_ms = estimate.image.extract_ms;
+  message.match_ms = estimate.image.match_ms;
+  message.update_ms = estimate.update_ms;
   return message;
 }
 

@@ -16,10 +16,9 @@ constexpr bool kAtStartOnly = true;
 constexpr int kLargestMapCache_mb = 1 << 20;  ///< a tebibyte
 
 /// tf2 knows no leading slash, and an empty name is no frame.
-void checkFrame(const std::string& name, const std::string& frame, std::vector<std::string>& wrong) {
-  if (!frame.empty() && frame.front() != '/' && frame.find_first_of(" \t\n") == std::string::npos) return;
-  wrong.push_back("parameter '" + name + "' = '" + frame +
-                  "' is not allowed: must be a frame name without leading slash or space");
+void requireFrame(ParameterVisitor& visitor, const std::string& name, const std::string& frame) {
+  visitor.require(!frame.empty() && frame.front() != '/' && frame.find_first_of(" \t\n") == std::string::npos, name,
+                  "'" + frame + "'", "a frame name without leading slash or space");
 }
 
 const char* const kIntroduction =
@@ -73,21 +72,13 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.text({"global_frame_id", "", "frame of the map", kAtStartOnly}, global_frame_id);
   visitor.text({"odom_frame_id", "", "frame of the odometry", kAtStartOnly}, odom_frame_id);
   visitor.text({"base_frame_id", "", "frame of the robot", kAtStartOnly}, base_frame_id);
-}
-
-std::vector<std::string> NodeConfig::violations() const {
-  std::vector<std::string> wrong = rangeViolations(*this);
-  checkFrame("global_frame_id", global_frame_id, wrong);
-  checkFrame("odom_frame_id", odom_frame_id, wrong);
-  checkFrame("base_frame_id", base_frame_id, wrong);
-  if (!map_directory.empty() && map_directory.front() != '/') {
-    wrong.push_back("parameter 'map_directory' = '" + map_directory + "' is not allowed: must be an absolute path");
-  }
-  if (global_frame_id == base_frame_id || global_frame_id == odom_frame_id) {
-    wrong.push_back("parameter 'global_frame_id' = '" + global_frame_id +
-                    "' is not allowed: must differ from odom_frame_id and base_frame_id");
-  }
-  return wrong;
+  requireFrame(visitor, "global_frame_id", global_frame_id);
+  requireFrame(visitor, "odom_frame_id", odom_frame_id);
+  requireFrame(visitor, "base_frame_id", base_frame_id);
+  visitor.require(map_directory.empty() || map_directory.front() == '/', "map_directory", "'" + map_directory + "'",
+                  "an absolute path");
+  visitor.require(global_frame_id != base_frame_id && global_frame_id != odom_frame_id, "global_frame_id",
+                  "'" + global_frame_id + "'", "another one than odom_frame_id and base_frame_id");
 }
 
 MapLoading NodeConfig::mapLoading(std::function<void(const std::string&)> warn) const {
@@ -99,10 +90,21 @@ void NodeParameters::declare(ParameterVisitor& visitor) {
   localizer.declare(visitor);
 }
 
-std::vector<std::string> NodeParameters::violations() const {
-  std::vector<std::string> wrong = node.violations();
-  for (const auto& violation : localizer.violations()) wrong.push_back(violation);
-  return wrong;
+std::string localizerYaml() {
+  NodeParameters defaults;
+  return "# All parameters of the localizer with their defaults: unit and range, then the meaning. Made from the code "
+         "by\n"
+         "# `localizer_node --localizer-config`. Loaded into the private namespace of the node. A parameter that is\n"
+         "# unknown or out of range stops the start.\n\n" +
+         parameters::yamlFile([&defaults](ParameterVisitor& visitor) { defaults.declare(visitor); });
+}
+
+std::string mapBuilderYaml() {
+  MapBuilderConfig defaults;
+  return "# All parameters of the map builder with their defaults: unit and range, then the meaning. Made from the "
+         "code by\n"
+         "# `localizer_node --map-builder-config`; for `map_builder --config`.\n\n" +
+         parameters::yamlFile([&defaults](ParameterVisitor& visitor) { defaults.declare(visitor); });
 }
 
 std::string parametersPage() {

@@ -24,7 +24,6 @@ struct NodeConfig {
   std::string base_frame_id = "base_link";
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const;
   /// How ~map and the maps after it are opened; `warn` hears of features that cannot be read.
   MapLoading mapLoading(std::function<void(const std::string&)> warn) const;
 };
@@ -35,11 +34,13 @@ struct NodeParameters {
   LocalizerConfig localizer;
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const;
 };
 
 /// doc/parameters.md: every parameter of the localizer and of the map builder, made from their declarations.
 std::string parametersPage();
+/// config/localizer.yaml and config/map_builder.yaml, made from the same declarations.
+std::string localizerYaml();
+std::string mapBuilderYaml();
 
 /// The map file that `path` names when only maps below `directory` may be opened: a relative path begins there, and
 /// symbolic links and ".." are followed. Without a directory, the path as it is. Throws MapStoreError, in one line that

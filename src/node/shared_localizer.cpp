@@ -50,8 +50,7 @@ void checkCovariance(const Eigen::Matrix2d& covariance) {
 }  // namespace
 
 void SharedLocalizer::configure(const LocalizerConfig& config) {
-  const auto wrong = config.violations();
-  if (!wrong.empty()) throw ParameterError(wrong.front());
+  requireValid(config);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (localizer_) localizer_->configure(config);
   config_ = config;

@@ -1,14 +1,12 @@
 #include "visual_localization/parameters/parameters.h"
 
-#include <cmath>
+#include <algorithm>
 #include <limits>
 #include <set>
 #include <sstream>
-
-#include <yaml-cpp/yaml.h>
+#include <utility>
 
 #include "base/text.h"
-#include "parameters/yaml_map.h"
 
 namespace visual_localization {
 namespace {
@@ -46,8 +44,12 @@ bool contains(const std::vector<std::string>& options, const std::string& value)
   return false;
 }
 
+std::string notAllowed(const std::string& name, const std::string& value, const std::string& allowed) {
+  return "parameter '" + name + "' = " + value + " is not allowed: must " + allowed;
+}
+
 [[noreturn]] void refuse(const std::string& name, const std::string& value, const std::string& allowed) {
-  throw ParameterError("parameter '" + name + "' = " + value + " is not allowed: must be " + allowed);
+  throw ParameterError(notAllowed(name, value, "be " + allowed));
 }
 
 /// Checks all values first, so that a later error cannot leave a half-changed configuration.
@@ -104,6 +106,10 @@ class Assigner : public ParameterVisitor {
     if (write_) field = *wanted;
   }
 
+  void renamed(const std::string& old_name, const std::string& name) override {
+    if (values_.count(old_name) != 0) throw ParameterError("parameter '" + old_name + "' is renamed to '" + name + "'");
+  }
+
   void refuseUnknown() const {
     for (const auto& [name, value] : values_) {
       if (known_.count(name) != 0) continue;
@@ -138,12 +144,19 @@ class RangeChecker : public ParameterVisitor {
     if (!contains(options, field)) report(info.name, field, oneOf(options));
   }
   void text(const ParameterInfo&, std::string&) override {}
+  void atMost(const std::string& name, double value, const std::string& limit_name, double limit) override {
+    if (value <= limit) return;
+    violations.push_back(notAllowed(name, number(value), "not exceed '" + limit_name + "' = " + number(limit)));
+  }
+  void require(bool holds, const std::string& name, const std::string& value, const std::string& allowed) override {
+    if (!holds) report(name, value, allowed);
+  }
 
   std::vector<std::string> violations;
 
  private:
   void report(const std::string& name, const std::string& value, const std::string& allowed) {
-    violations.push_back("parameter '" + name + "' = " + value + " is not allowed: must be " + allowed);
+    violations.push_back(notAllowed(name, value, "be " + allowed));
   }
 };
 
@@ -192,6 +205,54 @@ class TableWriter : public ParameterVisitor {
   const bool with_run_time_;
 };
 
+/// `(unit, )range`, for the comment of a YAML file.
+std::string rangeComment(const ParameterInfo& info, const std::string& allowed) {
+  return (info.unit.empty() || info.unit == "1" ? "" : info.unit + " ") + allowed;
+}
+
+class YamlWriter : public ParameterVisitor {
+ public:
+  void real(const ParameterInfo& info, double& field, double min, double max) override {
+    line(info, number(field), rangeComment(info, range(min, max)));
+  }
+  void integer(const ParameterInfo& info, int& field, int min, int max) override {
+    line(info, std::to_string(field), rangeComment(info, "integer " + range(min, max)));
+  }
+  void flag(const ParameterInfo& info, bool& field) override { line(info, field ? "true" : "false", "true or false"); }
+  void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) override {
+    line(info, field, oneOf(options));
+  }
+  void text(const ParameterInfo& info, std::string& field) override { line(info, "\"" + field + "\"", "text"); }
+
+  /// Parameters without a section first, then the sections in order of declaration.
+  std::string file() const {
+    std::string text = top_;
+    for (const auto& [name, lines] : sections_) text += "\n" + name + ":\n" + lines;
+    return text;
+  }
+
+ private:
+  void line(const ParameterInfo& info, const std::string& value, const std::string& allowed) {
+    const std::size_t slash = info.name.find('/');
+    std::string text = slash == std::string::npos ? info.name : "  " + info.name.substr(slash + 1);
+    text += ": " + value;
+    constexpr std::size_t kCommentColumn = 40;
+    text.resize(std::max(kCommentColumn, text.size()), ' ');
+    text += "  # " + allowed + "; " + info.description + "\n";
+    (slash == std::string::npos ? top_ : section(info.name.substr(0, slash))) += text;
+  }
+
+  std::string& section(const std::string& name) {
+    for (auto& [known, lines] : sections_) {
+      if (known == name) return lines;
+    }
+    return sections_.emplace_back(name, "").second;
+  }
+
+  std::string top_;
+  std::vector<std::pair<std::string, std::string>> sections_;
+};
+
 }  // namespace
 
 void assign(const Declaration& declare, const ParameterValues& values) {
@@ -220,30 +281,10 @@ std::string markdownTable(const Declaration& declare, bool with_run_time) {
   return writer.table;
 }
 
-ParameterValues readYaml(const std::string& path) {
-  try {
-    const YAML::Node root = YAML::LoadFile(path);
-    if (root.IsNull()) return {};
-    if (!root.IsMap()) throw ParameterError(path + ": must be a mapping of parameter names to values");
-    return flatten(root, path);
-  } catch (const YAML::BadFile&) {
-    throw ParameterError(path + ": cannot be opened");
-  } catch (const ParameterError&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw ParameterError(path + ": not valid YAML: " + error.what());
-  }
-}
-
-ParameterValue parseScalar(const std::string& text) {
-  const YAML::Node node(text);
-  bool flag = false;
-  std::int64_t integer = 0;
-  double real = 0.0;
-  if (YAML::convert<bool>::decode(node, flag)) return flag;
-  if (YAML::convert<std::int64_t>::decode(node, integer)) return integer;
-  if (YAML::convert<double>::decode(node, real)) return real;
-  return text;
+std::string yamlFile(const Declaration& declare) {
+  YamlWriter writer;
+  declare(writer);
+  return writer.file();
 }
 
 std::string toString(const ParameterValue& value) {
@@ -251,12 +292,6 @@ std::string toString(const ParameterValue& value) {
   if (const auto* integer = std::get_if<std::int64_t>(&value)) return std::to_string(*integer);
   if (const auto* real = std::get_if<double>(&value)) return number(*real);
   return std::get<std::string>(value);
-}
-
-std::string exceeds(const std::string& name, const ParameterValue& value, const std::string& limit_name,
-                    const ParameterValue& limit) {
-  return "parameter '" + name + "' = " + toString(value) + " is not allowed: must not exceed " + limit_name + " = " +
-         toString(limit);
 }
 
 }  // namespace visual_localization::parameters

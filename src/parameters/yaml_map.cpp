@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/yaml.h>
 
 #include "base/files.h"
 
@@ -69,10 +70,7 @@ bool hasMoreThanOneDocument(const std::string& text) {
   return parser.HandleNextDocument(skipper) && static_cast<bool>(parser);
 }
 
-std::string quoted(const std::string& text) { return "'" + text + "'"; }
-
-}  // namespace
-
+/// The parameters of a mapping, nested names joined with '/'.
 ParameterValues flatten(const YAML::Node& mapping, const std::string& path) {
   Allowance allowance;
   ParameterValues out;
@@ -80,10 +78,29 @@ ParameterValues flatten(const YAML::Node& mapping, const std::string& path) {
   return out;
 }
 
-YamlMap::YamlMap(YAML::Node node, std::string path, std::string prefix)
-    : node_(std::move(node)), path_(std::move(path)), prefix_(std::move(prefix)) {
+std::string quoted(const std::string& text) { return "'" + text + "'"; }
+
+}  // namespace
+
+ParameterValue parseScalar(const std::string& text) {
+  const YAML::Node node(text);
+  bool flag = false;
+  std::int64_t integer = 0;
+  double real = 0.0;
+  if (YAML::convert<bool>::decode(node, flag)) return flag;
+  if (YAML::convert<std::int64_t>::decode(node, integer)) return integer;
+  if (YAML::convert<double>::decode(node, real)) return real;
+  return text;
+}
+
+YamlMap::YamlMap(YamlMap&&) noexcept = default;
+YamlMap& YamlMap::operator=(YamlMap&&) noexcept = default;
+YamlMap::~YamlMap() = default;
+
+YamlMap::YamlMap(const YAML::Node& node, std::string path, std::string prefix)
+    : node_(std::make_unique<YAML::Node>(node)), path_(std::move(path)), prefix_(std::move(prefix)) {
   std::set<std::string> keys;
-  for (const auto& entry : node_) {
+  for (const auto& entry : *node_) {
     const std::string key = keyOf(entry.first, prefix_.empty() ? path_ : path_ + ": " + quoted(prefix_));
     if (!keys.insert(key).second) refuse(key, "appears twice");
   }
@@ -108,11 +125,11 @@ YamlMap YamlMap::parse(const std::string& text, const std::string& path) {
   }
 }
 
-bool YamlMap::has(const std::string& key) const { return node_[key].IsDefined() && !node_[key].IsNull(); }
+bool YamlMap::has(const std::string& key) const { return (*node_)[key].IsDefined() && !(*node_)[key].IsNull(); }
 
 YAML::Node YamlMap::take(const std::string& key) {
   known_.insert(key);
-  return has(key) ? node_[key] : YAML::Node(YAML::NodeType::Undefined);
+  return has(key) ? (*node_)[key] : YAML::Node(YAML::NodeType::Undefined);
 }
 
 YAML::Node YamlMap::takeRequired(const std::string& key) {
@@ -208,6 +225,8 @@ ParameterValues YamlMap::parameters(const std::string& key) {
   return flatten(value, path_ + ": " + prefix_ + key);
 }
 
+ParameterValues YamlMap::parameters() const { return flatten(*node_, path_); }
+
 std::vector<std::pair<std::string, std::vector<std::string>>> YamlMap::sweep(const std::string& key) {
   std::vector<std::pair<std::string, std::vector<std::string>>> sweep;
   const YAML::Node value = take(key);
@@ -230,7 +249,7 @@ std::vector<std::pair<std::string, std::vector<std::string>>> YamlMap::sweep(con
 }
 
 void YamlMap::requireNoMore() const {
-  for (const auto& entry : node_) {
+  for (const auto& entry : *node_) {
     const std::string key = entry.first.Scalar();
     if (known_.count(key) != 0) continue;
     std::string allowed;
@@ -241,6 +260,28 @@ void YamlMap::requireNoMore() const {
 
 void YamlMap::refuse(const std::string& key, const std::string& why) const {
   throw ParameterError(path_ + ": " + quoted(prefix_ + key) + " " + why);
+}
+
+std::string withoutKeys(const std::string& yaml, const std::vector<std::string>& keys) {
+  try {
+    YAML::Node node = YAML::Load(yaml);
+    for (const std::string& key : keys) node.remove(key);
+    return YAML::Dump(node);
+  } catch (const YAML::Exception& error) {
+    throw ParameterError(std::string("not valid YAML: ") + error.what());
+  }
+}
+
+ParameterValues readYaml(const std::string& path) {
+  try {
+    const std::string text = readFile(path);
+    if (YAML::Load(text).IsNull()) return {};
+    return YamlMap::parse(text, path).parameters();
+  } catch (const FileError& error) {
+    throw ParameterError(error.what());
+  } catch (const YAML::Exception& error) {
+    throw ParameterError(path + ": not valid YAML: " + error.what());
+  }
 }
 
 }  // namespace visual_localization::parameters

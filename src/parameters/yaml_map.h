@@ -1,13 +1,17 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include <yaml-cpp/yaml.h>
-
 #include "visual_localization/parameters/parameters.h"
+
+namespace YAML {
+class Node;
+}
 
 namespace visual_localization::parameters {
 
@@ -15,6 +19,10 @@ namespace visual_localization::parameters {
 /// is one that appears twice. All errors are ParameterErrors of one line that name the file and the key.
 class YamlMap {
  public:
+  YamlMap(YamlMap&&) noexcept;
+  YamlMap& operator=(YamlMap&&) noexcept;
+  ~YamlMap();
+
   /// The mapping at the top of a file.
   static YamlMap load(const std::string& path);
   /// The same of a text; `path` is for messages.
@@ -35,6 +43,8 @@ class YamlMap {
   std::vector<std::vector<std::string>> textLists(const std::string& key, std::size_t length);
   /// Parameters, nested or with full names; none when the key is missing.
   ParameterValues parameters(const std::string& key);
+  /// The same of the whole mapping.
+  ParameterValues parameters() const;
   /// Parameter names with lists of texts; none when the key is missing.
   std::vector<std::pair<std::string, std::vector<std::string>>> sweep(const std::string& key);
 
@@ -44,17 +54,18 @@ class YamlMap {
   [[noreturn]] void refuse(const std::string& key, const std::string& why) const;
 
  private:
-  YamlMap(YAML::Node node, std::string path, std::string prefix);
+  YamlMap(const YAML::Node& node, std::string path, std::string prefix);
   YAML::Node take(const std::string& key);
   YAML::Node takeRequired(const std::string& key);
 
-  YAML::Node node_;
+  std::unique_ptr<YAML::Node> node_;
   std::string path_;
   std::string prefix_;  ///< where in the file, for messages
   std::set<std::string> known_;
 };
 
-/// The parameters of a mapping, nested names joined with '/'. Throws ParameterError naming the file and the key.
-ParameterValues flatten(const YAML::Node& mapping, const std::string& path);
+/// A mapping's text without comments and these keys: the same for texts that mean the same. Throws ParameterError when
+/// it is not valid YAML.
+std::string withoutKeys(const std::string& yaml, const std::vector<std::string>& keys);
 
 }  // namespace visual_localization::parameters

@@ -16,6 +16,7 @@
 
 #include "base/time.h"
 #include "test/benchmark/street_map.h"
+#include "test/support/fake_image.h"
 #include "visual_localization/localization/localizer.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/map/map_file.h"
@@ -49,12 +50,15 @@ void forget(const std::string& path) {
   ::close(file);
 }
 
-/// A view that is compared with the map like a camera's image, but was never extracted.
-class StreetImage final : public ComparableImage {
+/// Views that are compared with the map like a camera's images, but were never extracted.
+class StreetImage final : public test::FakeImage {
  public:
-  StreetImage(const StreetMap& streets, std::size_t at, const TrainingMap& map)
-      : sift_(streets.view(at, 1)), global_(streets.global(at)), map_(map) {}
+  StreetImage(const StreetMap& streets, const TrainingMap& map) : streets_(streets), map_(map) {}
 
+  void show(std::size_t at) {
+    sift_ = streets_.view(at, 1);
+    global_ = streets_.global(at);
+  }
   Score compare(FeatureKind kind, std::size_t i) override {
     return kind == FeatureKind::kSift ? by_sift_.compare(sift_, *map_.sift(i))
                                       : by_global_.compare(global_, *map_.global(i));
@@ -62,9 +66,10 @@ class StreetImage final : public ComparableImage {
   std::size_t siftFeatures() override { return sift_.size(); }
 
  private:
+  const StreetMap& streets_;
+  const TrainingMap& map_;
   SiftFeatures sift_;
   GlobalFeatures global_;
-  const TrainingMap& map_;
   SiftSimilarity by_sift_{MatchConfig(), SimilarityConfig()};
   GlobalSimilarity by_global_{SimilarityConfig()};
 };
@@ -81,12 +86,12 @@ struct Drive {
 };
 
 /// Along the images from `begin` on, one a step; places beyond the map look like nothing in it.
-Drive drive(const StreetMap& streets, Localizer& localizer, std::size_t begin, std::size_t steps) {
+Drive drive(StreetImage& image, Localizer& localizer, std::size_t begin, std::size_t steps) {
   Drive result;
   for (std::size_t i = begin; i < begin + steps; ++i) {
-    StreetImage image(streets, i, localizer.map());
+    image.show(i);
     const Stopwatch stopwatch;
-    const Estimate estimate = localizer.process(static_cast<std::int64_t>(i) * 1'000'000'000, image);
+    const Estimate estimate = localizer.process(static_cast<std::int64_t>(i) * 1'000'000'000, {});
     result.steps_ms.push_back(stopwatch.elapsed_ms());
     result.comparisons += static_cast<double>(estimate.comparisons) / static_cast<double>(steps);
     result.tracking += (estimate.state == LocalizationState::kTracking ? 1.0 : 0.0) / static_cast<double>(steps);
@@ -108,9 +113,10 @@ LocalizerConfig configFor(const TrainingMap& map, double range_m) {
 
 Drive driveTracked(const StreetMap& streets, const std::shared_ptr<const TrainingMap>& map, const Options& options) {
   const std::size_t begin = map->size() / 2;
-  Localizer localizer(map, configFor(*map, options.swarm_range_m));
+  const auto image = std::make_shared<StreetImage>(streets, *map);
+  Localizer localizer(map, configFor(*map, options.swarm_range_m), image);
   localizer.relocalize(around(map->position_m(begin), 5.0));
-  return drive(streets, localizer, begin, std::min(options.steps, map->size() - begin));
+  return drive(*image, localizer, begin, std::min(options.steps, map->size() - begin));
 }
 
 double open_s(const Options& options, std::shared_ptr<const TrainingMap>& map) {
@@ -133,8 +139,9 @@ void measure(const Options& options) {
   Drive from_file = driveTracked(streets, map, options);
   Drive warm = driveTracked(streets, map, options);
 
-  Localizer lost_robot(map, LocalizerConfig());
-  Drive lost = drive(streets, lost_robot, 2 * map->size(), 30);
+  const auto image = std::make_shared<StreetImage>(streets, *map);
+  Localizer lost_robot(map, LocalizerConfig(), image);
+  Drive lost = drive(*image, lost_robot, 2 * map->size(), 30);
   const double lost_mib = resident_mib() - before_mib;
 
   if (options.header) {

@@ -56,9 +56,9 @@ void localize(benchmark::State& state, const std::string& features, const std::s
   for (auto _ : state) {
     const Estimate estimate = localizer.process(static_cast<std::int64_t>(at) * 1000000000, imageAt(at));
     ++at;
-    total.extract_ms += estimate.times.extract_ms;
-    total.match_ms += estimate.times.match_ms;
-    total.update_ms += estimate.times.update_ms;
+    total.extract_ms += estimate.image.extract_ms;
+    total.match_ms += estimate.image.match_ms;
+    total.update_ms += estimate.update_ms;
   }
   const auto mean = benchmark::Counter::kAvgIterations;
   state.counters["extract_ms"] = benchmark::Counter(total.extract_ms, mean);

@@ -5,8 +5,8 @@
 #include <benchmark/benchmark.h>
 
 #include "localization/dpso.h"
+#include "localization/particle_filter.h"
 #include "test/support/world.h"
-#include "visual_localization/localization/particle_filter.h"
 
 namespace visual_localization::benchmarks {
 namespace {

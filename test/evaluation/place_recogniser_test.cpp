@@ -120,7 +120,7 @@ TEST(PlaceRecogniserFactory, UnknownNameIsRefusedWithThoseAllowed) {
 
 TEST(PlaceRecogniserConfig, DefaultsAreValidAndEveryFieldIsDeclared) {
   PlaceRecogniserConfig config;
-  EXPECT_THAT(config.violations(), IsEmpty());
+  EXPECT_THAT(violationsOf(config), IsEmpty());
   EXPECT_THAT(parameters::values([&config](ParameterVisitor& visitor) { config.declare(visitor); }), SizeIs(12));
 }
 
@@ -130,7 +130,7 @@ TEST(PlaceRecogniserConfig, SaysWhatIsWrong) {
   config.sequence.min_speed = 2.0;
   config.bayes.min_step = 1;
   config.bayes.window = 4;
-  EXPECT_THAT(config.violations(), SizeIs(4));
+  EXPECT_THAT(violationsOf(config), SizeIs(4));
   EXPECT_THROW(makePlaceRecogniser("exhaustive", config, true), std::invalid_argument);
   PlaceRecogniserConfig read;
   EXPECT_THROW(assignParameters(read, {{"bayes/window", std::int64_t{4}}}), ParameterError);

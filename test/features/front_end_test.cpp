@@ -14,7 +14,8 @@ using test::kSecond;
 
 class FrontEndTest : public test::WallStreet {
  protected:
-  static FrontEnd makeFrontEnd(bool prune = true) { return {SiftConfig(), MatchConfig(), {320, 240}, prune, 5.0}; }
+  static FrontEnd makeFrontEnd(bool prune = true) { return FrontEnd(configOf(prune)); }
+  static FrontEndConfig configOf(bool prune = true) { return {{320, 240}, {}, {}, prune, 5.0}; }
 };
 
 TEST_F(FrontEndTest, OnlyAnImageThatFollowsIsPruned) {
@@ -109,10 +110,10 @@ TEST_F(FrontEndTest, AnImageOfAnotherSizeIsARepetitionWhenItIsResizedToTheSame) 
   front_end.setImage(0, large);
   front_end.setImage(kSecond, large);
   EXPECT_TRUE(front_end.isRepeated());
-  EXPECT_EQ(front_end.look().stretch, 1.0);
+  EXPECT_EQ(front_end.statistics().stretch, 1.0);
   front_end.setImage(2 * kSecond, large(cv::Rect(0, 60, 640, 360)));
   EXPECT_FALSE(front_end.isRepeated());
-  EXPECT_NEAR(front_end.look().stretch, 4.0 / 3.0, 1e-9);
+  EXPECT_NEAR(front_end.statistics().stretch, 4.0 / 3.0, 1e-9);
 }
 
 TEST_F(FrontEndTest, ADullImageShowsWhatABrightOneDoes) {
@@ -124,7 +125,7 @@ TEST_F(FrontEndTest, ADullImageShowsWhatABrightOneDoes) {
   for (int i = 1; i < 3; ++i) {
     front_end.setImage(i * 100 * kSecond, dull);
     EXPECT_GT(static_cast<double>(front_end.sift().size()), 0.8 * static_cast<double>(bright));
-    EXPECT_LT(front_end.look().contrast, 15.0) << "as it was";
+    EXPECT_LT(front_end.statistics().contrast, 15.0) << "as it was";
     EXPECT_EQ(front_end.isRepeated(), i == 2);
   }
 }
@@ -147,7 +148,7 @@ TEST_F(FrontEndTest, AnImageThatStaysIsPrunedAsTheNewParametersSay) {
   for (int i = 0; i < 2; ++i) front_end.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
   const std::size_t pruned = front_end.sift().size();
   EXPECT_LT(pruned, front_end.siftExtracted());
-  front_end.configure(MatchConfig(), false, 5.0);
+  front_end.configure(configOf(false));
   front_end.setImage(2 * kSecond, viewAt(10.5));
   ASSERT_TRUE(front_end.isRepeated());
   EXPECT_EQ(front_end.sift().size(), front_end.siftExtracted());
@@ -164,11 +165,11 @@ TEST_F(FrontEndTest, SaysWhatTheImageIsLike) {
   cv::Mat halves(240, 320, CV_8UC1, cv::Scalar(10));
   halves.colRange(0, 160).setTo(50);
   front_end.setImage(0, halves);
-  EXPECT_DOUBLE_EQ(front_end.look().mean_grey, 30.0);
-  EXPECT_DOUBLE_EQ(front_end.look().contrast, 20.0);
+  EXPECT_DOUBLE_EQ(front_end.statistics().mean_grey, 30.0);
+  EXPECT_DOUBLE_EQ(front_end.statistics().contrast, 20.0);
   front_end.setImage(kSecond, cv::Mat(240, 320, CV_8UC1, cv::Scalar(255)));
-  EXPECT_DOUBLE_EQ(front_end.look().mean_grey, 255.0);
-  EXPECT_DOUBLE_EQ(front_end.look().contrast, 0.0);
+  EXPECT_DOUBLE_EQ(front_end.statistics().mean_grey, 255.0);
+  EXPECT_DOUBLE_EQ(front_end.statistics().contrast, 0.0);
 }
 
 TEST_F(FrontEndTest, WithoutPruningAllFeaturesAreKept) {
@@ -218,29 +219,6 @@ TEST_F(FrontEndTest, TheTimeCountsWhatWasExtracted) {
   EXPECT_GT(both_ms, global_ms);
   front_end.sift();
   EXPECT_EQ(front_end.extract_ms(), both_ms);
-}
-
-TEST_F(FrontEndTest, ALiveImageComparesByTheKindThatIsAskedFor) {
-  FrontEnd front_end = makeFrontEnd();
-  const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
-  const GlobalSimilarity global{SimilarityConfig()};
-  front_end.setImage(0, viewAt(12.0 + 1e-9));
-  LiveImage image(front_end, *map(), sift, global);
-  EXPECT_FALSE(front_end.siftIfExtracted()) << "nothing was asked for yet";
-
-  const Score by_global = image.compare(FeatureKind::kGlobal, 20);
-  EXPECT_FALSE(front_end.siftIfExtracted()) << "global features need no SIFT";
-  EXPECT_EQ(by_global.similarity, 1.0);  // training image 20 was taken here
-  EXPECT_EQ(by_global.matches, 0U);
-  EXPECT_LT(image.compare(FeatureKind::kGlobal, 40).similarity, 0.9);
-  const double global_ms = image.match_ms();
-  EXPECT_GT(global_ms, 0.0);
-
-  const Score by_sift = image.compare(FeatureKind::kSift, 20);
-  EXPECT_EQ(by_sift.similarity, sift.compare(front_end.sift(), map()->image(20).sift).similarity);
-  EXPECT_GT(by_sift.matches, 50U);
-  EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kSift, 50).matches);
-  EXPECT_GT(image.match_ms(), global_ms);
 }
 
 }  // namespace

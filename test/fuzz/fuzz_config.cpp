@@ -3,8 +3,6 @@
 #include <stdexcept>
 #include <string>
 
-#include <yaml-cpp/yaml.h>
-
 #include "evaluation/experiment.h"
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/localization/localizer_config.h"
@@ -21,7 +19,7 @@ void readParameters(const std::string& path) {
     fuzz::expect<ParameterError>([&] { assignParameters(builder, values); });
     LocalizerConfig localizer;
     assignParameters(localizer, values);
-    for (const auto& violation : localizer.violations()) fuzz::requireOneLine(violation);
+    for (const auto& violation : violationsOf(localizer)) fuzz::requireOneLine(violation);
   } catch (const ParameterError& error) {
     fuzz::requireOneLine(error.what());
   }

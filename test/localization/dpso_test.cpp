@@ -9,6 +9,7 @@
 #include "base/angles.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
@@ -189,8 +190,9 @@ TEST(Dpso, ASingleFalseMatchDoesNotHideHowFarTheSearchReaches) {
   Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
   const TrackerInput input = world.inTheDark();
   bool given = false;
-  input.scores.startImage(
-      [&given](std::size_t) { return std::exchange(given, true) ? Score{} : World::scoreAt(0.01); });
+  input.scores.startImage(FeatureKind::kSift, [&given](FeatureKind, std::size_t) {
+    return std::exchange(given, true) ? Score{} : World::scoreAt(0.01);
+  });
   const TrackerEstimate estimate = tracker.update(input);
   EXPECT_GT(estimate.cloud_covariance_m2.trace(), 400.0);
 }
@@ -209,12 +211,12 @@ TEST(Dpso, CountsAtMostOneComparisonAParticle) {
 }
 
 TEST(DpsoConfig, SaysWhichConstraintIsViolated) {
-  EXPECT_TRUE(DpsoConfig().violations().empty());
+  EXPECT_TRUE(violationsOf(DpsoConfig()).empty());
   DpsoConfig config;
   config.v0 = 0.5;
   config.phi2_min = 0.9;
   config.high_energy_share = 0.9;
-  EXPECT_EQ(config.violations().size(), 3u);
+  EXPECT_EQ(violationsOf(config).size(), 3u);
 }
 
 }  // namespace

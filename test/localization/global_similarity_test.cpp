@@ -80,13 +80,13 @@ TEST(SiftSimilarity, AKnownSimilarityMeansTheSameAsAComparedOne) {
 
 TEST(SimilarityConfig, IsInRangeByDefaultAndSaysWhatIsNot) {
   SimilarityConfig config;
-  EXPECT_TRUE(rangeViolations(config).empty());
+  EXPECT_TRUE(violationsOf(config).empty());
   config.sift_recognised = 1.1;
   config.global_recognised = -0.1;
   config.global_exponent = 0.5;
-  EXPECT_THAT(rangeViolations(config), ::testing::UnorderedElementsAre(::testing::HasSubstr("sift_recognised"),
-                                                                       ::testing::HasSubstr("global_recognised"),
-                                                                       ::testing::HasSubstr("global_exponent")));
+  EXPECT_THAT(violationsOf(config), ::testing::UnorderedElementsAre(::testing::HasSubstr("sift_recognised"),
+                                                                    ::testing::HasSubstr("global_recognised"),
+                                                                    ::testing::HasSubstr("global_exponent")));
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ Dpso makeSwarm(const World& world, const std::string& recovery, std::uint32_t se
 /// Whether the swarm looked where images look alike.
 bool asks(Dpso& swarm, const TrackerInput& input) {
   swarm.update(input);
-  return input.places.wasUsed();
+  return input.scores.swept() > 0;
 }
 
 /// Follows a robot until it is tracked well.
@@ -105,7 +105,9 @@ TEST(GuidedRecovery, OnlyQuantumParticlesGoWhereTheImageLooksAlike) {
   Dpso swarm = makeSwarm(world, "guided");
   const std::vector<Particle> before = swarm.particles();
   const TrackerInput input = world.inTheDark();
-  input.places.startImage([](std::size_t image) { return image == 77 ? 1.0 : 0.0; });
+  input.scores.startImage(FeatureKind::kSift, [](FeatureKind kind, std::size_t image) {
+    return kind == FeatureKind::kGlobal && image == 77 ? World::scoreAt(1.0) : Score{};
+  });
   swarm.update(input);
   for (std::size_t i = 0; i < before.size(); ++i) {
     const bool quantum = before[i].kind == ParticleKind::kQuantum;

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "test/localization/wall_street.h"
+#include "test/support/fake_image.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -24,8 +25,8 @@ TEST_F(LocalizerTest, AnEstimateAgreesWithItself) {
     estimate = localizer.process(i * kSecond, viewAt(0.5 * i + 0.3));
     EXPECT_EQ(estimate.stamp_ns, i * kSecond);
   }
-  EXPECT_GT(estimate.features_kept, 0U);
-  EXPECT_LT(estimate.features_kept, estimate.features_extracted);
+  EXPECT_GT(estimate.image.features_kept, 0U);
+  EXPECT_LT(estimate.image.features_kept, estimate.image.features_extracted);
   EXPECT_GE(estimate.pose.covariance_m2(0, 0), 0.25);
   const Eigen::Vector2d geodetic = map()->frame().toEastNorth(estimate.pose.geodetic);
   EXPECT_LT((geodetic - estimate.pose.position_m).norm(), 1e-6);
@@ -52,16 +53,16 @@ TEST_P(EveryCombination, TracksACameraAlongTheStreet) {
   for (int i = 0; i < 45; ++i) {
     const double along_m = 0.6 * i + 0.3;
     estimate = localizer.process(i * kSecond, viewAt(along_m));
-    const bool sift = estimate.features == FeatureKind::kSift;
+    const bool sift = estimate.evidence.features == FeatureKind::kSift;
     by_sift += sift ? 1 : 0;
-    EXPECT_EQ(estimate.features_extracted > 0, sift) << "global features need no SIFT";
-    EXPECT_EQ(localizer.lastSift().size(), estimate.features_kept);
-    EXPECT_EQ(estimate.best.matches > 0, sift);
+    EXPECT_EQ(estimate.image.features_extracted > 0, sift) << "global features need no SIFT";
+    EXPECT_EQ(localizer.lastSift().size(), estimate.image.features_kept);
+    EXPECT_EQ(estimate.tracked.best.matches > 0, sift);
     if (i >= 15) error_sum_m += (estimate.pose.position_m - Eigen::Vector2d(along_m, 0.0)).norm();
   }
   EXPECT_LT(error_sum_m / 30.0, 1.5);
   EXPECT_EQ(estimate.state, LocalizationState::kTracking);
-  EXPECT_GT(estimate.best.similarity, config.features == "sift" ? 0.2 : 0.8);
+  EXPECT_GT(estimate.tracked.best.similarity, config.features == "sift" ? 0.2 : 0.8);
   EXPECT_LE(estimate.comparisons, map()->size());
   const bool hybrid = config.features == "hybrid";
   EXPECT_GE(by_sift, hybrid ? 1 : config.features == "sift" ? 45 : 0);
@@ -126,65 +127,85 @@ TEST_F(LocalizerTest, HybridBeginsWithSiftWheneverThePositionIsUnknown) {
     return localizer.process(shown * kSecond, noisy(viewAt(12.0), shown));
   };
   for (const bool with_prior : {false, true}) {
-    EXPECT_EQ(next().features, FeatureKind::kSift);
+    EXPECT_EQ(next().evidence.features, FeatureKind::kSift);
     Estimate estimate;
     for (int i = 0; i < 9; ++i) estimate = next();  // the next one is looked after by SIFT
-    EXPECT_EQ(estimate.features, FeatureKind::kGlobal);
-    EXPECT_EQ(estimate.features_extracted, 0U);
+    EXPECT_EQ(estimate.evidence.features, FeatureKind::kGlobal);
+    EXPECT_EQ(estimate.image.features_extracted, 0U);
     EXPECT_TRUE(localizer.lastSift().empty());
     with_prior ? localizer.relocalize(around({12.0, 0.0}, 1.0)) : localizer.relocalize();
   }
-  EXPECT_EQ(next().features, FeatureKind::kSift);
+  EXPECT_EQ(next().evidence.features, FeatureKind::kSift);
 }
 
-/// An image that counts what it is asked for.
-class CountingImage final : public ComparableImage {
+/// An image that is as much like every training image, and counts what it is asked for.
+class CountingImage final : public test::FakeImage {
  public:
-  explicit CountingImage(double similarity) : similarity_(similarity) {}
+  void show(double similarity) {
+    similarity_ = similarity;
+    by_sift = by_global = 0;
+  }
   Score compare(FeatureKind kind, std::size_t) override {
     ++(kind == FeatureKind::kSift ? by_sift : by_global);
     return {similarity_, similarity_, 50, similarity_ > 0.5};
   }
-  std::size_t siftFeatures() override { return 100; }
   std::size_t by_sift = 0;
   std::size_t by_global = 0;
 
  private:
-  double similarity_;
+  double similarity_ = 0.0;
 };
 
-TEST_F(LocalizerTest, ALargeMapIsWeighedOnlyWhileThePositionIsUnknown) {
+TEST_F(LocalizerTest, ALargeMapIsSweptOnlyWhileThePositionIsUnknown) {
   LocalizerConfig config;
-  config.max_proposal_images = 20;
+  config.sweep_images = 20;
   config.state.place_check = false;
-  Localizer localizer(map(), config);
+  const auto image = std::make_shared<CountingImage>();
+  Localizer localizer(map(), config, image);
   for (int i = 0; i < 3; ++i) {
-    CountingImage unknown(0.1);
-    const Estimate estimate = localizer.process(i * kSecond, unknown);
-    EXPECT_EQ(unknown.by_global, 20U);
-    EXPECT_EQ(unknown.by_sift, estimate.comparisons) << "weighing the map is no comparison";
+    image->show(0.1);
+    const Estimate estimate = localizer.process(i * kSecond, {});
+    EXPECT_EQ(image->by_global, 20U);
+    EXPECT_EQ(estimate.swept, 20U);
+    EXPECT_EQ(image->by_sift, estimate.comparisons) << "the sweep is counted by itself";
   }
-  CountingImage known(0.9);
-  localizer.process(3 * kSecond, known);
-  CountingImage still_known(0.9);
-  localizer.process(4 * kSecond, still_known);
-  EXPECT_EQ(still_known.by_global, 0U);
-  EXPECT_GT(still_known.by_sift, 0U);
+  image->show(0.9);
+  localizer.process(3 * kSecond, {});
+  image->show(0.9);
+  EXPECT_EQ(localizer.process(4 * kSecond, {}).swept, 0U);
+  EXPECT_EQ(image->by_global, 0U);
+  EXPECT_GT(image->by_sift, 0U);
 }
 
 TEST_F(LocalizerTest, TheWholeMapIsAskedOnlyWhenTheMatchIsNotSure) {
   LocalizerConfig config;
   config.dpso.recovery = "none";
-  config.state.place_check_images = 15;
+  config.sweep_images = 15;
   config.state.max_distance_m = 1000.0;  // alike everywhere, so the best match may be anywhere
-  Localizer localizer(map(), config);
-  CountingImage sure(0.9);
-  EXPECT_EQ(localizer.process(0, sure).place_ratio, 1.0);
-  EXPECT_EQ(sure.by_global, 0U);
-  CountingImage weak(0.1);
-  EXPECT_EQ(localizer.process(kSecond, weak).place_ratio, 1.0) << "alike everywhere";
-  EXPECT_GE(weak.by_global, 15U);
-  EXPECT_LE(weak.by_global, 15U + 32U) << "every fourth image, and those around the estimate";
+  const auto image = std::make_shared<CountingImage>();
+  Localizer localizer(map(), config, image);
+  image->show(0.9);
+  EXPECT_EQ(localizer.process(0, {}).evidence.place_ratio, 1.0);
+  EXPECT_EQ(image->by_global, 0U);
+  image->show(0.1);
+  EXPECT_EQ(localizer.process(kSecond, {}).evidence.place_ratio, 1.0) << "alike everywhere";
+  EXPECT_GE(image->by_global, 15U);
+  EXPECT_LE(image->by_global, 15U + 32U) << "every fourth image, and those around the estimate";
+}
+
+TEST_F(LocalizerTest, NoScoreIsComputedTwiceForAnImage) {
+  for (const char* features : {"sift", "global", "hybrid"}) {
+    LocalizerConfig config;
+    config.features = features;
+    const auto image = std::make_shared<CountingImage>();
+    Localizer localizer(map(), config, image);
+    for (int i = 0; i < 5; ++i) {
+      image->show(0.1);  // unknown and unsure: the sweep guides the swarm and checks the estimate
+      const Estimate estimate = localizer.process(i * kSecond, {});
+      EXPECT_EQ(estimate.comparisons + estimate.swept, image->by_sift + image->by_global) << features;
+      EXPECT_LE(image->by_global, map()->size()) << features;
+    }
+  }
 }
 
 TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {
@@ -214,6 +235,27 @@ TEST_F(LocalizerTest, RefusesABadConfiguration) {
   config = LocalizerConfig();
   config.tracker = "crystal_ball";
   EXPECT_THROW(Localizer(map(), config), ParameterError);
+}
+
+TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
+  const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
+  LiveImage image(*map(), frontEndConfigOf(LocalizerConfig(), map()->header()), SimilarityConfig());
+  image.set(0, viewAt(12.0 + 1e-9));
+  EXPECT_FALSE(image.sift()) << "nothing was asked for yet";
+
+  const Score by_global = image.compare(FeatureKind::kGlobal, 20);
+  EXPECT_FALSE(image.sift()) << "global features need no SIFT";
+  EXPECT_EQ(by_global.similarity, 1.0);  // training image 20 was taken here
+  EXPECT_EQ(by_global.matches, 0U);
+  EXPECT_LT(image.compare(FeatureKind::kGlobal, 40).similarity, 0.9);
+  const double global_ms = image.report().match_ms;
+  EXPECT_GT(global_ms, 0.0);
+
+  const Score by_sift = image.compare(FeatureKind::kSift, 20);
+  EXPECT_EQ(by_sift.similarity, sift.compare(*image.sift(), map()->image(20).sift).similarity);
+  EXPECT_GT(by_sift.matches, 50U);
+  EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kSift, 50).matches);
+  EXPECT_GT(image.report().match_ms, global_ms);
 }
 
 }  // namespace

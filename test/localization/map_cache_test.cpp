@@ -25,7 +25,7 @@ class MapCache : public test::WallStreet {
     for (int i = 0; i < 16; ++i) {
       const Estimate estimate = localizer.process(i * test::kSecond, noisy(viewAt(i < 8 ? 0.6 * i : 20.0), i));
       numbers.insert(numbers.end(),
-                     {estimate.pose.position_m.x(), estimate.pose.position_m.y(), estimate.best.similarity,
+                     {estimate.pose.position_m.x(), estimate.pose.position_m.y(), estimate.tracked.best.similarity,
                       static_cast<double>(estimate.comparisons), estimate.pose.covariance_m2(0, 0)});
     }
     return numbers;

@@ -1,4 +1,4 @@
-#include "visual_localization/localization/motion_model.h"
+#include "localization/motion_model.h"
 
 #include <cmath>
 #include <memory>
@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "localization/particle_filter.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
-#include "visual_localization/localization/particle_filter.h"
 #include "visual_localization/localization/particles.h"
 
 namespace visual_localization {

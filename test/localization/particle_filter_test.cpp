@@ -1,4 +1,4 @@
-#include "visual_localization/localization/particle_filter.h"
+#include "localization/particle_filter.h"
 
 #include <cmath>
 

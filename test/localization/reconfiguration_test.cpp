@@ -57,10 +57,10 @@ TEST_F(Reconfiguration, TheTrackGoesOnWithAnotherTracker) {
 
 TEST_F(Reconfiguration, TheTrackGoesOnWithOtherFeatures) {
   changeAndDriveOn({{"features", std::string("global")}});
-  EXPECT_EQ(last_.features, FeatureKind::kGlobal);
+  EXPECT_EQ(last_.evidence.features, FeatureKind::kGlobal);
   changeAndDriveOn({{"features", std::string("sift")}, {"match/mode", std::string("one_way")}, {"prune", false}});
-  EXPECT_EQ(last_.features, FeatureKind::kSift);
-  EXPECT_EQ(last_.features_kept, last_.features_extracted);
+  EXPECT_EQ(last_.evidence.features, FeatureKind::kSift);
+  EXPECT_EQ(last_.image.features_kept, last_.image.features_extracted);
 }
 
 TEST_F(Reconfiguration, TheTrackGoesOnWithMoreOrFewerParticles) {
@@ -76,7 +76,7 @@ TEST_F(Reconfiguration, ThresholdsLeaveTheCloudAlone) {
                              {"hybrid/sift_below", 8.0},
                              {"state/window", std::int64_t{6}},
                              {"fitness/distance_sigma", 9.0},
-                             {"max_proposal_images", std::int64_t{10}}});
+                             {"sweep_images", std::int64_t{10}}});
   localizer_.configure(config_);
   ASSERT_EQ(localizer_.particles().size(), before.size());
   for (std::size_t i = 0; i < before.size(); ++i) {

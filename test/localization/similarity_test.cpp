@@ -51,34 +51,41 @@ TEST(SiftSimilarity, FewerThanTwoFeaturesAreNoEvidence) {
   EXPECT_EQ(similarity.compare({}, {}).similarity, 0.0);
 }
 
-TEST(ScoreCache, ComparesEachTrainingImageOnceAndCounts) {
-  ScoreCache scores(10);
-  int calls = 0;
-  scores.startImage([&calls](std::size_t image) {
-    ++calls;
-    return Score{0.1 * static_cast<double>(image), 0.0, image};
+TEST(Scores, ComparesEachTrainingImageOnceByEachKindAndCounts) {
+  Scores scores(10);
+  int by_sift = 0;
+  int by_global = 0;
+  scores.startImage(FeatureKind::kSift, [&](FeatureKind kind, std::size_t image) {
+    const bool sift = kind == FeatureKind::kSift;
+    ++(sift ? by_sift : by_global);
+    return Score{(sift ? 0.1 : 0.05) * static_cast<double>(image), 0.0, image};
   });
-  for (int round = 0; round < 3; ++round) {
+  for (int repetition = 0; repetition < 3; ++repetition) {
     EXPECT_DOUBLE_EQ(scores[3].similarity, 0.3);
     EXPECT_EQ(scores[7].matches, 7u);
+    EXPECT_DOUBLE_EQ(scores.global(3).similarity, 0.15);
   }
-  EXPECT_EQ(calls, 2);
+  EXPECT_EQ(by_sift, 2);
+  EXPECT_EQ(by_global, 1);
   EXPECT_EQ(scores.comparisons(), 2u);
+  EXPECT_EQ(scores.swept(), 1u);
 }
 
-TEST(ScoreCache, ANewImageForgetsTheOldScores) {
-  ScoreCache scores(2);
-  scores.startImage([](std::size_t) { return Score{0.1, 0.1, 1}; });
+TEST(Scores, ANewImageForgetsTheOldScores) {
+  Scores scores(2);
+  scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{0.1, 0.1, 1}; });
   EXPECT_EQ(scores[1].similarity, 0.1);
-  scores.startImage([](std::size_t) { return Score{0.2, 0.2, 2}; });
+  scores.startImage(FeatureKind::kGlobal, [](FeatureKind, std::size_t) { return Score{0.2, 0.2, 2}; });
   EXPECT_EQ(scores.comparisons(), 0u);
   EXPECT_EQ(scores[1].similarity, 0.2);
+  EXPECT_EQ(scores.swept(), 0u) << "compared for a particle";
 }
 
-TEST(ScoreCache, AnImageBeyondTheMapIsAnError) {
-  ScoreCache scores(2);
-  scores.startImage([](std::size_t) { return Score{}; });
+TEST(Scores, AnImageBeyondTheMapIsAnError) {
+  Scores scores(2);
+  scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{}; });
   EXPECT_THROW(scores[2], std::out_of_range);
+  EXPECT_THROW(scores.global(2), std::out_of_range);
 }
 
 }  // namespace

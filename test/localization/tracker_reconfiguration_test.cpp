@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "test/support/world.h"
-#include "visual_localization/localization/tracker_factory.h"
+#include "visual_localization/localization/tracker.h"
 
 namespace visual_localization {
 namespace {

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "localization/dpso.h"
+#include "localization/particle_filter.h"
 #include "test/support/world.h"
-#include "visual_localization/localization/particle_filter.h"
 
 namespace visual_localization {
 namespace {

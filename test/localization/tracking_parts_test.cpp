@@ -22,8 +22,10 @@ Particle particleAt(double x, double y, double weight) {
 
 TEST(Fitness, IsTheWeightTimesAGaussianOfTheDistance) {
   const auto map = test::mapAt({{0.0, 0.0}, {100.0, 0.0}});
-  ScoreCache scores(2);
-  scores.startImage([](std::size_t image) { return Score{1.0, image == 0 ? 0.4 : 0.8, 10, true}; });
+  Scores scores(2);
+  scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t image) {
+    return Score{1.0, image == 0 ? 0.4 : 0.8, 10, true};
+  });
   FitnessConfig config;
   config.distance_sigma_m = 5.0;
   EXPECT_DOUBLE_EQ(evaluateFitness({0.0, 0.0}, *map, scores, config).value, 0.4);

@@ -5,16 +5,16 @@
 namespace visual_localization {
 namespace {
 
-Estimate estimateOf(LocalizationState state, const ImageLook& look, bool blind = false) {
+Estimate estimateOf(LocalizationState state, const ImageStatistics& look, bool blind = false) {
   Estimate estimate;
   estimate.state = state;
-  estimate.look = look;
-  estimate.blind = blind;
-  estimate.features_extracted = estimate.features_kept = blind ? 4 : 300;
+  estimate.image.statistics = look;
+  estimate.evidence.blind = blind;
+  estimate.image.features_extracted = estimate.image.features_kept = blind ? 4 : 300;
   return estimate;
 }
 
-constexpr ImageLook kFine{110.0, 50.0, 1.0};
+constexpr ImageStatistics kFine{110.0, 50.0, 1.0};
 constexpr auto kLost = LocalizationState::kUncertain;
 
 TEST(ImageTrouble, AGoodImageIsNoneWhereverTheRobotIs) {
@@ -37,9 +37,9 @@ TEST(ImageTrouble, SaysWhatAnImageOfNoUseIsLike) {
 
 TEST(ImageTrouble, TellsFeaturesOfUseFromAll) {
   Estimate estimate = estimateOf(kLost, kFine, true);
-  estimate.features_extracted = 250;
+  estimate.image.features_extracted = 250;
   EXPECT_EQ(imageTrouble(estimate).find("4 of 250 features in the image are of use, "), 0U);
-  estimate.features = FeatureKind::kGlobal;
+  estimate.evidence.features = FeatureKind::kGlobal;
   EXPECT_EQ(imageTrouble(estimate).find("Hardly anything in the image, "), 0U);
 }
 
@@ -49,7 +49,7 @@ TEST(ImageTrouble, AFrozenCameraIsOneWhateverItShows) {
   EXPECT_EQ(imageTrouble(estimate), "") << "not for so long";
   estimate.frozen = true;
   EXPECT_EQ(imageTrouble(estimate), "The camera has sent the same image 12 times: frozen?");
-  estimate.look = {0.0, 0.0, 1.0};
+  estimate.image.statistics = {0.0, 0.0, 1.0};
   EXPECT_EQ(imageTrouble(estimate),
             "The camera has sent the same image 12 times, mean grey level 0 of 255, contrast 0: dark or covered?");
 }

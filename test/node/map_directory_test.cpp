@@ -6,6 +6,7 @@
 #include "node/node_config.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
@@ -87,11 +88,11 @@ TEST_F(MapDirectory, RefusesEverythingWhenThereIsNoSuchFolder) {
 
 TEST(NodeConfig, MapDirectoryIsAbsolute) {
   NodeConfig config;
-  EXPECT_TRUE(config.violations().empty());
+  EXPECT_TRUE(violationsOf(config).empty());
   config.map_directory = "/maps";
-  EXPECT_TRUE(config.violations().empty());
+  EXPECT_TRUE(violationsOf(config).empty());
   config.map_directory = "maps";
-  EXPECT_THAT(config.violations(), testing::ElementsAre(HasSubstr("'map_directory' = 'maps'")));
+  EXPECT_THAT(violationsOf(config), testing::ElementsAre(HasSubstr("'map_directory' = 'maps'")));
 }
 
 }  // namespace

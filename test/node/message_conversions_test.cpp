@@ -27,11 +27,13 @@ Estimate someEstimate() {
   estimate.pose.covariance_m2 << 4.0, 0.5, 0.5, 1.0;
   estimate.pose.yaw_variance_rad2 = 0.04;
   estimate.pose.geodetic = {48.5, 9.05, 340.0};
-  estimate.best = {0.25, 0.25, 31, true, 1.25};
-  estimate.best_image = 7;
+  estimate.tracked.best = {0.25, 0.25, 31, true, 1.25};
+  estimate.tracked.best_image = 7;
   estimate.comparisons = 12;
-  estimate.spread_m = {3.0, 2.0};
-  estimate.times = {10.0, 20.0, 1.5};
+  estimate.tracked.spread_m = {3.0, 2.0};
+  estimate.image.extract_ms = 10.0;
+  estimate.image.match_ms = 20.0;
+  estimate.update_ms = 1.5;
   return estimate;
 }
 

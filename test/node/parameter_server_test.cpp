@@ -56,7 +56,7 @@ TEST(ParameterServer, ParametersOfOthersAreKnown) {
   EXPECT_FALSE(belongsToOthers("dpso/inertia"));
 }
 
-TEST(NodeParameters, DefaultsAreValid) { EXPECT_TRUE(NodeParameters().violations().empty()); }
+TEST(NodeParameters, DefaultsAreValid) { EXPECT_TRUE(violationsOf(NodeParameters()).empty()); }
 
 TEST(NodeParameters, ErrorsNameParameterValueAndRange) {
   const std::string range = errorOf({{"transform_tolerance", -1.0}});

@@ -25,10 +25,9 @@ struct Engine {
     visitor.flag({"engine/turbo", "", "louder"}, turbo);
     visitor.choice({"engine/fuel", "", "what it drinks"}, fuel, {"petrol", "diesel"});
     visitor.text({"name", "", "what it is called", true}, name);
-  }
-  std::vector<std::string> violations() const {
-    if (turbo && cylinders < 2) return {"a turbo needs two cylinders"};
-    return {};
+    visitor.require(!turbo || cylinders >= 2, "engine/turbo", "true", "false with one cylinder");
+    visitor.atMost("engine/cylinders", cylinders, "engine/power", power_w);
+    visitor.renamed("engine/horses", "engine/power");
   }
 };
 
@@ -102,10 +101,10 @@ TEST(Parameters, ARefusedSetChangesNothing) {
 
 TEST(Parameters, RangeViolationsOfAStructFilledByHand) {
   Engine engine;
-  EXPECT_TRUE(rangeViolations(engine).empty());
+  EXPECT_TRUE(violationsOf(engine).empty());
   engine.power_w = -3.0;
   engine.fuel = "coal";
-  EXPECT_EQ(rangeViolations(engine).size(), 2u);
+  EXPECT_EQ(violationsOf(engine).size(), 3u) << "the constraint on power, too";
 }
 
 TEST(Parameters, YamlIsFlattenedAndTyped) {
@@ -147,6 +146,33 @@ TEST(Parameters, TableHasARowForEveryParameter) {
   const std::string longer = parameters::markdownTable(declare, true);
   EXPECT_THAT(longer, HasSubstr("| `engine/power` | 10 | W | [0, 100] | yes | how strong |"));
   EXPECT_THAT(longer, HasSubstr("| `name` | \"unnamed\" |  | text |  | what it is called |"));
+}
+
+TEST(Parameters, ConstraintsAcrossFieldsNameBothValues) {
+  EXPECT_EQ(refusal({{"engine/power", 3.0}}),
+            "parameter 'engine/cylinders' = 4 is not allowed: must not exceed 'engine/power' = 3");
+  EXPECT_EQ(refusal({{"engine/cylinders", std::int64_t{1}}, {"engine/turbo", true}}),
+            "parameter 'engine/turbo' = true is not allowed: must be false with one cylinder");
+}
+
+TEST(Parameters, ARenamedParameterIsRefusedWithItsNewName) {
+  EXPECT_EQ(refusal({{"engine/horses", 3.0}}), "parameter 'engine/horses' is renamed to 'engine/power'");
+}
+
+TEST(Parameters, SeveralDocumentsAreRefused) {
+  const TemporaryYaml yaml("name: a\n---\nname: b\n");
+  EXPECT_THROW(parameters::readYaml(yaml.path()), ParameterError);
+}
+
+TEST(Parameters, AYamlFileOfAllParametersReadsBackAsTheyAre) {
+  Engine engine;
+  const auto declare = [&engine](ParameterVisitor& visitor) { engine.declare(visitor); };
+  const std::string text = parameters::yamlFile(declare);
+  EXPECT_THAT(text, HasSubstr("  cylinders: 4                            # integer [1, 12]; how many\n"));
+  EXPECT_THAT(text, HasSubstr("  power: 10                               # W [0, 100]; how strong\n"));
+  const TemporaryYaml yaml(text);
+  EXPECT_EQ(parameters::readYaml(yaml.path()).size(), parameters::values(declare).size());
+  EXPECT_NO_THROW(assignParameters(engine, parameters::readYaml(yaml.path())));
 }
 
 }  // namespace

@@ -16,19 +16,22 @@ namespace visual_localization::test {
 class World {
  public:
   explicit World(std::shared_ptr<const TrainingMap> map)
-      : map_(std::move(map)), scores_(map_->size()), places_(map_->size(), 100000) {}
+      : map_(std::move(map)), scores_(map_->size()), sweep_(*map_, 100000, 100000) {}
 
   /// What the robot sees from here; globally, places within some 10 m look alike.
   TrackerInput from(const Eigen::Vector2d& robot_m) {
-    scores_.startImage([this, robot_m](std::size_t image) { return scoreAt(0.5 * bell(image, robot_m, 2.0)); });
-    places_.startImage([this, robot_m](std::size_t image) { return bell(image, robot_m, 10.0); });
-    return {scores_, places_};
+    scores_.startImage(FeatureKind::kSift, [this, robot_m](FeatureKind kind, std::size_t image) {
+      return kind == FeatureKind::kSift ? scoreAt(0.5 * bell(image, robot_m, 2.0))
+                                        : scoreAt(bell(image, robot_m, 10.0));
+    });
+    sweep_.startImage();
+    return {scores_, sweep_};
   }
 
   TrackerInput inTheDark() {
-    scores_.startImage([](std::size_t) { return Score{}; });
-    places_.startImage([](std::size_t) { return 0.0; });
-    return {scores_, places_};
+    scores_.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{}; });
+    sweep_.startImage();
+    return {scores_, sweep_};
   }
 
   static Score scoreAt(double similarity) {
@@ -44,8 +47,8 @@ class World {
   }
 
   std::shared_ptr<const TrainingMap> map_;
-  ScoreCache scores_;
-  PlaceProposal places_;
+  Scores scores_;
+  MapSweep sweep_;
 };
 
 /// A round of 30 m radius with an image every 0.94 m.

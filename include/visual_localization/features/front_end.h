@@ -16,7 +16,7 @@
 namespace visual_localization {
 
 /// What an image is like, whatever it shows.
-struct ImageLook {
+struct ImageStatistics {
   double mean_grey = 0.0;  ///< of 255
   double contrast = 0.0;   ///< standard deviation, grey levels
   double stretch = 1.0;    ///< its width to height over the map's: another shape is stretched to the map's
@@ -48,6 +48,16 @@ inline double stretchOf(cv::Size recorded, cv::Size shown) {
   return static_cast<double>(shown.width) / recorded.width * recorded.height / shown.height;
 }
 
+/// How live images are prepared.
+struct FrontEndConfig {
+  cv::Size image_size;            ///< the map's, pixels
+  SiftConfig sift;                ///< the map's
+  MatchConfig match;              ///< for pruning
+  bool prune = true;              ///< keep only features that the image before showed as well
+  double max_image_gap_s = 10.0;  ///< longer pauses make the image before useless for pruning
+  std::string sift_backend = kNativeSift;
+};
+
 /// Live image in, features out: resizes to the map's size, spreads the grey levels of a dull image and extracts either
 /// kind of features when it is first asked for. SIFT features are kept only if the image directly before shows them as
 /// well (Weiss et al., section III); its features too are extracted only then. The first image, or one after a gap or
@@ -55,11 +65,10 @@ inline double stretchOf(cv::Size recorded, cv::Size shown) {
 /// seen longer. Takes no memory from the heap once it has seen a few images, but for what OpenCV needs to resize them.
 class FrontEnd {
  public:
-  FrontEnd(const SiftConfig& sift, const MatchConfig& match, cv::Size image_size, bool prune, double max_image_gap_s,
-           const std::string& sift_backend = kNativeSift);
+  explicit FrontEnd(const FrontEndConfig& config);
 
-  /// Holds from the next image on.
-  void configure(const MatchConfig& match, bool prune, double max_image_gap_s);
+  /// Holds from the next image on. Size, SIFT parameters and backend stay what they are.
+  void configure(const FrontEndConfig& config);
   /// The next image. `grey`: 8-bit, one channel, any size of at least 16 x 16; throws std::invalid_argument otherwise,
   /// and then nothing has changed.
   void setImage(std::int64_t stamp_ns, const cv::Mat& grey);
@@ -71,7 +80,7 @@ class FrontEnd {
   /// Whether the image repeats the one before to the last bit, at the map's size and with its grey levels spread.
   bool isRepeated() const { return is_repeated_; }
   /// What the image is like at the map's size, before its grey levels are spread.
-  const ImageLook& look() const { return look_; }
+  const ImageStatistics& statistics() const { return statistics_; }
   /// The pruned SIFT features if they were asked for.
   const SiftFeatures* siftIfExtracted() const { return has_pruned_ ? &pruned_ : nullptr; }
   /// Number of SIFT features before pruning; 0 unless they were asked for.
@@ -91,10 +100,7 @@ class FrontEnd {
   const SiftFeatures& unprunedSift(Image& image);
   bool previousIsClose() const;
 
-  MatchConfig match_;
-  cv::Size image_size_;
-  bool prune_;
-  double max_image_gap_s_;
+  FrontEndConfig config_;
   std::unique_ptr<SiftExtractor> sift_extractor_;
   GlobalExtractor global_extractor_;
   std::optional<Image> previous_;
@@ -102,7 +108,7 @@ class FrontEnd {
   cv::Mat resized_;
   cv::Mat spread_;
   bool is_repeated_ = false;
-  ImageLook look_;
+  ImageStatistics statistics_;
   SiftFeatures pruned_;  ///< like those of the images kept when it no longer holds, for the sake of its memory
   bool has_pruned_ = false;
   std::optional<GlobalFeatures> global_;

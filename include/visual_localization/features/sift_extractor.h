@@ -21,7 +21,6 @@ struct SiftConfig {
   int max_features = 0;              ///< keep only the strongest so many; 0 = all
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const { return {}; }
 };
 
 /// Names of the extractors: our own, and OpenCV's. Their features can be matched with each other, so a map does not

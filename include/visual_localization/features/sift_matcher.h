@@ -15,7 +15,6 @@ struct MatchConfig {
   std::string mode = "symmetric";  ///< "symmetric" (journal) or "one_way" (conference, hybrid)
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const { return {}; }
 };
 
 /// Feature `a` of the first image matches feature `b` of the second.

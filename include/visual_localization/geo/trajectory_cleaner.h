@@ -35,8 +35,6 @@ struct TrajectoryCleanerConfig {
   double max_bridge_s = 90.0;       ///< longer stretches without believable fix are left open
 
   void declare(ParameterVisitor& visitor);
-  /// Constraints that span fields, in words; empty when valid.
-  std::vector<std::string> violations() const { return {}; }
 };
 
 /// The cleaned path and what was done to get it.

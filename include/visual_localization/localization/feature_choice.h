@@ -18,7 +18,6 @@ struct HybridConfig {
   int sift_every = 10;          ///< SIFT at least so often, and then until an image confirms the position; 0: never
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const { return {}; }
 };
 
 /// Which features the next image is compared by: always the same ones, or by how far the cloud is spread (Weiss et

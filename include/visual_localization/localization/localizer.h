@@ -1,19 +1,16 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/front_end.h"
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/feature_choice.h"
 #include "visual_localization/localization/localizer_config.h"
-#include "visual_localization/localization/place_check.h"
-#include "visual_localization/localization/place_proposal.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker.h"
@@ -27,6 +24,8 @@ class Localizer {
  public:
   /// Starts with an unknown position. Throws ParameterError when `config` is invalid.
   Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config);
+  /// The same for images that are not live: `image` knows by itself how each compares with the map.
+  Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config, std::shared_ptr<QueryImage> image);
 
   /// `grey`: 8-bit, one channel, at least 16 x 16; resized to the map's size. Throws std::invalid_argument for
   /// anything else, and then nothing has changed. An image that repeats the one before to the last bit is no new
@@ -34,8 +33,6 @@ class Localizer {
   /// (state/frozen_images, state/frozen_time) the camera counts as frozen, and the position must be confirmed anew.
   /// With state/frozen_images 0 a repeated image with another stamp is an image like any other.
   Estimate process(std::int64_t stamp_ns, const cv::Mat& grey);
-  /// The same for an image that knows by itself how to compare: its times and counts of features stay zero.
-  Estimate process(std::int64_t stamp_ns, ComparableImage& image);
 
   /// Goes on with other parameters from the next image on, without losing the track: another tracker, or another number
   /// of particles, begins with particles drawn from the present ones; the rest keeps all it knows. The seed holds for
@@ -43,7 +40,7 @@ class Localizer {
   void configure(const LocalizerConfig& config);
   /// The position is unknown: anywhere in the map.
   void relocalize();
-  /// The position is unknown within a prior (see prior.h).
+  /// The position is unknown within a prior (see particles.h).
   void relocalize(const Prior& prior);
 
   /// Nothing was seen for long: the particles stay, but the position must be confirmed anew. The state until then.
@@ -52,10 +49,7 @@ class Localizer {
   const TrainingMap& map() const { return *map_; }
   const std::vector<Particle>& particles() const { return tracker_->particles(); }
   /// SIFT features of the last image after pruning, for drawing its matches; empty when there was no need for them.
-  SiftFeatures lastSift() const {
-    const SiftFeatures* sift = front_end_.siftIfExtracted();
-    return sift == nullptr ? SiftFeatures() : *sift;
-  }
+  SiftFeatures lastSift() const { return image_->sift() == nullptr ? SiftFeatures() : *image_->sift(); }
 
  private:
   /// How often the last image has come, to the last bit.
@@ -68,28 +62,24 @@ class Localizer {
     void add(std::int64_t stamp_ns, bool repeated);
   };
 
-  bool isNews(std::int64_t stamp_ns) const;
-  Estimate look(std::int64_t stamp_ns);
-  Estimate lastAgain(std::int64_t stamp_ns) const;
+  bool isRepetition(std::int64_t stamp_ns) const;
+  Estimate lastAgain(std::int64_t stamp_ns);
+  Estimate answer();
   bool isFrozen() const;
-  void configureTracker(const std::string& tracker_before);
-  Evidence evidenceOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, FeatureKind features,
-                      ComparableImage& image);
+  Evidence verify(const TrackerEstimate& tracked);
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
+  void configureTracker(const std::string& tracker_before);
+  void forgetEvidence();
 
   std::shared_ptr<const TrainingMap> map_;
   LocalizerConfig config_;
-  FrontEnd front_end_;
-  SiftSimilarity sift_similarity_;
-  GlobalSimilarity global_similarity_;
-  ScoreCache scores_;
-  PlaceProposal places_;
+  std::shared_ptr<QueryImage> image_;
+  Scores scores_;
+  MapSweep sweep_;
   std::unique_ptr<Tracker> tracker_;
   FeatureChoice choice_;
-  PlaceCheck place_check_;
   StateAssessor assessor_;
   std::vector<Neighbour> neighbours_;  ///< of the last estimate
-  TrackerEstimate tracked_;            ///< after the last image
   std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again
   Repeats repeats_;
 };

@@ -3,11 +3,14 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
-#include <random>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "visual_localization/localization/random.h"
+#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -23,23 +26,15 @@ struct Particle {
   ParticleKind kind = ParticleKind::kStandard;
 };
 
-/// The one source of randomness of a tracker: seeded, passed in, never global.
-class Random {
- public:
-  explicit Random(std::uint32_t seed) : engine_(seed) {}
+/// What odometry says about the way from the last image to this one, in the robot's frame at the last image.
+struct OdometryIncrement {
+  Eigen::Vector2d translation_m = Eigen::Vector2d::Zero();  ///< forward, left
+  double rotation_rad = 0.0;                                ///< counter-clockwise
+};
 
-  /// Uniform in [min, max).
-  double uniform(double min, double max) { return std::uniform_real_distribution<double>(min, max)(engine_); }
-  /// N(0, std_dev^2).
-  double normal(double std_dev) { return std::normal_distribution<double>(0.0, 1.0)(engine_) * std_dev; }
-  /// Independent N(0, std_dev_i^2) per axis.
-  Eigen::Vector2d normal(const Eigen::Vector2d& std_dev) {
-    const double x = normal(std_dev.x());
-    return {x, normal(std_dev.y())};
-  }
-
- private:
-  std::mt19937 engine_;
+/// What is known about the way from the last image to this one.
+struct Travel {
+  std::optional<OdometryIncrement> odometry;  ///< the papers' models do without
 };
 
 /// Mean and covariance of a weighted cloud, metres.
@@ -76,5 +71,17 @@ Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& 
 /// best places are among few particles too, the other half from all alike, so that rivals are not forgotten. Throws
 /// std::invalid_argument when there are none.
 Prior drawnFrom(std::vector<Particle> cloud);
+
+/// f(x, t) and the training image it rests on.
+struct Fitness {
+  double value = 0.0;
+  std::size_t training_image = 0;
+  Score score;
+};
+
+/// f(x, t) = m(i_M(x), s(t)) * zeta(distance to i_M(x)), Kronfeld et al. (journal), Eq. 3, zeta a Gaussian of
+/// height one; m as the weight that its similarity gives it.
+Fitness evaluateFitness(const Eigen::Vector2d& position_m, const TrainingMap& map, Scores& scores,
+                        const FitnessConfig& config);
 
 }  // namespace visual_localization

@@ -31,7 +31,6 @@ struct SimilarityConfig {
   double global_exponent = 20.0;   ///< global m is raised to this to be a weight (Weiss et al., section IV.A)
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const { return {}; }
 };
 
 }  // namespace visual_localization

@@ -3,27 +3,21 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
 
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/localization/random.h"
 #include "visual_localization/localization/score.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
-
-/// The current image as the trackers see it: something that can be compared with every training image, by either
-/// kind of features. A live one extracts its features when they are first asked for; a recorded one looks the
-/// scores up.
-class ComparableImage {
- public:
-  virtual ~ComparableImage() = default;
-  virtual Score compare(FeatureKind kind, std::size_t training_image) = 0;
-  /// Number of SIFT features that it is compared by; extracts them if that has not been done.
-  virtual std::size_t siftFeatures() = 0;
-};
 
 /// Share of SIFT features that match (Kronfeld et al. (journal), section 4; one-way: Weiss et al., section III).
 /// Stateless, so that one may serve several threads.
@@ -32,7 +26,7 @@ class SiftSimilarity {
   SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config);
   /// 0 when either image has fewer than two features.
   Score compare(const SiftFeatures& current, const SiftFeatures& training) const;
-  /// What a similarity that is known already means.
+  /// The score of a similarity that is known already.
   Score scoreOf(double similarity, std::size_t matches, double scale) const;
 
  private:
@@ -47,57 +41,143 @@ class GlobalSimilarity {
  public:
   explicit GlobalSimilarity(const SimilarityConfig& config) : config_(config) {}
   Score compare(const GlobalFeatures& current, const GlobalFeatures& training) const;
-  /// What a similarity that is known already means.
+  /// The score of a similarity that is known already.
   Score scoreOf(double similarity) const;
 
  private:
   SimilarityConfig config_;
 };
 
-/// Similarities of the current image to the training images, computed when first asked for and then shared by
-/// all particles. Counts the comparisons, the papers' measure of cost.
-class ScoreCache {
- public:
-  using Compare = std::function<Score(std::size_t training_image)>;
-
-  explicit ScoreCache(std::size_t training_images) : entry_of_(training_images) {}
-
-  /// Forgets everything and takes scores from `compare` from now on.
-  void startImage(Compare compare);
-  /// The score of one training image; throws std::out_of_range for an index beyond the map.
-  Score operator[](std::size_t training_image);
-  /// Distinct training images compared since startImage.
-  std::size_t comparisons() const { return entries_.size(); }
-
- private:
-  struct Entry {
-    std::size_t training_image;
-    Score score;
-  };
-
-  // A sparse set (Briggs and Torczon, 1993): nothing of the size of the map is touched for a new image.
-  std::vector<Entry> entries_;           ///< of the current image, in the order of comparison
-  std::vector<std::uint32_t> entry_of_;  ///< of each training image; holds if the entry is there and says so too
-  Compare compare_;
+/// What is known of an image beside its scores.
+struct ImageReport {
+  ImageStatistics statistics;
+  std::size_t features_extracted = 0;  ///< SIFT features before pruning; 0 when there was no need for them
+  std::size_t features_kept = 0;       ///< after pruning
+  double extract_ms = 0.0;             ///< wall-clock time of feature extraction and pruning
+  double match_ms = 0.0;               ///< wall-clock time of comparisons with training images
 };
 
-/// The image that a front end holds, compared with a map. All parts must outlive it.
-class LiveImage final : public ComparableImage {
+/// The current image: something that can be compared with every training image, by either kind of features. A live
+/// one extracts its features when they are first asked for; a recorded one looks its scores up.
+class QueryImage {
  public:
-  LiveImage(FrontEnd& front_end, const TrainingMap& map, const SiftSimilarity& sift, const GlobalSimilarity& global)
-      : front_end_(front_end), map_(map), sift_(sift), global_(global) {}
+  virtual ~QueryImage() = default;
+  /// The next image. Throws std::invalid_argument for one that cannot be used, and then nothing has changed.
+  virtual void set(std::int64_t stamp_ns, const cv::Mat& grey) = 0;
+  /// Whether it repeats the one before to the last bit.
+  virtual bool isRepeated() const = 0;
+  /// Not cached: see Scores.
+  virtual Score compare(FeatureKind kind, std::size_t training_image) = 0;
+  /// Number of SIFT features that it is compared by; extracts them if that has not been done.
+  virtual std::size_t siftFeatures() = 0;
+  virtual ImageReport report() const = 0;
+  /// Its SIFT features after pruning, if there was a need for them; null otherwise.
+  virtual const SiftFeatures* sift() const = 0;
+  /// Holds from the next image on.
+  virtual void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) = 0;
+};
 
+/// An image of the camera. `map` must outlive it.
+class LiveImage final : public QueryImage {
+ public:
+  LiveImage(const TrainingMap& map, const FrontEndConfig& front_end, const SimilarityConfig& similarity);
+
+  /// See FrontEnd::setImage.
+  void set(std::int64_t stamp_ns, const cv::Mat& grey) override;
+  bool isRepeated() const override { return front_end_.isRepeated(); }
   Score compare(FeatureKind kind, std::size_t training_image) override;
   std::size_t siftFeatures() override { return front_end_.sift().size(); }
-  /// Time spent on comparisons, without the extraction that they brought about.
-  double match_ms() const { return match_ms_; }
+  ImageReport report() const override;
+  const SiftFeatures* sift() const override { return front_end_.siftIfExtracted(); }
+  void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) override;
 
  private:
-  FrontEnd& front_end_;
   const TrainingMap& map_;
-  const SiftSimilarity& sift_;
-  const GlobalSimilarity& global_;
-  double match_ms_ = 0.0;
+  FrontEnd front_end_;
+  SiftSimilarity sift_similarity_;
+  GlobalSimilarity global_similarity_;
+  double match_ms_ = 0.0;  ///< without the extraction that comparisons bring about
+};
+
+/// The scores of the current image against the training images, by both kinds of features: computed when first asked
+/// for, each at most once, and counted.
+class Scores {
+ public:
+  using Compare = std::function<Score(FeatureKind kind, std::size_t training_image)>;
+
+  explicit Scores(std::size_t training_images) : sift_(training_images), global_(training_images) {}
+
+  /// Forgets everything and takes scores from `compare` from now on. `kind`: what particles are compared by.
+  void startImage(FeatureKind kind, Compare compare);
+  FeatureKind kind() const { return kind_; }
+  /// The score that counts for a particle. Throws std::out_of_range for an index beyond the map, as global() does.
+  Score operator[](std::size_t training_image);
+  /// The score by global features, whatever particles are compared by.
+  Score global(std::size_t training_image);
+
+  /// Distinct training images that particles were compared with: the papers' measure of cost.
+  std::size_t comparisons() const { return comparisons_; }
+  /// Distinct training images compared beside these, by global features: see MapSweep.
+  std::size_t swept() const;
+
+ private:
+  /// A sparse set (Briggs and Torczon, 1993): nothing of the size of the map is touched for a new image.
+  class Cache {
+   public:
+    struct Entry {
+      std::size_t training_image = 0;
+      Score score;
+      bool counted = false;  ///< as a comparison
+    };
+    explicit Cache(std::size_t training_images) : entry_of_(training_images) {}
+    void clear() { entries_.clear(); }
+    std::size_t size() const { return entries_.size(); }
+    Entry& at(FeatureKind kind, std::size_t training_image, const Compare& compare);
+
+   private:
+    std::vector<Entry> entries_;           ///< of the current image, in the order of comparison
+    std::vector<std::uint32_t> entry_of_;  ///< of each training image; holds if the entry is there and says so too
+  };
+
+  Cache sift_;
+  Cache global_;
+  FeatureKind kind_ = FeatureKind::kSift;
+  Compare compare_;
+  std::size_t comparisons_ = 0;
+};
+
+/// Compares the whole map with the current image by global features, when somebody first asks. It tells a lost robot
+/// where to look, and a robot that believes to know its position whether another one looks more alike. Of a map with
+/// more than `max_images` every k-th training image is compared, beginning with another one for each image, so that k
+/// images see all of it; or, when only `max_kept` of the global features can be kept in memory, as much of it as that.
+class MapSweep {
+ public:
+  /// `map` must outlive it; `max_images` is positive. `max_kept`: see TrainingMap::globalsKept.
+  MapSweep(const TrainingMap& map, std::size_t max_images, std::size_t max_kept);
+
+  /// Another number of images at most.
+  void configure(std::size_t max_images);
+  /// Forgets what is known of the image before.
+  void startImage() { cumulated_.clear(); }
+  /// Where a lost robot may be: a training image, in proportion to its score's weight; any when nothing has weight.
+  std::size_t draw(Scores& scores, Random& random);
+  /// Best global similarity within `near_m` of `position_m`, as a share of the best in the whole map, in [0, 1]. One
+  /// when nothing looks alike anywhere. A swarm that has settled at the wrong position compares only what is there,
+  /// and never sees that another position fits better.
+  double ratio(Scores& scores, const Eigen::Vector2d& position_m, double near_m);
+
+ private:
+  void sweep(Scores& scores);
+  std::size_t imageAt(std::size_t i) const { return first_ + stride_ * i; }
+
+  const TrainingMap& map_;
+  std::size_t max_kept_;
+  std::size_t stride_ = 1;
+  std::size_t offsets_ = 1;  ///< after this many images it begins with the same training image again
+  std::size_t offset_ = 0;
+  std::size_t first_ = 0;              ///< of the training images that are swept
+  std::vector<double> cumulated_;      ///< weights up to and including each swept image; empty until needed
+  std::vector<Neighbour> neighbours_;  ///< of the last position
 };
 
 }  // namespace visual_localization

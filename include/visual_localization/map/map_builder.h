@@ -32,7 +32,6 @@ struct MapBuilderConfig {
   TrajectoryCleanerConfig trajectory;
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const;
 };
 
 /// What one recorded round brought.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -123,5 +124,17 @@ class TrainingMap {
   Area area_;
   std::unique_ptr<const PositionIndex> index_;
 };
+
+/// Direction of travel of the training images around a position.
+struct Heading {
+  double yaw_rad = 0.0;
+  double variance_rad2 = 0.0;  ///< how much they differ from it
+};
+
+/// That of the training image nearest to `position_m`. Where the route was driven both ways that may face the other
+/// way; so if `recognised` names a training image close by that matches well, images that face away from it are left
+/// out. `neighbours` is memory to work in.
+Heading headingAt(const TrainingMap& map, const Eigen::Vector2d& position_m, std::optional<std::size_t> recognised,
+                  std::vector<Neighbour>& neighbours);
 
 }  // namespace visual_localization

@@ -25,6 +25,16 @@ class ParameterVisitor {
   virtual void flag(const ParameterInfo& info, bool& field) = 0;
   virtual void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) = 0;
   virtual void text(const ParameterInfo& info, std::string& field) = 0;
+
+  // Declared after the fields that they are about.
+  /// A constraint across fields: `name`, that is `value`, must not exceed `limit_name`, that is `limit`.
+  virtual void atMost(const std::string& /*name*/, double /*value*/, const std::string& /*limit_name*/,
+                      double /*limit*/) {}
+  /// Any other constraint: unless it `holds`, `value` of `name` is not allowed, and must be `allowed`.
+  virtual void require(bool /*holds*/, const std::string& /*name*/, const std::string& /*value*/,
+                       const std::string& /*allowed*/) {}
+  /// `old_name` is refused with the name that the parameter has now.
+  virtual void renamed(const std::string& /*old_name*/, const std::string& /*name*/) {}
 };
 
 }  // namespace visual_localization

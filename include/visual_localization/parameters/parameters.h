@@ -30,11 +30,11 @@ namespace parameters {
 /// Presents every field of one configuration to a visitor.
 using Declaration = std::function<void(ParameterVisitor&)>;
 
-/// Sets the fields that `values` names. Throws ParameterError at the first value that is unknown, of the
+/// Sets the fields that `values` names. Throws ParameterError at the first value that is unknown, renamed, of the
 /// wrong type or out of range, before any field has changed.
 void assign(const Declaration& declare, const ParameterValues& values);
 
-/// All fields that lie outside their declared range, in words; empty when the configuration is valid.
+/// All ranges and constraints that do not hold, in words; empty when the configuration is valid.
 std::vector<std::string> violations(const Declaration& declare);
 
 /// The current value of every field.
@@ -44,8 +44,11 @@ ParameterValues values(const Declaration& declare);
 /// can change while the node runs.
 std::string markdownTable(const Declaration& declare, bool with_run_time = false);
 
-/// Reads a YAML file of nested mappings. Throws ParameterError naming the file and the key for anything that
-/// is not a mapping of names to scalars.
+/// A YAML file of all parameters with their values, in sections, each with its range and meaning as comment.
+std::string yamlFile(const Declaration& declare);
+
+/// Reads a YAML file of nested mappings; an empty one names nothing. Throws ParameterError naming the file and the key
+/// for anything that is not a mapping of names to scalars.
 ParameterValues readYaml(const std::string& path);
 
 /// Interprets text as a YAML scalar: true/false, an integer, a number, otherwise a string.
@@ -54,28 +57,30 @@ ParameterValue parseScalar(const std::string& text);
 /// The value as a user would type it.
 std::string toString(const ParameterValue& value);
 
-/// In words, that one parameter exceeds another one that it must not exceed: both names, both values.
-std::string exceeds(const std::string& name, const ParameterValue& value, const std::string& limit_name,
-                    const ParameterValue& limit);
-
 }  // namespace parameters
 
-/// Sets the named fields of `config`; strong guarantee, see parameters::assign. Constraints that span fields
-/// are checked by the configuration's own `violations()`.
+/// All ranges and constraints of `config` that do not hold, in words; empty when it is valid.
+template <class Config>
+std::vector<std::string> violationsOf(const Config& config) {
+  Config copy = config;
+  return parameters::violations([&copy](ParameterVisitor& visitor) { copy.declare(visitor); });
+}
+
+/// `config` itself. Throws ParameterError with the first violation when there is one.
+template <class Config>
+const Config& requireValid(const Config& config) {
+  const std::vector<std::string> wrong = violationsOf(config);
+  if (!wrong.empty()) throw ParameterError(wrong.front());
+  return config;
+}
+
+/// Sets the named fields of `config`. Throws ParameterError when a value or what comes out is not allowed, and then
+/// nothing has changed.
 template <class Config>
 void assignParameters(Config& config, const ParameterValues& values) {
   Config changed = config;
   parameters::assign([&changed](ParameterVisitor& visitor) { changed.declare(visitor); }, values);
-  const std::vector<std::string> wrong = changed.violations();
-  if (!wrong.empty()) throw ParameterError(wrong.front());
-  config = changed;
-}
-
-/// Range violations of every field of `config`, in words.
-template <class Config>
-std::vector<std::string> rangeViolations(const Config& config) {
-  Config copy = config;
-  return parameters::violations([&copy](ParameterVisitor& visitor) { copy.declare(visitor); });
+  config = requireValid(changed);
 }
 
 }  // namespace visual_localization

@@ -5,26 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "visual_localization/localization/motion_model.h"
+#include "localization/motion_model.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/tracker.h"
 #include "visual_localization/parameters/parameter_visitor.h"
 
 namespace visual_localization {
-
-/// Parameters of the particle filters; defaults of Weiss et al., section IV.A, and Kronfeld et al. (journal), Table 3.
-struct ParticleFilterConfig {
-  int particles = 300;              ///< m
-  double pull = 0.2;                ///< share of the way to its nearest training image that a particle is moved
-  double random_share = 0.05;       ///< worst particles that are replaced by random ones after each image
-  double gaussian_std_m = 4.0;      ///< step of pf_gaussian per image and axis
-  double rotation_std_deg = 60.0;   ///< sigma_rot of pf_linear
-  double acceleration_std = 0.001;  ///< sigma_acc of pf_linear
-  double initial_speed_m = 1.8;     ///< v_init of pf_linear per image: three times the papers' 0.6 m
-
-  void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const { return {}; }
-};
 
 /// The motion of the tracker called `tracker`, "pf_gaussian" or "pf_linear", with the pull towards the training images.
 /// `map` must outlive it.
@@ -48,7 +34,7 @@ class ParticleFilter final : public Tracker {
 
  private:
   void resample();
-  void weigh(ScoreCache& scores);
+  void weigh(Scores& scores);
   TrackerEstimate estimate() const;
   void injectRandomParticles();
 

@@ -9,17 +9,6 @@
 
 namespace visual_localization {
 
-/// What odometry says about the way from the last image to this one, in the robot's frame at the last image.
-struct OdometryIncrement {
-  Eigen::Vector2d translation_m = Eigen::Vector2d::Zero();  ///< forward, left
-  double rotation_rad = 0.0;                                ///< counter-clockwise
-};
-
-/// What is known about the way from the last image to this one.
-struct Travel {
-  std::optional<OdometryIncrement> odometry;  ///< the papers' models do without
-};
-
 /// How a particle may move from one image to the next.
 class MotionModel {
  public:

@@ -1,8 +1,13 @@
-#include "visual_localization/localization/dpso_config.h"
+#include "visual_localization/localization/tracker_config.h"
 
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
+
+void FitnessConfig::declare(ParameterVisitor& visitor) {
+  visitor.real({"fitness/distance_sigma", "m", "how fast fitness falls off beside the recorded path (std of zeta)"},
+               distance_sigma_m, 0.1, 1000.0);
+}
 
 void DpsoConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"dpso/particles", "1", "size of the swarm"}, particles, 2, 100000);
@@ -37,23 +42,30 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);
   visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
                1000.0);
+  visitor.atMost("dpso/v0_min", v0_min, "dpso/v0", v0);
+  visitor.atMost("dpso/v0", v0, "dpso/v0_max", v0_max);
+  visitor.atMost("dpso/quantum_share", quantum_share, "dpso/quantum_share_max", quantum_share_max);
+  visitor.atMost("dpso/phi2_min", phi2_min, "dpso/phi2", phi2);
+  // Not by the difference: 1 - 0.9 is less than 0.1.
+  visitor.require(quantum_share_max + high_energy_share <= 1.0, "dpso/quantum_share_max",
+                  parameters::toString(quantum_share_max),
+                  "at most 1 - 'dpso/high_energy_share' = " + parameters::toString(1.0 - high_energy_share));
 }
 
-std::vector<std::string> DpsoConfig::violations() const {
-  std::vector<std::string> wrong;
-  const auto require = [&wrong](const std::string& name, double value, const std::string& limit_name, double limit) {
-    if (value > limit) wrong.push_back(parameters::exceeds(name, value, limit_name, limit));
-  };
-  require("dpso/v0_min", v0_min, "'dpso/v0'", v0);
-  require("dpso/v0", v0, "'dpso/v0_max'", v0_max);
-  require("dpso/quantum_share", quantum_share, "'dpso/quantum_share_max'", quantum_share_max);
-  require("dpso/phi2_min", phi2_min, "'dpso/phi2'", phi2);
-  // Not by the difference: 1 - 0.9 is less than 0.1.
-  if (quantum_share_max + high_energy_share > 1.0) {
-    wrong.push_back(parameters::exceeds("dpso/quantum_share_max", quantum_share_max, "1 - 'dpso/high_energy_share'",
-                                        1.0 - high_energy_share));
-  }
-  return wrong;
+void ParticleFilterConfig::declare(ParameterVisitor& visitor) {
+  visitor.integer({"pf/particles", "1", "number of particles (m)"}, particles, 2, 100000);
+  visitor.real({"pf/pull", "1", "share of the way to its nearest training image that a particle is moved"}, pull, 0.0,
+               1.0);
+  visitor.real({"pf/random_share", "1", "worst particles that are replaced by random ones after each image"},
+               random_share, 0.0, 1.0);
+  visitor.real({"pf/gaussian_std", "m", "step of pf_gaussian per image and axis"}, gaussian_std_m, 0.0, 1000.0);
+  visitor.real({"pf/rotation_std", "deg", "how much pf_linear turns per image (sigma_rot)"}, rotation_std_deg, 0.0,
+               180.0);
+  visitor.real(
+      {"pf/acceleration_std", "1", "how much the logarithm of pf_linear's speed changes per image (sigma_acc)"},
+      acceleration_std, 0.0, 1.0);
+  visitor.real({"pf/initial_speed", "m", "first speed of pf_linear's particles per image (v_init)"}, initial_speed_m,
+               0.0, 1000.0);
 }
 
 }  // namespace visual_localization

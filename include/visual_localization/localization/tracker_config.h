@@ -1,11 +1,18 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
-#include <vector>
 
 #include "visual_localization/parameters/parameter_visitor.h"
 
 namespace visual_localization {
+
+/// How fitness falls off beside the recorded path.
+struct FitnessConfig {
+  double distance_sigma_m = 10.0;  ///< std of zeta in Kronfeld et al. (journal), Eq. 3
+
+  void declare(ParameterVisitor& visitor);
+};
 
 /// Parameters of the dynamic particle swarm; names and defaults of Kronfeld et al. (journal), section 5.
 struct DpsoConfig {
@@ -26,13 +33,36 @@ struct DpsoConfig {
   int recovery_patience = 2;        ///< bad images in a row before recovery starts
   double recovery_step = 0.5;       ///< share of the way to the limits per bad image
   double v0_max = 0.1;
-  double max_range_m = 500.0;  ///< shares of the area's range are of at most so much: a city's swarm is not faster
+  double max_range_m = 500.0;  ///< shares of the area's range are of at most this: a city's swarm is not faster
   double quantum_share_max = 0.20;
   double phi2_min = 0.01;
   double mode_radius_m = 5.0;  ///< particles this close to the best one make up its mode
 
   void declare(ParameterVisitor& visitor);
-  std::vector<std::string> violations() const;
+};
+
+/// Parameters of the particle filters; defaults of Weiss et al., section IV.A, and Kronfeld et al. (journal), Table 3.
+struct ParticleFilterConfig {
+  int particles = 300;              ///< m
+  double pull = 0.2;                ///< share of the way to its nearest training image that a particle is moved
+  double random_share = 0.05;       ///< worst particles that are replaced by random ones after each image
+  double gaussian_std_m = 4.0;      ///< step of pf_gaussian per image and axis
+  double rotation_std_deg = 60.0;   ///< sigma_rot of pf_linear
+  double acceleration_std = 0.001;  ///< sigma_acc of pf_linear
+  double initial_speed_m = 1.8;     ///< v_init of pf_linear per image: three times the papers' 0.6 m
+
+  void declare(ParameterVisitor& visitor);
+};
+
+/// Which tracker, and the parameters of all of them.
+struct TrackerConfig {
+  std::string tracker = "dpso";  ///< "dpso", "pf_gaussian" or "pf_linear"
+  DpsoConfig dpso;
+  ParticleFilterConfig pf;
+  FitnessConfig fitness;
+
+  /// Number of particles of the chosen tracker.
+  std::size_t particles() const { return static_cast<std::size_t>(tracker == "dpso" ? dpso.particles : pf.particles); }
 };
 
 }  // namespace visual_localization

@@ -1,11 +1,10 @@
-#include "localization/heading.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
 #include "test/support/synthetic.h"
+#include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 namespace {
@@ -27,20 +26,13 @@ std::shared_ptr<const TrainingMap> bothWays() {
 }
 
 /// At image 4 of the way there, on the side of the way back.
-TrackerEstimate recognisedOnTheWayThere(const TrainingMap& map) {
-  TrackerEstimate tracked;
-  tracked.position_m = {4.2, 0.4};
-  tracked.training_image = map.nearest(tracked.position_m).image;
-  tracked.best_image = 4;
-  return tracked;
-}
+const Eigen::Vector2d kBesideImage4_m(4.2, 0.4);
 
 TEST(Heading, IsThatOfTheWayThatWasRecognised) {
   const auto map = bothWays();
   std::vector<Neighbour> neighbours;
-  const TrackerEstimate tracked = recognisedOnTheWayThere(*map);
-  ASSERT_EQ(tracked.training_image, 15U) << "the nearest image is of the way back";
-  const Heading heading = headingOf(*map, tracked, true, neighbours);
+  ASSERT_EQ(map->nearest(kBesideImage4_m).image, 15U) << "the nearest image is of the way back";
+  const Heading heading = headingAt(*map, kBesideImage4_m, 4, neighbours);
   EXPECT_DOUBLE_EQ(heading.yaw_rad, 0.0);
   EXPECT_DOUBLE_EQ(heading.variance_rad2, 0.0);
 }
@@ -51,11 +43,7 @@ TEST(Heading, IsUncertainWhenAllAroundFaceTheOtherWay) {
   ASSERT_NEAR(std::abs(map->yaw_rad(2)), kPi, 1e-9);
   ASSERT_NEAR(map->yaw_rad(6), 0.0, 1e-9);
   std::vector<Neighbour> neighbours;
-  TrackerEstimate tracked;
-  tracked.position_m = {7.0, 0.0};
-  tracked.training_image = 2;
-  tracked.best_image = 6;
-  const Heading heading = headingOf(*map, tracked, true, neighbours);
+  const Heading heading = headingAt(*map, {7.0, 0.0}, 6, neighbours);
   EXPECT_DOUBLE_EQ(heading.yaw_rad, map->yaw_rad(6));
   EXPECT_GT(heading.variance_rad2, 4.0);
 }
@@ -63,7 +51,7 @@ TEST(Heading, IsUncertainWhenAllAroundFaceTheOtherWay) {
 TEST(Heading, IsUncertainWhenNothingTellsTheWay) {
   const auto map = bothWays();
   std::vector<Neighbour> neighbours;
-  const Heading heading = headingOf(*map, recognisedOnTheWayThere(*map), false, neighbours);
+  const Heading heading = headingAt(*map, kBesideImage4_m, {}, neighbours);
   EXPECT_DOUBLE_EQ(heading.yaw_rad, kPi);
   EXPECT_GT(heading.variance_rad2, 2.0);
 }
@@ -72,11 +60,7 @@ TEST(Heading, OfACornerIsThatOfTheNearestImage) {
   // Five images eastwards and five northwards: nothing is left out of the variance.
   const auto map = test::mapAt({{0, 0}, {1, 0}, {2, 0}, {3, 0}, {4, 0}, {4, 1}, {4, 2}, {4, 3}});
   std::vector<Neighbour> neighbours;
-  TrackerEstimate tracked;
-  tracked.position_m = {4.0, 1.0};
-  tracked.training_image = 5;
-  tracked.best_image = 2;
-  const Heading heading = headingOf(*map, tracked, true, neighbours);
+  const Heading heading = headingAt(*map, {4.0, 1.0}, 2, neighbours);
   EXPECT_NEAR(heading.yaw_rad, kPi / 2.0, 1e-9);
   EXPECT_GT(heading.variance_rad2, 0.4);
 }
