@@ -1,1 +1,1 @@
-"""The report of an evaluation: tables, sentences and figures from the CSV files that `evaluate` writes."""
+"""The report of an evaluation: tables, sentences and figures from the CSV files of `evaluate`."""

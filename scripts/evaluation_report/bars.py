@@ -1,4 +1,4 @@
-"""Figures of bars: a measure of every method, the papers' number under ours."""
+"""Bar charts: a measure of every method, the papers' number below ours."""
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from matplotlib.patches import Patch
@@ -19,7 +19,7 @@ class Bar:
         self.spread = None if spread is None else spread * scale
 
     def end(self) -> float:
-        """Where bar and whisker end."""
+        """The end of bar and whisker."""
         return (self.value or 0) + (self.spread or 0)
 
 
@@ -27,10 +27,10 @@ Rows = Sequence[Tuple[str, Sequence[Tuple[Bar, Dict[str, Any]]]]]
 
 
 def draw_bar(axis: plt.Axes, position: float, bar: Bar, thickness: float, decimals: int, style: Dict[str, Any]) -> None:
-    """A horizontal bar, its whisker and its number behind both."""
+    """A horizontal bar, its whisker, and its number."""
     axis.barh(position, bar.value, thickness, **style)
     if bar.spread is not None:
-        # Nothing is below zero, so neither is a whisker.
+        # No measure is below zero, so neither is a whisker.
         low = min(bar.spread, bar.value)
         axis.errorbar(bar.value, position, xerr=[[low], [bar.spread]], fmt='none', **WHISKERS)
     axis.annotate(f'{bar.value:.{decimals}f}', (bar.end(), position), xytext=(4, 0), textcoords='offset points',
@@ -38,12 +38,12 @@ def draw_bar(axis: plt.Axes, position: float, bar: Bar, thickness: float, decima
 
 
 def draw_panel(axis: plt.Axes, rows: Rows, decimals: int, named: bool) -> None:
-    """One row a method, its bars one under the other; a dash when there are none. The first method is on top."""
+    """One row per method with its bars; a dash when there are none. The first method is on top."""
     thickness = .8 / max((len(bars) for _, bars in rows), default=1)
     for index, (_, bars) in enumerate(rows):
         defined = [(bar, style) for bar, style in bars if bar.value is not None]
-        for place, (bar, style) in enumerate(defined):
-            offset = (place - (len(defined) - 1) / 2) * thickness
+        for slot, (bar, style) in enumerate(defined):
+            offset = (slot - (len(defined) - 1) / 2) * thickness
             draw_bar(axis, index + offset, bar, thickness * .92, decimals, style)
         if not defined:
             axis.annotate('–', (0, index), xytext=(4, 0), textcoords='offset points', va='center', fontsize=7.5,
@@ -57,19 +57,19 @@ def draw_panel(axis: plt.Axes, rows: Rows, decimals: int, named: bool) -> None:
 
 
 def longest(rows: Rows) -> float:
-    """Where the furthest bar ends."""
+    """The end of the longest bar."""
     return max((bar.end() for _, bars in rows for bar, _ in bars), default=0)
 
 
 def panel_columns(count: int, names: Sequence[str]) -> int:
-    """How many panels fit side by side; long names need the room themselves."""
+    """How many panels fit side by side, beside the longest name."""
     room = PAGE_WIDTH - .068 * max(map(len, names), default=0)
     return max(1, min(count, 3 if count != 4 else 2, int(room / 1.9)))
 
 
 def bars_figure(results: Results, papers: Papers, palette: Palette, title: str, metric: str, label: str, decimals: int,
                 spread: Optional[str] = None, scale: float = 1) -> Optional[plt.Figure]:
-    """A measure by method, one panel a pair of groups; None when nothing is defined."""
+    """A measure by method, one panel per pair of groups; None when nothing is defined."""
     panels: List[Tuple[str, List[Tuple[str, List[Tuple[Bar, Dict[str, Any]]]]]]] = []
     with_papers = False
     for group in results.groups():
@@ -111,7 +111,7 @@ def paper_bar(results: Results, papers: Papers, outcome: Outcome, metric: str, s
 
 
 def cost_figure(results: Results, papers: Papers, palette: Palette, title: str) -> Optional[plt.Figure]:
-    """Time per image by illumination, here and in the paper, whose computers differ too much for one axis."""
+    """Time per image by illumination, here and in the paper; the computers differ too much for one axis."""
     merged = by_illumination(results)
     methods = list(dict.fromkeys(outcome.method for outcome in merged))
     known = {(outcome.group, outcome.method): outcome for outcome in merged}

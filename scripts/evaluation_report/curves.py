@@ -16,7 +16,7 @@ FILTERS = re.compile(r'^PF\b')
 
 
 def draw_steps(axis: plt.Axes, curves: Dict[str, Series], palette: Palette, column: str = 'mean_err_m') -> None:
-    """A curve a method over the images since the start."""
+    """One curve per method over the images since the start."""
     for method, series in curves.items():
         if series.has(column):
             axis.plot(series.step, series.columns[column], **palette.line(method), linewidth=1.2)
@@ -26,7 +26,7 @@ def draw_steps(axis: plt.Axes, curves: Dict[str, Series], palette: Palette, colu
 
 
 def log_errors(axis: plt.Axes) -> None:
-    """A logarithmic axis shows both how fast the methods localise and what they reach then."""
+    """A logarithmic axis: shows how fast the methods localise and their final error."""
     axis.set_ylim(auto=True)
     axis.set_yscale('log')
     axis.yaxis.set_major_locator(FixedLocator([digit * 10.0 ** power for power in range(-3, 5) for digit in (1, 2, 5)]))
@@ -35,7 +35,7 @@ def log_errors(axis: plt.Axes) -> None:
 
 
 def steps_figure(results: Results, palette: Palette, title: str) -> Optional[plt.Figure]:
-    """Mean error over the images of all runs, one panel a pair of groups ([H] Fig. 4 a to d)."""
+    """Mean error over the images of all runs, one panel per pair of groups ([H] Fig. 4 a to d)."""
     panels = {group: drawable(curves) for group, curves in results.steps.items()}
     panels = {group: curves for group, curves in panels.items() if curves}
     if not panels:
@@ -53,7 +53,7 @@ def steps_figure(results: Results, palette: Palette, title: str) -> Optional[plt
 
 
 def drawable(curves: Dict[str, Series], column: str = 'mean_err_m') -> Dict[str, Series]:
-    """Those that have something in the column."""
+    """The curves with a value in the column."""
     return {method: series for method, series in curves.items() if series.has(column)}
 
 
@@ -71,7 +71,7 @@ def kidnapped_figure(results: Results, palette: Palette, title: str) -> Optional
 
 
 def mark_kidnapping(axis: plt.Axes, last: float) -> None:
-    """The image at half of the run where the robot is carried away; known when all runs are of one length."""
+    """Marks the kidnapping at half of the run; only known when all runs have one length."""
     half = (last + 1) // 2
     axis.axvline(half, color='#555555', linewidth=.8, linestyle=(0, (2, 2)))
     axis.annotate('kidnapped', (half, 1), xycoords=('data', 'axes fraction'), xytext=(-4, -3),
@@ -102,7 +102,7 @@ def speed_figure(results: Results, papers: Papers, palette: Palette, title: str)
             axis.plot(*zip(*there), **theirs[name]) if there else None
             axis.plot(*zip(*here), **lines[name]) if here else None
         log_speeds(axis, sorted({x for both in curves.values() for line in both for x, _ in line}))
-        axis.set(title=literal(group_title(group)), xlabel='simulated speed [multiples of the driven one]',
+        axis.set(title=literal(group_title(group)), xlabel='simulated speed [multiples of the recorded speed]',
                  ylabel='mean error [m]')
         axis.set_ylim(bottom=0)
     hide_unused(axes, len(groups))
@@ -128,7 +128,7 @@ def speed_points(results: Results, papers: Papers, group: Group,
 
 
 def log_speeds(axis: plt.Axes, speeds: Sequence[float]) -> None:
-    """Doubled speeds equally far apart."""
+    """Doubled speeds at equal distances."""
     if not speeds or min(speeds) <= 0:
         return
     axis.set_xscale('log', base=2)
@@ -138,7 +138,7 @@ def log_speeds(axis: plt.Axes, speeds: Sequence[float]) -> None:
 
 
 def runs_figure(traces: Dict[str, Series], palette: Palette, title: str) -> Optional[plt.Figure]:
-    """Error, speed limit and speed of the swarm in single runs, recovery shaded ([J] Fig. 5)."""
+    """Error, speed limit and speed of the swarm in single runs; recovery is shaded ([J] Fig. 5)."""
     swarms = {method: series for method, series in traces.items() if series.has('v0') and series.has('err_m')}
     if not swarms:
         return None
@@ -163,7 +163,7 @@ def runs_figure(traces: Dict[str, Series], palette: Palette, title: str) -> Opti
 
 
 def draw_run(axis: plt.Axes, series: Series) -> None:
-    """One run: the error on the left axis, the speeds on the right one."""
+    """One run: error on the left axis, speeds on the right axis."""
     if series.has('recovering'):
         shade(axis, series.step, series.columns['recovering'])
     axis.plot(series.step, series.columns['err_m'], color=COLOURS['black'], linewidth=1.2)
@@ -202,7 +202,7 @@ def diversity_figure(traces: Dict[str, Series], palette: Palette, title: str) ->
 
 
 def diversity_parts(traces: Dict[str, Series]) -> Dict[str, Dict[str, Series]]:
-    """Swarms among themselves, and the best known one beside the particle filters when there are any."""
+    """All swarms together; with particle filters, also one swarm beside them."""
     swarms = {method: series for method, series in traces.items() if not FILTERS.match(method)}
     filters = {method: series for method, series in traces.items() if FILTERS.match(method)}
     if not filters or not swarms:
@@ -237,7 +237,7 @@ def counts_figure(results: Results, palette: Palette, title: str) -> Optional[pl
 
 
 def averaged(curves: Sequence[Series]) -> Series:
-    """The mean of several curves at each step; those that have ended do not count any more."""
+    """The mean of several curves at each step, over those that have not ended."""
     sums: Dict[float, List[float]] = {}
     for series in curves:
         for step, value in zip(series.step, series.columns.get('mean_err_m', [])):
@@ -250,7 +250,7 @@ def averaged(curves: Sequence[Series]) -> Series:
 
 
 def thresholds_figure(results: Results, title: str) -> Optional[plt.Figure]:
-    """Mean error and share of SIFT steps over the thresholds, one panel a pair of groups ([H] Fig. 4 f)."""
+    """Mean error and share of SIFT steps over the thresholds, one panel per pair of groups ([H] Fig. 4 f)."""
     panels = []
     for group in results.groups():
         points = [(thresholds_of(results, one.method), one.get('mean_err_m'), one.get('sift_share'))
@@ -274,10 +274,10 @@ def thresholds_figure(results: Results, title: str) -> Optional[plt.Figure]:
 
 
 def draw_thresholds(axis: plt.Axes, known: Sequence[Tuple[Tuple[float, float], float, float]]) -> None:
-    """Error on the left axis, SIFT share on the right one."""
-    places = range(len(known))
-    axis.plot(places, [error for _, error, _ in known], 'o-', color=COLOURS['blue'])
-    axis.set_xticks(places)
+    """Error on the left axis, SIFT share on the right axis."""
+    indices = range(len(known))
+    axis.plot(indices, [error for _, error, _ in known], 'o-', color=COLOURS['blue'])
+    axis.set_xticks(indices)
     axis.set_xticklabels([f'({above:g}, {below:g})' for (above, below), _, _ in known], rotation=60, fontsize=7.5)
     axis.set(xlabel='thresholds (d_global, d_SIFT) [m]')
     axis.set_ylabel('mean error [m]', color=COLOURS['blue'])
@@ -285,6 +285,6 @@ def draw_thresholds(axis: plt.Axes, known: Sequence[Tuple[Tuple[float, float], f
     right = axis.twinx()
     right.grid(False)
     right.spines['right'].set_visible(True)
-    right.plot(places, [100 * share for _, _, share in known], 's--', color=COLOURS['vermillion'])
+    right.plot(indices, [100 * share for _, _, share in known], 's--', color=COLOURS['vermillion'])
     right.set_ylabel('SIFT steps [%]', color=COLOURS['vermillion'])
     right.set_ylim(bottom=0)

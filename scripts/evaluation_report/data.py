@@ -1,4 +1,4 @@
-"""Reads what `evaluate` wrote into a folder: experiment.yaml and the CSV files. An empty field is None."""
+"""Reads the result folder of `evaluate`: experiment.yaml and the CSV files. An empty field is None."""
 import csv
 import math
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ Group = Tuple[str, str]
 Number = Optional[float]
 
 KEYS = ('train_group', 'test_group', 'method')
-# The least that a summary must hold; every other measure may be missing.
+# A summary must have these measures; all others may be missing.
 NEEDED_MEASURES = ('mean_err_m',)
 CURVES = ('mean_err_m', 'comparisons', 'sift_share')
 TRACES = ('err_m', 'v0', 'speed_ema', 'quantum_share', 'phi2', 'recovering', 'spread_x_m', 'spread_y_m', 'diversity_m',
@@ -19,7 +19,7 @@ TRACES = ('err_m', 'v0', 'speed_ema', 'quantum_share', 'phi2', 'recovering', 'sp
 
 
 class DataError(Exception):
-    """What is wrong with a file, in words."""
+    """Says what is wrong with a file."""
 
     def __init__(self, path: Path, what: str):
         super().__init__(f'{path}: {" ".join(what.split())}')
@@ -47,7 +47,7 @@ class Series:
     columns: Dict[str, List[float]] = field(default_factory=dict)
 
     def add(self, step: float, row: Dict[str, Number]) -> None:
-        """Appends one image; what is not defined becomes NaN, which a plot leaves out."""
+        """Appends one image; an undefined value becomes NaN, which a plot omits."""
         self.step.append(step)
         for name, value in row.items():
             self.columns.setdefault(name, []).append(math.nan if value is None else value)
@@ -59,7 +59,7 @@ class Series:
 
 @dataclass
 class Results:
-    """Everything that the folder holds."""
+    """The content of the folder."""
     experiment: str
     description: Dict[str, Any]
     outcomes: List[Outcome]
@@ -77,7 +77,7 @@ class Results:
         return [outcome for outcome in self.outcomes if outcome.group == group]
 
     def methods(self) -> List[str]:
-        """Every method once, in the order of the experiment, also those that only curves have."""
+        """Every method once, in the order of the experiment, including those with curves only."""
         names = [outcome.method for outcome in self.outcomes]
         for curves in (*self.steps.values(), *self.traces.values()):
             names += curves
@@ -85,7 +85,7 @@ class Results:
 
 
 def read_rows(path: Path, needed: Tuple[str, ...]) -> Iterator[Tuple[int, Dict[str, str]]]:
-    """Line number and fields by name of every row."""
+    """Line number and named fields of every row."""
     try:
         with open(path, newline='', encoding='utf-8-sig') as file:
             reader = csv.reader(file, strict=True)
@@ -108,7 +108,7 @@ def read_rows(path: Path, needed: Tuple[str, ...]) -> Iterator[Tuple[int, Dict[s
 
 
 def number(path: Path, line: int, name: str, text: str) -> Number:
-    """A field as number; None when it is empty or not finite."""
+    """A field as a number; None when empty or not finite."""
     if not text.strip():
         return None
     try:
@@ -119,7 +119,7 @@ def number(path: Path, line: int, name: str, text: str) -> Number:
 
 
 def truth(path: Path, line: int, name: str, text: str) -> Number:
-    """A flag as 0 or 1, whether it was written as number or as word."""
+    """A flag as 0 or 1, written as a number or as a word."""
     words = {'true': 1.0, 'false': 0.0}
     return words[text.lower()] if text.lower() in words else number(path, line, name, text)
 
@@ -138,7 +138,7 @@ def read_outcomes(path: Path) -> Tuple[str, List[Outcome]]:
 
 
 def read_series(path: Path, keys: Tuple[str, str], names: Tuple[str, ...]) -> Dict[Group, Dict[str, Series]]:
-    """Curves by the two key columns and by method; nothing when the file is missing."""
+    """Curves by the two key columns and by method; empty when the file is missing."""
     result: Dict[Group, Dict[str, Series]] = {}
     if not path.exists():
         return result
@@ -154,7 +154,7 @@ def read_series(path: Path, keys: Tuple[str, str], names: Tuple[str, ...]) -> Di
 
 
 def read_pairs(path: Path) -> List[Tuple[str, str]]:
-    """The pairs of rounds that were run; nothing when the file is missing."""
+    """The pairs of recordings that were run; empty when the file is missing."""
     if not path.exists():
         return []
     rows = read_rows(path, ('train_round', 'test_round'))
@@ -162,7 +162,7 @@ def read_pairs(path: Path) -> List[Tuple[str, str]]:
 
 
 def read_settings(path: Path) -> Dict[str, Dict[str, str]]:
-    """What every method sets, by method and key; nothing when the file is missing."""
+    """The settings of every method, by method and key; empty when the file is missing."""
     settings: Dict[str, Dict[str, str]] = {}
     if path.exists():
         for _, row in read_rows(path, ('method', 'key', 'value')):
@@ -171,7 +171,7 @@ def read_settings(path: Path) -> Dict[str, Dict[str, str]]:
 
 
 def read_description(path: Path) -> Dict[str, Any]:
-    """The experiment as it was given; empty when the file is missing."""
+    """The experiment's YAML; empty when the file is missing."""
     if not path.exists():
         return {}
     try:
@@ -188,7 +188,7 @@ def read_description(path: Path) -> Dict[str, Any]:
 
 
 def read_results(folder: Path) -> Results:
-    """Everything in the folder; only summary.csv must be there."""
+    """The content of the folder; only summary.csv is required."""
     if not folder.is_dir():
         raise DataError(folder, 'is not a folder')
     description = read_description(folder / 'experiment.yaml')

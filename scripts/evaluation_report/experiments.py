@@ -1,4 +1,4 @@
-"""What the names of experiments and methods mean, and which of them to hold against each other."""
+"""What the names of experiments and methods mean, and which methods to compare."""
 import re
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
@@ -13,21 +13,21 @@ COUNT_NAME = re.compile(r'^(.*) (\d+)$')
 
 
 class GridPoint(NamedTuple):
-    """A setting of the linear motion model; the initial speed in multiples of the driven one."""
+    """A setting of the linear motion model; the initial speed in multiples of the recorded speed."""
     rotation_deg: float
     acceleration: float
     speed: float
 
 
 def group_title(group: Group) -> str:
-    """A pair of groups for people."""
+    """The title of a pair of groups."""
     if group in (CONSTANT, CHANGING):
         return f'{group[0]} illumination'
     return f'{group[0]} → {group[1]}'
 
 
 def floats(texts: Tuple[Optional[str], ...]) -> Optional[List[float]]:
-    """Numbers, or None when one of them is none."""
+    """Numbers, or None when one of the texts is not a number."""
     try:
         return [float(text) for text in texts]  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -65,20 +65,20 @@ def thresholds_of(results: Results, method: str) -> Optional[Tuple[float, float]
 
 
 def is_kidnapped(results: Results, method: str) -> bool:
-    """Whether the robot is carried away in the middle of the runs."""
+    """Whether the robot is kidnapped in the middle of the runs."""
     flag = results.settings.get(method, {}).get('kidnapped', '').lower()
     return flag in ('true', '1') or method.endswith(KIDNAPPED)
 
 
 def weighted(outcomes: List[Outcome], metric: str) -> Number:
-    """A measure's mean over outcomes, each counting with its runs."""
+    """A measure's mean over outcomes, weighted by their runs."""
     known = [(outcome.get(metric), outcome.get('runs') or 1) for outcome in outcomes]
     total = sum(runs for value, runs in known if value is not None)
     return sum(value * runs for value, runs in known if value is not None) / total if total else None
 
 
 def by_illumination(results: Results) -> List[Outcome]:
-    """Cost of each method where map and drive share the light and where they do not; speed-up is against SIFT alone."""
+    """Cost of each method where map and drive have the same light and where not; speed-up is relative to SIFT."""
     merged = []
     for group, same in ((CONSTANT, True), (CHANGING, False)):
         chosen = [outcome for outcome in results.outcomes if (outcome.group[0] == outcome.group[1]) == same]
@@ -94,7 +94,7 @@ def by_illumination(results: Results) -> List[Outcome]:
 
 
 def marginals(values: Dict[str, float]) -> Dict[str, Dict[str, float]]:
-    """Means over a motion grid along each of its axes: axis, then label, then mean."""
+    """Means along each axis of a motion grid: axis, then label, then mean."""
     points = {name: grid_point(name) for name in values}
     result: Dict[str, Dict[str, float]] = {}
     labels = (('rotation', lambda point: f'{point.rotation_deg:g}° rotation'),
@@ -110,7 +110,7 @@ def marginals(values: Dict[str, float]) -> Dict[str, Dict[str, float]]:
 
 
 def ratio_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
-    """Which methods to divide by which, such that the ratio says what the experiment is about."""
+    """The pairs of methods whose ratio answers the experiment's question."""
     if experiment == 'speed':
         pairs = [(method, f'not {method}') for method in methods]
         for method in methods:
@@ -121,7 +121,7 @@ def ratio_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
         pairs = [(method + KIDNAPPED, method) for method in methods]
         pairs += [(f'adaptive, paper recovery{end}', f'not adaptive{end}') for end in ('', KIDNAPPED)]
     else:
-        # The method the paper proposes against every other one.
+        # The method that the paper proposes, relative to every other one.
         chosen = next((name for name in ('DPSO-80', 'hybrid') if name in methods), methods[0] if methods else '')
         pairs = [(chosen, method) for method in methods if method != chosen]
     return [pair for pair in pairs if pair[0] in methods and pair[1] in methods]

@@ -1,4 +1,4 @@
-"""Which figures an experiment gets, and how they reach the disk."""
+"""Which figures an experiment gets, and how they are written."""
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Callable, Dict, List, Optional, Tuple
@@ -12,7 +12,7 @@ from .grids import motion_figure
 from .papers import Papers
 from .style import STYLE, Palette, literal, plt
 
-# Bars of more methods than this are no picture any more; their experiments have figures of their own.
+# With more methods than this, bars are unreadable; such experiments have other figures.
 MOST_BARS = 24
 
 
@@ -25,7 +25,7 @@ class Drawing:
 
 
 class Figures:
-    """The figures of one report, drawn one after the other."""
+    """The figures of one report."""
 
     def __init__(self, results: Results, papers: Papers):
         self._results = results
@@ -33,7 +33,7 @@ class Figures:
         self._palette = Palette(results.methods())
 
     def write(self, folder: Path, file_format: str) -> List[Tuple[str, str]]:
-        """Draws everything there are data for; file names and captions."""
+        """Draws every figure that has data; returns file names and captions."""
         written = []
         with plt.rc_context(STYLE):
             for drawing in self.drawings():
@@ -41,7 +41,7 @@ class Figures:
                 if figure is None:
                     continue
                 name = f'{drawing.name}.{file_format}'
-                # The date would make every file a new one.
+                # A date would change the file at every run.
                 metadata = {'Date': None} if file_format == 'svg' else None
                 try:
                     with written_whole(folder / name) as partial:
@@ -53,7 +53,7 @@ class Figures:
         return written
 
     def drawings(self) -> List[Drawing]:
-        """The experiment's own figures, or else the general ones."""
+        """The experiment's figures, or the general ones."""
         own: Dict[str, Callable[[], List[Drawing]]] = {
             'speed': self._speed, 'single_run': self._single_run, 'kidnapped': self._kidnapped,
             'motion_grid': self._motion_grid, 'hybrid': self._hybrid, 'hybrid_particles': self._hybrid_particles,
@@ -128,5 +128,5 @@ class Figures:
 
 
 def plain(name: str) -> str:
-    """A name that is safe in a file's name and in a link."""
+    """A name that is safe in a file name and in a link."""
     return ''.join(letter if letter.isalnum() and letter.isascii() else '_' for letter in name)

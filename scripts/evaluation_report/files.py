@@ -9,7 +9,7 @@ from .data import DataError
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """A path to write to, which becomes the file when nothing went wrong."""
+    """A temporary path to write to; renamed to `path` on success."""
     partial = path.with_name(f'.{path.name}.partial')
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -39,7 +39,7 @@ def motion_figure(results: Results, papers: Papers, group: Group, title: str) ->
 
 
 def draw_grid(axis: plt.Axes, cells: List[List[float]]) -> None:
-    """Colours each cell by its error, which stands in it; the smallest is bold. Each grid has its own scale."""
+    """Colours each cell by its error and prints it there, the smallest in bold. Each grid has its own scale."""
     known = [value for row in cells for value in row if value == value]
     low, high = min(known), max(known)
     image = axis.imshow(cells, cmap='cividis_r', vmin=low, vmax=high if high > low else low + 1, aspect='auto')
@@ -60,10 +60,10 @@ def label_columns(axis: plt.Axes, columns: List) -> None:
     """The initial speed under each column, the rotation under each block of columns."""
     axis.set_xticks(range(len(columns)))
     axis.set_xticklabels([f'{speed:g}' for _, speed in columns])
-    axis.set_xlabel(r'initial speed [multiples of the driven one], below it $\sigma_{rot}$', labelpad=16)
+    axis.set_xlabel(r'initial speed [multiples of the recorded speed]; below: $\sigma_{rot}$', labelpad=16)
     for rotation in dict.fromkeys(rotation for rotation, _ in columns):
-        places = [place for place, column in enumerate(columns) if column[0] == rotation]
-        axis.annotate(f'{rotation:g}°', (sum(places) / len(places), 0), xycoords=('data', 'axes fraction'),
+        indices = [index for index, column in enumerate(columns) if column[0] == rotation]
+        axis.annotate(f'{rotation:g}°', (sum(indices) / len(indices), 0), xycoords=('data', 'axes fraction'),
                       xytext=(0, -17), textcoords='offset points', ha='center', va='top')
-        if places[0]:
-            axis.axvline(places[0] - .5, color='white', linewidth=2.5)
+        if indices[0]:
+            axis.axvline(indices[0] - .5, color='white', linewidth=2.5)

@@ -7,28 +7,28 @@ from typing import Dict, List, Optional, Tuple
 from .data import DataError, Group, Number, number, read_rows
 
 COLUMNS = ('experiment', 'source', 'train_group', 'test_group', 'method', 'metric', 'value')
-# Numbers that hold whatever the illumination.
+# Numbers that hold for every illumination.
 ANY: Group = ('any', 'any')
 
 
 @dataclass(frozen=True)
 class PaperValue:
-    """A number as it is printed, and where."""
+    """A number as printed, and its source."""
     text: str
     value: float
     source: str
 
     def decimals(self) -> int:
-        """How many digits are printed behind the point."""
+        """Number of printed decimals."""
         return len(self.text.partition('.')[2])
 
     def rounds(self, other: 'PaperValue') -> bool:
-        """Whether this is the other number, printed with fewer digits."""
+        """Whether this is the other number, rounded."""
         return abs(other.value - self.value) <= 0.5 * 10.0 ** -self.decimals() + 1e-9
 
 
 def method_key(method: str) -> str:
-    """A name in which neither the case nor the spelling of numbers matters: 1e-05 is 0.00001."""
+    """A name independent of case and of the spelling of numbers: 1e-05 is 0.00001."""
     words = method.lower().replace('wgii + wgoh', 'global').split()
     return ' '.join(_spelled(word) for word in words)
 
@@ -41,12 +41,12 @@ def _spelled(word: str) -> str:
 
 
 def group_key(group: Group) -> Group:
-    """Groups as the papers call them: sunny_1 belongs to sunny."""
+    """Groups by the papers' names: sunny_1 belongs to sunny."""
     return tuple(re.sub(r'[\W_]*\d*$', '', name.lower()) for name in group)  # type: ignore[return-value]
 
 
 class Papers:
-    """Looks the papers' numbers up; for each, the source that leads comes first."""
+    """The papers' numbers; for each, the leading source first."""
 
     def __init__(self, path: Optional[Path]):
         self._values: Dict[Tuple[str, Group, str, str], List[PaperValue]] = {}
@@ -65,7 +65,7 @@ class Papers:
                 sources.append(row['source'])
 
     def sources(self, experiment: str) -> List[str]:
-        """Where the experiment's numbers stand; the leading source first."""
+        """Sources of the experiment's numbers, the leading one first."""
         return self._sources.get(experiment, [])
 
     def all(self, experiment: str, group: Group, method: str, metric: str) -> List[PaperValue]:
@@ -82,6 +82,6 @@ class Papers:
         return found[0].value if found else None
 
     def differing(self, experiment: str, group: Group, method: str, metric: str) -> List[PaperValue]:
-        """The leading number and those of other sources that are really different."""
+        """The leading number, and those of other sources that differ by more than rounding."""
         found = self.all(experiment, group, method, metric)
         return found[:1] + [other for other in found[1:] if not found[0].rounds(other)]

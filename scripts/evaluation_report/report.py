@@ -1,4 +1,4 @@
-"""Puts the report together."""
+"""Assembles the report."""
 from pathlib import Path
 from typing import List, Optional, Tuple
 
@@ -11,21 +11,21 @@ from .words import in_words
 
 
 def counted(count: int, what: str) -> str:
-    """So many of them."""
+    """A number with its noun, singular or plural."""
     return f'{count} {what}' if count == 1 else f'{count} {what}s'
 
 
 def introduction(results: Results) -> str:
-    """Title, and what was run."""
+    """Title, source, and what was run."""
     title = escape(results.description.get('title') or results.experiment)
     text = f'# {title}\n\n'
     source = results.description.get('source')
     if source:
-        text += f'Reproduces: {escape(source)}.\n\n'
-    rounds = [name for pair in results.pairs for name in pair]
+        text += f'Source: {escape(source)}.\n\n'
+    recordings = {name for pair in results.pairs for name in pair}
     facts = [counted(len(results.methods()), 'method')]
     if results.pairs:
-        facts.insert(0, counted(len(set(rounds)), 'round'))
+        facts.insert(0, counted(len(recordings), 'recording'))
         facts.append(counted(len(results.pairs), 'pair') + ' (map → drive): '
                      + ', '.join(f'{escape(train)} → {escape(test)}' for train, test in results.pairs))
     runs = [outcome.get('runs') for outcome in results.outcomes]
@@ -38,20 +38,20 @@ def introduction(results: Results) -> str:
 def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]]) -> str:
     """The whole report in Markdown."""
     text = introduction(results) + '## Results\n\n' + result_tables(results, papers)
-    text += '\n## In words\n\n' + in_words(results, papers)
+    text += '\n## Comparison with the papers\n\n' + in_words(results, papers)
     discussion = results.description.get('discussion')
     if discussion:
-        text += f'\n## Why\n\n{str(discussion).rstrip()}\n'
+        text += f'\n## Discussion\n\n{str(discussion).rstrip()}\n'
     if figures:
         text += '\n## Figures\n\n' + '\n\n'.join(f'![{escape(caption)}](figures/{name})' for name, caption in figures)
         text += '\n'
     text += '\n## Tracking and cost\n\n' + tracking_tables(results)
     trust = trust_tables(results)
-    return text + (f'\n## Trust in the states\n\n{trust}' if trust else '')
+    return text + (f'\n## Reliability of the states\n\n{trust}' if trust else '')
 
 
 def write_report(folder: Path, papers_path: Optional[Path], file_format: str) -> int:
-    """Writes figures and report into the folder; the number of figures."""
+    """Writes figures and report into the folder; returns the number of figures."""
     papers = Papers(papers_path)
     results = read_results(folder)
     figures = Figures(results, papers).write(folder / 'figures', file_format)

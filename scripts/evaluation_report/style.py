@@ -1,4 +1,4 @@
-"""How the figures look: colours, sizes, and a page of panels with its legend in a row of its own."""
+"""Style of the figures: colours, sizes, and a page of panels with its legend in a separate row."""
 import math
 import re
 from typing import Any, Dict, List, Optional, Sequence, Tuple
@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 
-# Okabe and Ito's colours, which colour-blind readers can tell apart; yellow last, as it is faint on white.
+# Okabe and Ito's colours, which colour-blind readers can tell apart; yellow last: faint on white.
 COLOURS = {'blue': '#0072B2', 'vermillion': '#D55E00', 'green': '#009E73', 'purple': '#CC79A7', 'sky': '#56B4E9',
            'orange': '#E69F00', 'black': '#000000', 'yellow': '#F0E442'}
 PREFERRED = {'DPSO': 'vermillion', 'PF-g': 'sky', 'PF-l': 'blue', 'adaptive': 'vermillion', 'not adaptive': 'blue',
@@ -32,24 +32,24 @@ STYLE = {'font.size': 9, 'axes.titlesize': 9.5, 'figure.titlesize': 11, 'legend.
 
 
 def literal(text: str) -> str:
-    """A name as it is, which matplotlib does not take for a formula."""
+    """A name that matplotlib does not take for a formula."""
     return text.replace('$', r'\$')
 
 
 def family(method: str) -> str:
-    """What a method has in common with those that differ in a number or in the kidnapping only."""
+    """The name without its number and without the kidnapping."""
     base = re.sub(r', kidnapped$', '', method)
     return re.sub(r'[-\s]+\d[\d.]*x?$', '', base)
 
 
 class Palette:
-    """Gives each family of methods its colour and each of its members a line style, the same in every figure."""
+    """A colour for each family of methods and a line style for each member, the same in every figure."""
 
     def __init__(self, methods: Sequence[str]):
         members: Dict[str, List[str]] = {}
         for method in methods:
             members.setdefault(family(method), []).append(re.sub(r', kidnapped$', '', method))
-        # Who comes first gets the colour that both would like.
+        # When two prefer the same colour, the first gets it.
         taken = dict((colour, name) for name, colour in reversed([(name, PREFERRED[name]) for name in members
                                                                   if name in PREFERRED]))
         free = [colour for colour in COLOURS if colour not in taken]
@@ -75,21 +75,21 @@ class Palette:
         return {'color': self.colour(method), 'linestyle': style}
 
     def handles(self, methods: Sequence[str]) -> List[Line2D]:
-        """Entries of a legend of curves."""
+        """Legend entries of curves."""
         return [Line2D([], [], label=literal(method), **self.line(method)) for method in methods]
 
 
 def paper_patch() -> Patch:
-    """The legend's entry for bars with the papers' numbers."""
+    """The legend entry of the papers' bars."""
     return Patch(facecolor=PAPER_FILL, edgecolor=PAPER_EDGE, hatch='////', label='papers')
 
 
 def page(title: str, rows: int, columns: int, panel_height: float, handles: Sequence[Any] = (),
          legend_width: Optional[int] = None, share_x: bool = False) -> Tuple[plt.Figure, List[plt.Axes]]:
-    """A figure of equal panels, row by row, with the legend beneath them where it covers nothing."""
+    """A figure of equal panels, row by row, with the legend below them."""
     longest = max((len(handle.get_label()) for handle in handles), default=1)
     across = legend_width or max(1, min(len(handles), int(PAGE_WIDTH * 72 / (longest * 4.8 + 44))))
-    # As many in every row.
+    # The same number in every row.
     across = math.ceil(len(handles) / math.ceil(len(handles) / across)) if handles else 1
     legend_height = .26 * math.ceil(len(handles) / across) + .05 if handles else 0
     heights = [panel_height] * rows + ([legend_height] if handles else [])
@@ -108,12 +108,12 @@ def page(title: str, rows: int, columns: int, panel_height: float, handles: Sequ
 
 
 def shape(count: int) -> Tuple[int, int]:
-    """Rows and columns for so many panels."""
+    """Rows and columns for this many panels."""
     columns = 1 if count == 1 else 3 if count in (3, 5, 6, 9) else 2
     return math.ceil(count / columns), columns
 
 
 def hide_unused(axes: Sequence[plt.Axes], used: int) -> None:
-    """Takes the panels away that nothing was drawn in."""
+    """Hides the unused panels."""
     for axis in axes[used:]:
         axis.set_visible(False)

@@ -8,7 +8,7 @@ from .papers import PaperValue, Papers
 
 
 class Measure(NamedTuple):
-    """A column: how it is called and written."""
+    """A column: its title and number format."""
     metric: str
     title: str
     decimals: int
@@ -27,13 +27,13 @@ TRACKING = (Measure('runs', 'runs', 0),
             Measure('median_err_m', 'median error [m]', 2),
             Measure('within_5m', 'within 5 m [%]', 1, 100),
             Measure('steps_to_localise', 'images until localised', 1),
-            Measure('steps_to_relocalise', 'images until localised again', 1),
+            Measure('steps_to_relocalise', 'images until relocalised', 1),
             Measure('recall_at_p99', 'recall at 99 % precision [%]', 1, 100),
             Measure('extract_ms', 'extract [ms]', 2),
             Measure('match_ms', 'match [ms]', 2),
             Measure('update_ms', 'update [ms]', 2))
 TRUST = (Measure('tracking_share', 'TRACKING [%]', 1, 100),
-         Measure('wrong_tracking', 'of these beyond 5 m [%]', 2, 100),
+         Measure('wrong_tracking', 'TRACKING beyond 5 m [%]', 2, 100),
          Measure('lost_precision', '"lost": precision [%]', 1, 100),
          Measure('lost_recall', '"lost": recall [%]', 1, 100))
 OFF_MAP = (Measure('off_map_precision', 'OFF_MAP: precision [%]', 1, 100),
@@ -54,7 +54,7 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def written(value: Number, decimals: int, scale: float = 1.0) -> str:
-    """A number for people; a dash when there is none."""
+    """A formatted number; a dash when there is none."""
     return NOTHING if value is None else f'{value * scale:.{decimals}f}'
 
 
@@ -66,7 +66,7 @@ def ours(outcome: Outcome, measure: Measure) -> str:
 
 
 class PaperColumn:
-    """Cells with the papers' numbers; remembers the sources it used, to be listed under the table."""
+    """Cells with the papers' numbers; collects their sources for the line under the table."""
 
     def __init__(self, papers: Papers, experiment: str):
         self._papers = papers
@@ -74,7 +74,7 @@ class PaperColumn:
         self._used: Set[int] = set()
 
     def cell(self, group: Group, method: str, measure: Measure) -> str:
-        """The leading paper's number; behind a slash the number of another one that differs."""
+        """The leading source's number; after a slash the differing number of another source."""
         values = self._papers.differing(self._experiment, group, method, measure.metric)
         return ' / '.join(self._written(value, group, method, measure) for value in values) or NOTHING
 
@@ -100,7 +100,7 @@ class PaperColumn:
 
 
 def outcome_table(experiment: str, outcomes: List[Outcome], measures: Sequence[Measure], papers: Papers) -> str:
-    """One row a method; columns in which nothing is defined are left out."""
+    """One row per method; empty columns are omitted."""
     column = PaperColumn(papers, experiment)
     header, cells = ['method'], [[escape(outcome.method)] for outcome in outcomes]
     for measure in measures:
@@ -115,7 +115,7 @@ def outcome_table(experiment: str, outcomes: List[Outcome], measures: Sequence[M
 
 
 def group_tables(results: Results, papers: Papers, measures: Sequence[Measure]) -> str:
-    """One table a pair of groups, under its own heading."""
+    """One table per pair of groups, each under its heading."""
     return '\n'.join(f'### {escape(group_title(group))}\n\n'
                      + outcome_table(results.experiment, results.of(group), measures, papers)
                      for group in results.groups())
@@ -201,7 +201,7 @@ def threshold_tables(results: Results, papers: Papers) -> str:
 
 
 def cost_tables(results: Results, papers: Papers) -> str:
-    """The hybrid's tables: errors a pair of groups, then what they cost by illumination ([H] Tables I and II)."""
+    """The hybrid's tables: errors per pair of groups, then cost by illumination ([H] Tables I and II)."""
     text = group_tables(results, papers, MAIN)
     merged = by_illumination(results)
     for group in (CONSTANT, CHANGING):
@@ -217,7 +217,7 @@ SHAPES: Dict[str, Callable[[Results, Papers], str]] = {
 
 
 def result_tables(results: Results, papers: Papers) -> str:
-    """The experiment's own tables, in the shape of the papers'; methods that fit no shape get the plain one."""
+    """The experiment's tables in the papers' layout; the general table when no method fits it."""
     shaped = SHAPES.get(results.experiment, lambda *_: '')(results, papers)
     return (shaped or group_tables(results, papers, MAIN)).rstrip() + '\n'
 
@@ -228,7 +228,7 @@ def tracking_tables(results: Results) -> str:
 
 
 def trust_tables(results: Results) -> str:
-    """How far the states of trackers can be trusted; empty when nothing has states."""
+    """How reliable the trackers' states are; empty when no method has states."""
     outcomes = [outcome for group in results.groups() for outcome in results.of(group)]
     if all(outcome.get('tracking_share') is None for outcome in outcomes):
         return ''

@@ -1,4 +1,4 @@
-"""The comparison with the papers, in sentences: order and ratios, and whether they agree."""
+"""The comparison with the papers in sentences: order, ratios, and whether they agree."""
 from itertools import combinations
 from typing import Dict, List, NamedTuple, Tuple
 
@@ -6,10 +6,10 @@ from .data import Group, Outcome, Results
 from .experiments import by_illumination, count_of, group_title, marginals, ratio_pairs
 from .papers import Papers
 
-# Ratios this close count as the same: neither the images nor the robot are the papers'.
+# Ratios this close count as equal: images and robot are not the papers'.
 TOLERANCE = 0.25
-# So many turned pairs are told one by one; the table shows the others.
-TOLD = 6
+# At most this many reversed pairs are listed; the table shows all.
+LISTED = 6
 RATIO_METRICS = {'mean_err_m': 'mean error', 'comparisons_per_image': 'comparisons per image'}
 # The ratio of these to SIFT alone is the speed-up already.
 ORDER_METRICS = {'s_per_image': 'time per image'}
@@ -24,7 +24,7 @@ class Both(NamedTuple):
 
 
 class Words:
-    """Collects sentences and counts how many of them agree."""
+    """Collects sentences and counts those that agree."""
 
     def __init__(self) -> None:
         self.lines: List[str] = []
@@ -36,7 +36,7 @@ class Words:
         self.lines.append(f'\n### {text}\n')
 
     def include(self, title: str, section: 'Words') -> None:
-        """Takes a section over, unless it is empty."""
+        """Appends another section, unless it is empty."""
         if section.lines:
             self.heading(title)
             self.lines += section.lines
@@ -44,33 +44,33 @@ class Words:
                 own[:] = [a + b for a, b in zip(own, other)]
 
     def order(self, what: str, both: Both) -> None:
-        """Whether the methods come in the same order, and which pairs are turned."""
+        """Whether the methods have the same order, and which pairs are reversed."""
         if len(both.ours) < 2:
             return
-        turned = list(turned_pairs(both))
+        reversed_ = reversed_pairs(both)
         total = sum(1 for _ in judged_pairs(both))
-        self._order[0] += total - len(turned)
+        self._order[0] += total - len(reversed_)
         self._order[1] += total
         line = f'- Order by {what}, lowest first. Here: {ranking(both.ours)}. Papers: {ranking(both.papers)}. '
-        if not turned:
+        if not reversed_:
             self.lines.append(line + f'All {total} pairs are in the papers\' order.')
             return
-        told = '; '.join(f'`{first}` before `{second}` in the papers ({both.papers[first]:.3g} and '
-                         f'{both.papers[second]:.3g}), here behind it ({both.ours[first]:.3g} and '
-                         f'{both.ours[second]:.3g})' for first, second in turned[:TOLD])
-        more = f'; and {len(turned) - TOLD} more' if len(turned) > TOLD else ''
-        self.lines.append(line + f'{total - len(turned)} of {total} pairs are in the papers\' order. '
-                          f'Turned: {told}{more}.')
+        listed = '; '.join(f'`{first}` and `{second}` (papers {both.papers[first]:.3g} < {both.papers[second]:.3g}, '
+                           f'here {both.ours[first]:.3g} ≥ {both.ours[second]:.3g})'
+                           for first, second in reversed_[:LISTED])
+        more = f'; and {len(reversed_) - LISTED} more' if len(reversed_) > LISTED else ''
+        self.lines.append(line + f'{total - len(reversed_)} of {total} pairs are in the papers\' order. '
+                          f'Reversed: {listed}{more}.')
 
     def ratio(self, what: str, first: str, second: str, both: Both) -> None:
-        """One method's measure over another's, here and in the papers."""
+        """The ratio of one method's measure to another's, here and in the papers."""
         if not both.ours[second] or not both.papers[second]:
             return
         here, there = both.ours[first] / both.ours[second], both.papers[first] / both.papers[second]
-        self.agreement(f'{what} of `{first}` over `{second}`', here, there)
+        self.agreement(f'{what}, `{first}` / `{second}`', here, there)
 
     def agreement(self, what: str, here: float, there: float, scale: float = 1, unit: str = '') -> None:
-        """Two numbers that should be the same, and by how much they are not."""
+        """Two numbers that should be equal, and their relative difference."""
         if not there:
             return
         line = (f'- {what[0].upper() + what[1:]}: {scale * here:.2f}{unit} here, {scale * there:.2f}{unit} in the '
@@ -82,16 +82,16 @@ class Words:
         self.lines.append(line + f'{"agrees" if agrees else "**differs**"} ({100 * off:+.0f} %).')
 
     def text(self) -> str:
-        """Everything, with the tally in front."""
+        """All sentences, the tally first."""
         if not self.lines:
-            return 'The papers have no numbers that this experiment could be held against.\n'
+            return 'The papers give no numbers for this experiment.\n'
         tally = []
         if self._ratios[1]:
             tally.append(f'{self._ratios[0]} of {self._ratios[1]} ratios agree with the papers within '
                          f'{100 * TOLERANCE:.0f} %')
         if self._order[1]:
             tally.append(f'{self._order[0]} of {self._order[1]} pairs of methods are in the papers\' order')
-        return '; '.join(tally) + '.\n' + '\n'.join(self.lines) + '\n'
+        return ('; '.join(tally) + '.\n' if tally else '') + '\n'.join(self.lines) + '\n'
 
 
 def ranking(values: Dict[str, float]) -> str:
@@ -100,19 +100,19 @@ def ranking(values: Dict[str, float]) -> str:
 
 
 def judged_pairs(both: Both) -> List[Tuple[str, str]]:
-    """Pairs that the papers put in an order, the lower one first."""
+    """Pairs whose values differ in the papers, the lower one first."""
     return [(first, second) if both.papers[first] < both.papers[second] else (second, first)
             for first, second in combinations(both.ours, 2) if both.papers[first] != both.papers[second]]
 
 
-def turned_pairs(both: Both) -> List[Tuple[str, str]]:
-    """Pairs whose order is another one here; those furthest apart in the papers first."""
-    turned = [(first, second) for first, second in judged_pairs(both) if both.ours[first] >= both.ours[second]]
-    return sorted(turned, key=lambda pair: both.papers[pair[0]] - both.papers[pair[1]])
+def reversed_pairs(both: Both) -> List[Tuple[str, str]]:
+    """Pairs in another order here; those furthest apart in the papers first."""
+    found = [(first, second) for first, second in judged_pairs(both) if both.ours[first] >= both.ours[second]]
+    return sorted(found, key=lambda pair: both.papers[pair[0]] - both.papers[pair[1]])
 
 
 def common(experiment: str, outcomes: List[Outcome], metric: str, papers: Papers) -> Both:
-    """The measure of those methods that both have."""
+    """The measure of the methods that both have."""
     both = Both({}, {})
     for outcome in outcomes:
         here, there = outcome.get(metric), papers.lead(experiment, outcome.group, outcome.method, metric)
@@ -134,7 +134,7 @@ def compare(words: Words, experiment: str, group: Group, outcomes: List[Outcome]
 
 
 def compare_cost(words: Words, results: Results, papers: Papers) -> None:
-    """What the hybrid saves, by illumination ([H] Table II)."""
+    """Cost of the hybrid by illumination ([H] Table II)."""
     merged = by_illumination(results)
     for group in dict.fromkeys(outcome.group for outcome in merged):
         outcomes = [outcome for outcome in merged if outcome.group == group]
@@ -149,7 +149,7 @@ def compare_cost(words: Words, results: Results, papers: Papers) -> None:
 
 
 def compare_grid(words: Words, results: Results, papers: Papers) -> None:
-    """The motion grid: its best cell, and the mean over each of its axes."""
+    """The motion grid: its best cell, and the means along each axis."""
     for group in results.groups():
         both = common(results.experiment, results.of(group), 'mean_err_m', papers)
         if len(both.ours) < 2:
@@ -172,7 +172,7 @@ def compare_grid(words: Words, results: Results, papers: Papers) -> None:
 
 
 def compare_counts(words: Words, results: Results, papers: Papers) -> None:
-    """How much error fewer particles cost: the papers give differences to 300 particles only ([H] Section V)."""
+    """Error by number of particles: the paper gives only differences to 300 ([H] Section V)."""
     means: Dict[str, List[float]] = {}
     for outcome in results.outcomes:
         error = outcome.get('mean_err_m')
@@ -184,8 +184,8 @@ def compare_counts(words: Words, results: Results, papers: Papers) -> None:
         base = means.get(f'{count[0]} 300') if count else None
         if there is not None and base:
             above = sum(errors) / len(errors) - sum(base) / len(base)
-            words.lines.append(f'- `{method}`: {above:+.2f} m mean error against 300 particles here, {there:+.2f} m in '
-                               'the paper, averaged over the pairs of groups.')
+            words.lines.append(f'- `{method}`: mean error {above:+.2f} m relative to 300 particles here, {there:+.2f} '
+                               'm in the paper; mean over the pairs of groups.')
 
 
 def in_words(results: Results, papers: Papers) -> str:
