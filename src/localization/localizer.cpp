@@ -40,17 +40,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
 
-  const ImageReport image = image_->report();
-  last_ = Estimate{stamp_ns,
-                   state,
-                   poseOf(tracked, state),
-                   tracked,
-                   evidence,
-                   assessor_.motionResidual_m(),
-                   scores_.comparisons(),
-                   scores_.swept(),
-                   image,
-                   stopwatch.elapsed_ms() - image.extract_ms - image.match_ms};
+  last_ = estimateOf(stamp_ns, tracked, evidence, state, stopwatch.elapsed_ms());
   return answer();
 }
 
@@ -58,6 +48,22 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
 bool Localizer::isRepetition(std::int64_t stamp_ns) const {
   if (!last_ || !image_->isRepeated()) return false;
   return config_.state.frozen_images > 0 || last_->stamp_ns == stamp_ns;
+}
+
+Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const Evidence& evidence,
+                               LocalizationState state, double elapsed_ms) {
+  Estimate estimate;
+  estimate.stamp_ns = stamp_ns;
+  estimate.state = state;
+  estimate.pose = poseOf(tracked, state);
+  estimate.tracked = tracked;
+  estimate.evidence = evidence;
+  estimate.motion_residual_m = assessor_.motionResidual_m();
+  estimate.comparisons = scores_.comparisons();
+  estimate.swept = scores_.swept();
+  estimate.image = image_->report();
+  estimate.update_ms = elapsed_ms - estimate.image.extract_ms - estimate.image.match_ms;
+  return estimate;
 }
 
 Estimate Localizer::lastAgain(std::int64_t stamp_ns) {

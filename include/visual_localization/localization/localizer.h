@@ -63,6 +63,8 @@ class Localizer {
   };
 
   bool isRepetition(std::int64_t stamp_ns) const;
+  Estimate estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const Evidence& evidence,
+                      LocalizationState state, double elapsed_ms);
   Estimate lastAgain(std::int64_t stamp_ns);
   Estimate answer();
   bool isFrozen() const;
