@@ -90,7 +90,7 @@ void LocalizerPublisher::publishMatches(const SharedLocalizer::Result& result, c
                                         const std_msgs::Header& header) {
   if (matches_.getNumSubscribers() == 0) return;
   const cv::Mat canvas =
-      drawMatches(grey, result.sift, *result.map, result.estimate.tracked.best_image, result.match.max_angle_ratio);
+      drawMatches(grey, result.sift, *result.map, result.estimate.tracked.best_image, result.match);
   matches_.publish(cv_bridge::CvImage(header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
 }
 
