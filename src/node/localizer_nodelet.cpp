@@ -120,7 +120,6 @@ void LocalizerNodelet::onInitialPose(const geometry_msgs::PoseWithCovarianceStam
 bool LocalizerNodelet::onRelocalize(Relocalize::Request& request, Relocalize::Response& response) {
   try {
     const Eigen::Vector2d centre_m(request.centre.x, request.centre.y);
-    if (request.use_centre) requireDisc(centre_m, request.radius);
     response.success =
         request.use_centre ? localizer_->relocalizeAround(centre_m, request.radius) : localizer_->relocalizeAnywhere();
     response.message = !response.success    ? "no map is loaded"
