@@ -22,13 +22,13 @@ constexpr int kBadUsage = 2;
 
 const char* const kHelp =
     "Usage: localizer_node [image:=TOPIC] [_map:=FILE] [_PARAMETER:=VALUE ...]\n"
-    "Localises with one camera in a map of training images; the nodelet\n"
-    "visual_localization/LocalizerNodelet standing alone. Needs a roscore.\n\n"
+    "Localises with one camera in a map of training images: the nodelet\n"
+    "visual_localization/LocalizerNodelet, running alone. Needs a roscore.\n\n"
     "  --help                this text\n"
     "  --version             the version\n"
     "  --parameters          every parameter with its default, range and meaning, in Markdown\n"
     "  --localizer-config    config/localizer.yaml: every parameter of the localizer with its default\n"
-    "  --map-builder-config  config/map_builder.yaml, the same of the map builder\n\n"
+    "  --map-builder-config  config/map_builder.yaml, the same for the map builder\n\n"
     "Topics, services and parameters: doc/node.md and config/localizer.yaml.\n";
 
 /// Arguments that are not for ROS, without the program's name.

@@ -8,8 +8,17 @@
 #include <Eigen/Eigenvalues>
 
 #include "base/angles.h"
+#include "visual_localization/geo/local_frame.h"
 
 namespace visual_localization {
+namespace {
+
+/// False for a number that is not finite.
+bool isOnLocalMap(const Eigen::Vector2d& position_m) {
+  return (position_m.array().abs() <= kLargestCoordinate_m).all();
+}
+
+}  // namespace
 
 CloudMoments momentsOf(const std::vector<Particle>& particles) {
   CloudMoments moments;
@@ -63,9 +72,10 @@ Prior anywhere(const Area& area) {
 }
 
 Prior around(const Eigen::Vector2d& centre_m, double radius_m) {
-  if (!centre_m.allFinite()) throw std::invalid_argument("the centre must be finite");
-  if (!std::isfinite(radius_m) || radius_m < 0.0) {
-    throw std::invalid_argument("the radius must be finite and not negative, in metres");
+  if (!isOnLocalMap(centre_m))
+    throw std::invalid_argument("the centre must be finite and within 1000 km of the origin");
+  if (!(radius_m >= 0.0 && radius_m <= kLargestCoordinate_m)) {
+    throw std::invalid_argument("the radius must be from 0 to 1000 km, in metres");
   }
   return [centre_m, radius_m](Random& random) {
     const double angle = random.uniform(-kPi, kPi);
@@ -75,8 +85,11 @@ Prior around(const Eigen::Vector2d& centre_m, double radius_m) {
 }
 
 Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& covariance_m2) {
-  if (!mean_m.allFinite() || !covariance_m2.allFinite()) {
-    throw std::invalid_argument("position and covariance must be finite");
+  if (!isOnLocalMap(mean_m))
+    throw std::invalid_argument("the position must be finite and within 1000 km of the origin");
+  constexpr double kLargestVariance_m2 = kLargestCoordinate_m * kLargestCoordinate_m;
+  if (!(covariance_m2.array().abs() <= kLargestVariance_m2).all()) {
+    throw std::invalid_argument("the covariance must be finite and at most (1000 km)^2");
   }
   const double scale = std::max(1.0, covariance_m2.cwiseAbs().maxCoeff());
   const double tolerance = 1e-6 * scale;

@@ -60,8 +60,8 @@ int columnOf(std::size_t i, std::size_t count) {
   return cvRound(kCurveRight - age * (kCurveRight - kCurveLeft) / static_cast<double>(Dashboard::kShown - 1));
 }
 
-/// A clock that is played from a bag lags behind the stamps by a few milliseconds, which would only confuse; clocks
-/// that differ show.
+/// A clock that is played from a bag lags behind the stamps by a few milliseconds, which would only confuse; larger
+/// differences of the clocks show.
 std::string latencyText(double latency_ms) {
   constexpr double kSmallLag_ms = 50.0;
   if (latency_ms == -1.0) return "-";  // the image has no stamp

@@ -9,14 +9,14 @@
 
 namespace visual_localization {
 
-/// What the status says, as a picture for people: the state in colour, the figures that explain it, and how they
-/// came about over the last images. Thread-safe.
+/// The status as a picture for people: the state in colour, the figures that explain it, and their course over the last
+/// images. Thread-safe.
 class Dashboard {
  public:
-  static constexpr std::size_t kShown = 120;  ///< so many images are remembered
+  static constexpr std::size_t kShown = 120;  ///< number of images that are remembered
 
   void add(const LocalizationStatus& status);
-  /// 8-bit BGR, always of the same size; black when nothing has been added.
+  /// 8-bit BGR, always of the same size; dark when nothing has been added.
   cv::Mat draw() const;
 
  private:

@@ -13,6 +13,7 @@ namespace visual_localization {
 namespace {
 
 const char* const kCompressed = "compressed";
+constexpr unsigned kQueue = 5;  ///< roscpp drops uncounted what does not fit; the worker's own queue of one counts
 
 /// "image_transport/raw" is known to users as "raw".
 std::set<std::string> knownTransports(const image_transport::ImageTransport& image_transport) {
@@ -42,12 +43,13 @@ ImageSource::ImageSource(ros::NodeHandle node, const ros::NodeHandle& private_no
   if (transport == kCompressed) {
     const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> forward =
         [callback](const sensor_msgs::CompressedImageConstPtr& message) { callback(received(message)); };
-    compressed_ = node.subscribe<sensor_msgs::CompressedImage>(node.resolveName("image") + "/compressed", 1, forward,
-                                                               ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
+    compressed_ =
+        node.subscribe<sensor_msgs::CompressedImage>(node.resolveName("image") + "/compressed", kQueue, forward,
+                                                     ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
   } else {
     const image_transport::TransportHints hints(transport, ros::TransportHints().tcpNoDelay(), private_node);
     by_plugin_ = image_transport_.subscribe(
-        "image", 1, [callback](const sensor_msgs::ImageConstPtr& message) { callback(received(message)); },
+        "image", kQueue, [callback](const sensor_msgs::ImageConstPtr& message) { callback(received(message)); },
         ros::VoidPtr(), hints);
   }
   topic_ = compressed_ ? compressed_.getTopic() : by_plugin_.getTopic();
@@ -60,7 +62,7 @@ void ImageSource::shutdown() {
 
 std::string ImageSource::description() const {
   const unsigned publishers = compressed_ ? compressed_.getNumPublishers() : by_plugin_.getNumPublishers();
-  return topic() + (publishers == 0 ? ", which nobody publishes" : " (publishers: " + std::to_string(publishers) + ")");
+  return topic() + " (publishers: " + std::to_string(publishers) + ")";
 }
 
 }  // namespace visual_localization

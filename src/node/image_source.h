@@ -10,13 +10,13 @@
 
 namespace visual_localization {
 
-/// An image as it arrived: it is decoded only by whoever has the time for it.
+/// An image as it arrived, not decoded yet: only the newest one is worth that.
 struct ReceivedImage {
   std_msgs::Header header;
   std::function<cv::Mat()> decode;  ///< 8-bit grey; throws ImageError when the message is unusable
 };
 
-/// The subscription to the camera, by whatever transport.
+/// The subscription to the camera, by any transport.
 class ImageSource {
  public:
   using Callback = std::function<void(ReceivedImage)>;

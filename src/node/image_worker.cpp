@@ -1,5 +1,11 @@
 #include "node/image_worker.h"
 
+#include <exception>
+#include <sstream>
+
+#include "node/localizer_diagnostics.h"
+#include "node/message_conversions.h"
+
 namespace visual_localization {
 
 StampMonitor::Verdict StampMonitor::judge(std::int64_t stamp_ns) {
@@ -17,6 +23,97 @@ StampMonitor::Verdict StampMonitor::judge(std::int64_t stamp_ns) {
   newest_ns_ = stamp_ns;
   late_ns_.reset();
   return Verdict::kWentBack;
+}
+
+void ImageWorker::start(const std::string& topic) {
+  topic_ = topic;
+  thread_ = std::thread(&ImageWorker::work, this);
+}
+
+void ImageWorker::stop() {
+  queue_.close();
+  if (thread_.joinable()) thread_.join();
+}
+
+void ImageWorker::push(ReceivedImage image) {
+  count(&ImageCounts::received);
+  queue_.push(std::move(image));
+}
+
+ImageCounts ImageWorker::counts() const {
+  const std::uint64_t dropped = queue_.dropped();  // first, so that no more images end than are received
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ImageCounts counts = counts_;
+  counts.dropped = dropped;
+  return counts;
+}
+
+void ImageWorker::count(std::uint64_t ImageCounts::*images) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++(counts_.*images);
+}
+
+void ImageWorker::work() {
+  while (const auto image = queue_.pop()) {
+    if (const auto localized = localize(*image)) publish(*localized);
+  }
+}
+
+std::optional<LocalizedImage> ImageWorker::localize(const ReceivedImage& image) {
+  try {
+    LocalizedImage localized{{}, image.header, !image.header.stamp.isZero(), image.decode()};
+    if (!localizer_.hasMap()) {
+      count(&ImageCounts::without_map);
+      return std::nullopt;
+    }
+    if (localized.has_stamp && isLate(image.header.stamp)) {
+      count(&ImageCounts::late);
+      return std::nullopt;
+    }
+    if (!localized.has_stamp) {
+      log_.warn("no stamp", "Images without a stamp: the time of processing is used");
+      localized.header.stamp = ros::Time::now();
+    }
+    const auto stamp_ns = static_cast<std::int64_t>(localized.header.stamp.toNSec());
+    localized.result = localizer_.process(stamp_ns, localized.grey).value();  // a map is never unloaded
+    count(&ImageCounts::processed);
+    return localized;
+  } catch (const std::exception& error) {
+    refuse(error.what());
+    return std::nullopt;
+  }
+}
+
+void ImageWorker::publish(const LocalizedImage& image) {
+  const Estimate& estimate = image.result.estimate;
+  if (!isFinite(estimate)) return log_.error("not finite", "The estimate is not finite and is not published");
+  const std::string trouble = imageTrouble(estimate);
+  if (!trouble.empty()) log_.warn("trouble", trouble + " (" + topic_ + ")");
+  try {
+    output_.publish(image, counts());
+  } catch (const std::exception& error) {
+    log_.error("not published", "An image is localised, but not everything is published: " + std::string(error.what()));
+  }
+}
+
+bool ImageWorker::isLate(const ros::Time& stamp) {
+  const auto verdict = stamps_.judge(static_cast<std::int64_t>(stamp.toNSec()));
+  if (verdict == StampMonitor::Verdict::kInOrder) return false;
+  std::ostringstream lag;
+  lag << stamps_.lag_s() << " s";
+  if (verdict == StampMonitor::Verdict::kLate) {
+    log_.warn("late", "Late image left out: " + lag.str() + " older than the newest one (" + topic_ + ")");
+    return true;
+  }
+  log_.warn("time went back", "Time went back by " + lag.str() + ", as when a bag starts again: continuing from there");
+  output_.timeWentBack();
+  return false;
+}
+
+void ImageWorker::refuse(const std::string& reason) {
+  count(&ImageCounts::refused);
+  output_.refused(reason);
+  log_.warn("refused", "Image refused: " + reason);
 }
 
 }  // namespace visual_localization

@@ -4,7 +4,17 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <string>
+#include <thread>
 #include <utility>
+
+#include <opencv2/core.hpp>
+#include <ros/time.h>
+#include <std_msgs/Header.h>
+
+#include "node/image_source.h"
+#include "node/shared_localizer.h"
+#include "node/throttled_log.h"
 
 namespace visual_localization {
 
@@ -57,14 +67,14 @@ class LatestQueue {
 };
 
 /// Tells images that come late from time that goes back: an image older than the newest one is late; when the next one
-/// is older too, and not older than that one, time has gone back, as when a bag begins anew. One image of a new round
-/// is lost by that, and two publishers whose clocks differ cannot drag the time to and fro.
+/// is older too, and not older than that one, time has gone back, as when a bag starts again. That costs one image of
+/// the new time, and two publishers whose clocks differ cannot move the time back and forth.
 class StampMonitor {
  public:
   enum class Verdict : std::uint8_t {
     kInOrder,   ///< not older than the newest
-    kLate,      ///< older, of no use any more
-    kWentBack,  ///< older, and the beginning of another time
+    kLate,      ///< older, no longer of use
+    kWentBack,  ///< older, and the start of another time
   };
 
   /// `stamp_ns` of the image that came now.
@@ -76,6 +86,74 @@ class StampMonitor {
   std::optional<std::int64_t> newest_ns_;
   std::optional<std::int64_t> late_ns_;  ///< of the image before, if that was late
   double lag_s_ = 0.0;
+};
+
+/// How many images came since the start, and what became of them. Each one ends in exactly one of the counts below
+/// `received`; until then it waits or is being processed.
+struct ImageCounts {
+  std::uint64_t received = 0;
+  std::uint64_t processed = 0;
+  std::uint64_t dropped = 0;      ///< replaced by a newer one before they were processed
+  std::uint64_t late = 0;         ///< older than one that was processed
+  std::uint64_t refused = 0;      ///< unusable
+  std::uint64_t without_map = 0;  ///< came while no map was loaded
+
+  std::uint64_t ended() const { return processed + dropped + late + refused + without_map; }
+};
+
+/// One image and what the localizer says about it.
+struct LocalizedImage {
+  SharedLocalizer::Result result;  ///< finite
+  std_msgs::Header header;         ///< of the image; a missing stamp is replaced by the time of processing
+  bool has_stamp = true;
+  cv::Mat grey;
+};
+
+/// Where the worker's thread hands its results.
+class ImageOutput {
+ public:
+  virtual ~ImageOutput() = default;
+  virtual void publish(const LocalizedImage& image, const ImageCounts& counts) = 0;
+  virtual void refused(const std::string& reason) = 0;
+  virtual void timeWentBack() = 0;
+};
+
+/// Localises the newest image in a thread of its own; the callbacks of roscpp only push.
+class ImageWorker {
+ public:
+  /// All three must outlive it.
+  ImageWorker(SharedLocalizer& localizer, ImageOutput& output, ThrottledLog& log)
+      : localizer_(localizer), output_(output), log_(log) {}
+  ~ImageWorker() { stop(); }
+  ImageWorker(const ImageWorker&) = delete;
+  ImageWorker& operator=(const ImageWorker&) = delete;
+
+  /// Images that were pushed before are waiting. `topic` names the camera in the log.
+  void start(const std::string& topic);
+  /// Finishes the image that is being processed.
+  void stop();
+  /// Never waits for the worker.
+  void push(ReceivedImage image);
+  ImageCounts counts() const;
+
+ private:
+  void work();
+  /// Nothing for an image that ends otherwise.
+  std::optional<LocalizedImage> localize(const ReceivedImage& image);
+  void publish(const LocalizedImage& image);
+  bool isLate(const ros::Time& stamp);
+  void refuse(const std::string& reason);
+  void count(std::uint64_t ImageCounts::*images);
+
+  SharedLocalizer& localizer_;
+  ImageOutput& output_;
+  ThrottledLog& log_;
+  std::string topic_;
+  LatestQueue<ReceivedImage> queue_;
+  StampMonitor stamps_;  ///< of the worker's thread
+  mutable std::mutex mutex_;
+  ImageCounts counts_;  ///< but for the dropped ones, which the queue counts
+  std::thread thread_;
 };
 
 }  // namespace visual_localization

@@ -9,40 +9,42 @@
 namespace visual_localization {
 namespace {
 
-// Where people begin to call an image dark, bright or dull; nothing is decided by them.
+// From here on the text calls an image dark, overexposed or low in contrast; nothing is decided by these limits.
 constexpr double kDark = 20.0;
 constexpr double kBright = 235.0;
-constexpr double kDull = 8.0;
+constexpr double kLowContrast = 8.0;
 constexpr double kStretched = 0.05;
 
-const char* guessAt(const ImageStatistics& look) {
-  if (look.mean_grey < kDark) return ": dark or covered?";
-  if (look.mean_grey > kBright) return ": overexposed?";
-  if (look.contrast < kDull) return ": fog, or something before the lens?";
-  return ": blurred, or fewer than the image before showed as well?";
+const char* guessAt(const ImageStatistics& image) {
+  if (image.mean_grey < kDark) return ": dark or covered?";
+  if (image.mean_grey > kBright) return ": overexposed?";
+  if (image.contrast < kLowContrast) return ": fog, or a dirty lens?";
+  return ": blurred, or little overlap with the previous image?";
 }
 
-std::string brightness(const ImageStatistics& look) {
+std::string brightness(const ImageStatistics& image) {
   char text[80];
-  std::snprintf(text, sizeof text, "mean grey level %.0f of 255, contrast %.0f", look.mean_grey, look.contrast);
-  return text + std::string(guessAt(look));
+  std::snprintf(text, sizeof text, "mean grey level %.0f of 255, contrast %.0f", image.mean_grey, image.contrast);
+  return text + std::string(guessAt(image));
 }
 
 std::string features(const Estimate& estimate) {
-  if (estimate.evidence.features != FeatureKind::kSift) return "Hardly anything in the image";
+  if (estimate.evidence.features != FeatureKind::kSift) return "Hardly any structure in the image";
   const std::string kept = std::to_string(estimate.image.features_kept);
   if (estimate.image.features_kept == estimate.image.features_extracted) return kept + " features in the image";
-  return kept + " of " + std::to_string(estimate.image.features_extracted) + " features in the image are of use";
+  return kept + " of " + std::to_string(estimate.image.features_extracted) +
+         " features in the image left after pruning";
 }
 
-bool looksBad(const ImageStatistics& look) {
-  return look.mean_grey < kDark || look.mean_grey > kBright || look.contrast < kDull;
+bool looksBad(const ImageStatistics& image) {
+  return image.mean_grey < kDark || image.mean_grey > kBright || image.contrast < kLowContrast;
 }
 
-std::string stretched(const ImageStatistics& look) {
+std::string stretched(const ImageStatistics& image) {
   char text[120];
-  std::snprintf(text, sizeof text, "Images are of another shape than the map's, stretched by %.2f: another camera?",
-                look.stretch > 1.0 ? look.stretch : 1.0 / look.stretch);
+  std::snprintf(text, sizeof text,
+                "Aspect ratio of the images differs from the map's by a factor of %.2f: another camera?",
+                image.stretch > 1.0 ? image.stretch : 1.0 / image.stretch);
   return text;
 }
 
@@ -70,9 +72,10 @@ std::string imageTrouble(const Estimate& estimate) {
 
 LocalizerDiagnostics::LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                                            const std::string& name, const NodeConfig& config,
-                                           DescribeCamera describe_camera)
+                                           DescribeCamera describe_camera, CountImages count_images)
     : image_timeout_s_(config.image_timeout_s),
       describe_camera_(std::move(describe_camera)),
+      count_images_(std::move(count_images)),
       updater_(node, private_node, name) {
   updater_.setHardwareID("none");
   updater_.add("localization", this, &LocalizerDiagnostics::reportState);
@@ -110,17 +113,15 @@ void LocalizerDiagnostics::transformMissing(const std::string& reason) {
   missing_transform_ = reason;
 }
 
-void LocalizerDiagnostics::imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts) {
+void LocalizerDiagnostics::imageProcessed(const Estimate& estimate, double latency_ms) {
   const std::lock_guard<std::mutex> lock(mutex_);
   estimate_ = estimate;
   latency_ms_ = latency_ms;
-  counts_ = counts;
   last_refusal_.clear();
 }
 
-void LocalizerDiagnostics::imageRefused(const ImageCounts& counts, const std::string& reason) {
+void LocalizerDiagnostics::imageRefused(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  counts_ = counts;
   last_refusal_ = reason;
 }
 
@@ -141,11 +142,11 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
   if (!estimate_) return;
   status.add("Best similarity", estimate_->tracked.best.similarity);
   status.add("Matched features", estimate_->tracked.best.matches);
-  status.addf("They look so many times larger", "%.2f", estimate_->tracked.best.scale);
+  status.addf("Median scale ratio", "%.2f", estimate_->tracked.best.scale);
   status.add("Features kept", estimate_->image.features_kept);
-  status.addf("Looks like here, of the best anywhere", "%.3f", estimate_->evidence.place_ratio);
+  status.addf("Place ratio", "%.3f", estimate_->evidence.place_ratio);
   status.addf("Motion residual (m)", "%.2f", estimate_->motion_residual_m);
-  status.add("Images compared", estimate_->comparisons);
+  status.add("Training images compared", estimate_->comparisons);
   status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->tracked.spread_m.x(), estimate_->tracked.spread_m.y());
   status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->image.extract_ms, estimate_->image.match_ms,
               estimate_->update_ms);
@@ -156,7 +157,7 @@ void LocalizerDiagnostics::reportImages(Wrapper& status) {
   if (age_s() > image_timeout_s_) {
     status.summaryf(DiagnosticStatus::ERROR, "No image for %.1f s on %s", age_s(), describe_camera_().c_str());
   } else if (!last_arrival_) {
-    status.summary(DiagnosticStatus::WARN, "No image has arrived yet on " + describe_camera_());
+    status.summary(DiagnosticStatus::WARN, "No image yet on " + describe_camera_());
   } else if (!last_refusal_.empty()) {
     status.summary(DiagnosticStatus::WARN, "Refused: " + last_refusal_);
   } else if (const std::string trouble = estimate_ ? imageTrouble(*estimate_) : ""; !trouble.empty()) {
@@ -165,12 +166,15 @@ void LocalizerDiagnostics::reportImages(Wrapper& status) {
     status.summary(DiagnosticStatus::OK, "Images arrive");
   }
   status.addf("Rate (Hz)", "%.2f", arrivals_.rate_hz());
-  if (last_arrival_) status.addf("Age of the newest (s)", "%.2f", age_s());
+  if (last_arrival_) status.addf("Age of the newest image (s)", "%.2f", age_s());
   if (latency_ms_ >= 0.0) status.addf("Latency (ms)", "%.1f", latency_ms_);
-  status.add("Processed", counts_.processed);
-  status.add("Dropped", counts_.dropped);
-  status.add("Late", counts_.late);
-  status.add("Refused", counts_.refused);
+  const ImageCounts counts = count_images_();
+  status.add("Received", counts.received);
+  status.add("Processed", counts.processed);
+  status.add("Dropped", counts.dropped);
+  status.add("Late", counts.late);
+  status.add("Refused", counts.refused);
+  status.add("Without a map", counts.without_map);
   if (!estimate_) return;
   status.addf("Mean grey level, contrast (of 255)", "%.0f, %.0f", estimate_->image.statistics.mean_grey,
               estimate_->image.statistics.contrast);
@@ -181,7 +185,7 @@ void LocalizerDiagnostics::reportTransform(Wrapper& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool missing = !missing_transform_.empty();
   status.summary(missing ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
-                 missing ? "Nothing broadcast: " + missing_transform_ : "Broadcast with every image");
+                 missing ? "No transform broadcast: " + missing_transform_ : "Transform broadcast with every image");
 }
 
 void LocalizerDiagnostics::reportMap(Wrapper& status) {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <chrono>
-#include <cstdint>
+#include <cstddef>
 #include <deque>
 #include <functional>
 #include <mutex>
@@ -11,17 +11,17 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/node_handle.h>
 
+#include "node/image_worker.h"
 #include "node/node_config.h"
 #include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
 
-/// What is wrong with the image that led to `estimate`, in a line that people understand; empty when nothing seems to
-/// be. An image that is recognised is all right, whatever it is like.
+/// What is wrong with the image that led to `estimate`, in one line for people; empty when nothing seems to be. An
+/// image that is recognised is all right, whatever it is like.
 std::string imageTrouble(const Estimate& estimate);
 
-/// Rate of events over the last seconds. One that is slower than the reports shows its rate too, not one and nought in
-/// turn.
+/// Rate of events over the last seconds, so that events rarer than the reports show their rate, not 1 and 0 in turn.
 class RateMeter {
  public:
   using Clock = std::chrono::steady_clock;
@@ -50,28 +50,21 @@ class RateMeter {
   std::deque<Clock::time_point> times_;
 };
 
-/// How many images came to what end, since start.
-struct ImageCounts {
-  std::uint64_t processed = 0;
-  std::uint64_t dropped = 0;  ///< replaced by a newer one before they were processed
-  std::uint64_t late = 0;     ///< older than one that was processed
-  std::uint64_t refused = 0;  ///< unusable
-};
-
-/// What the node tells on /diagnostics: state, images, latency, map. Thread-safe.
+/// What the node reports on /diagnostics: state, images, latency, map. Thread-safe.
 class LocalizerDiagnostics {
  public:
-  /// Tells where images should come from.
+  /// Where images should come from, for people.
   using DescribeCamera = std::function<std::string()>;
+  using CountImages = std::function<ImageCounts()>;
 
   /// `name` of the node. It is an error when no image comes for longer than the timeout.
   LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, const std::string& name,
-                       const NodeConfig& config, DescribeCamera describe_camera);
+                       const NodeConfig& config, DescribeCamera describe_camera, CountImages count_images);
 
   void setImageTimeout(double image_timeout_s);
   void imageArrived();
-  void imageProcessed(const Estimate& estimate, double latency_ms, const ImageCounts& counts);
-  void imageRefused(const ImageCounts& counts, const std::string& reason);
+  void imageProcessed(const Estimate& estimate, double latency_ms);
+  void imageRefused(const std::string& reason);
   /// How long no image has come, when that is longer than the timeout.
   std::optional<double> silence_s();
   /// The state has changed without an image.
@@ -95,12 +88,12 @@ class LocalizerDiagnostics {
   double image_timeout_s_;
   std::optional<Estimate> estimate_;
   double latency_ms_ = 0.0;
-  ImageCounts counts_;
   std::string last_refusal_;
   std::string map_path_;
   std::size_t map_images_ = 0;
   std::string missing_transform_;
   DescribeCamera describe_camera_;
+  CountImages count_images_;
   RateMeter arrivals_;
   const Clock::time_point start_ = Clock::now();
   std::optional<Clock::time_point> last_arrival_;

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <atomic>
-#include <cstdint>
+#include <cstddef>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
@@ -25,16 +23,15 @@
 #include "node/node_config.h"
 #include "node/reconfigure_server.h"
 #include "node/shared_localizer.h"
-#include "node/throttle.h"
-#include "node/transform_publisher.h"
+#include "node/throttled_log.h"
 
 namespace visual_localization {
 
-/// Images in, poses out. The callbacks of roscpp only put images into a queue of one; one thread of its own
-/// works on the newest. A parameter that is not allowed stops the start.
+/// Images in, poses out: parameters, callbacks and services around an ImageWorker. An invalid parameter stops the
+/// start.
 class LocalizerNodelet : public nodelet::Nodelet {
  public:
-  LocalizerNodelet() = default;
+  LocalizerNodelet();
   ~LocalizerNodelet() override;
 
  private:
@@ -43,7 +40,6 @@ class LocalizerNodelet : public nodelet::Nodelet {
   void stop();
   void offerServices();
 
-  void onImage(ReceivedImage image);
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose);
   bool onRelocalize(Relocalize::Request& request, Relocalize::Response& response);
   bool onGlobalLocalization(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
@@ -51,24 +47,16 @@ class LocalizerNodelet : public nodelet::Nodelet {
   void configure(const NodeParameters& parameters, const ParameterValues& changed);
   void onTimer(const ros::WallTimerEvent& event);
 
+  void watchCamera();
   /// Throws MapStoreError and leaves everything as it is when there is no map at `path`.
   std::size_t useMap(const std::string& path);
-  void work();
-  void process(const ReceivedImage& image);
-  /// False for an image that comes too late to be of use.
-  bool isInOrder(const ros::Time& stamp);
-  void watchCamera();
-  void reportTrouble(const Estimate& estimate);
-  void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, bool stamp_is_usable);
-  ros::Time usableStamp(const ros::Time& stamp);
-  void refuse(const std::string& reason);
-  ImageCounts counts() const;
 
   NodeParameters parameters_;  ///< at the start; what can change lives where it is used
+  ThrottledLog log_;
   std::unique_ptr<SharedLocalizer> localizer_;
-  std::unique_ptr<LocalizerPublisher> publisher_;
-  std::unique_ptr<TransformPublisher> transform_publisher_;
   std::unique_ptr<LocalizerDiagnostics> diagnostics_;
+  std::unique_ptr<LocalizerPublisher> publisher_;
+  std::unique_ptr<ImageWorker> worker_;
   std::unique_ptr<ImageSource> images_;
   ros::Subscriber initial_pose_;
   ros::CallbackQueue service_queue_;
@@ -76,22 +64,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   std::unique_ptr<ReconfigureServer> reconfigure_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
   ros::WallTimer timer_;
-
-  LatestQueue<ReceivedImage> queue_;
-  std::atomic<std::uint64_t> processed_{0};
-  std::atomic<std::uint64_t> late_{0};
-  std::atomic<std::uint64_t> refused_{0};
-  StampMonitor stamps_;         ///< of the worker
-  bool camera_silent_ = false;  ///< of the timer
-  Throttle refusal_throttle_;
-  Throttle initial_pose_throttle_;
-  Throttle stamp_throttle_;
-  Throttle transform_throttle_;
-  Throttle finite_throttle_;
-  Throttle order_throttle_;
-  Throttle jump_throttle_;
-  Throttle trouble_throttle_;
-  std::thread worker_;
+  bool camera_silent_ = false;  ///< as the timer last saw it
 };
 
 }  // namespace visual_localization

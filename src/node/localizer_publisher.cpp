@@ -1,6 +1,7 @@
 #include "node/localizer_publisher.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <iterator>
 
 #include <cv_bridge/cv_bridge.h>
@@ -21,19 +22,27 @@ std_msgs::Header headerOf(const std::string& frame_id, const ros::Time& stamp) {
   return header;
 }
 
+/// -1 for an image without a stamp. In 64 bits: differences of ros::Time throw when they are longer than 68 years.
+double latencyOf(const LocalizedImage& image) {
+  if (!image.has_stamp) return -1.0;
+  const auto now_ns = static_cast<std::int64_t>(ros::Time::now().toNSec());
+  return static_cast<double>(now_ns - static_cast<std::int64_t>(image.header.stamp.toNSec())) * 1e-6;
+}
+
 }  // namespace
 
-LocalizerPublisher::LocalizerPublisher(ros::NodeHandle node, const NodeConfig& config)
-    : config_(config), image_transport_(node) {
+LocalizerPublisher::LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHandle private_node,
+                                       const NodeConfig& config, LocalizerDiagnostics& diagnostics, ThrottledLog& log)
+    : config_(config), diagnostics_(diagnostics), log_(log), transform_(config, node), image_transport_(private_node) {
   constexpr bool kLatched = true;
-  pose_ = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue);
-  fix_ = node.advertise<sensor_msgs::NavSatFix>("fix", kQueue);
-  particles_ = node.advertise<geometry_msgs::PoseArray>("particles", kQueue);
-  particle_cloud_ = node.advertise<sensor_msgs::PointCloud2>("particle_cloud", kQueue);
-  swarm_ = node.advertise<Swarm>("swarm", kQueue);
-  status_ = node.advertise<LocalizationStatus>("status", kQueue);
-  map_path_ = node.advertise<nav_msgs::Path>("map_path", 1, kLatched);
-  map_markers_ = node.advertise<visualization_msgs::MarkerArray>("map_markers", 1, kLatched);
+  pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue);
+  fix_ = private_node.advertise<sensor_msgs::NavSatFix>("fix", kQueue);
+  particles_ = private_node.advertise<geometry_msgs::PoseArray>("particles", kQueue);
+  particle_cloud_ = private_node.advertise<sensor_msgs::PointCloud2>("particle_cloud", kQueue);
+  swarm_ = private_node.advertise<Swarm>("swarm", kQueue);
+  status_ = private_node.advertise<LocalizationStatus>("status", kQueue);
+  map_path_ = private_node.advertise<nav_msgs::Path>("map_path", 1, kLatched);
+  map_markers_ = private_node.advertise<visualization_msgs::MarkerArray>("map_markers", 1, kLatched);
   matches_ = image_transport_.advertise("matches", 1);
   dashboard_image_ = image_transport_.advertise("dashboard", 1);
 }
@@ -49,15 +58,28 @@ void LocalizerPublisher::publishState(LocalizationState state, const ImageCounts
   publishStatus(toStatus(nothing, headerOf(config_.global_frame_id, ros::Time::now())), -1.0, counts);
 }
 
-void LocalizerPublisher::publish(const SharedLocalizer::Result& result, const ros::Time& stamp, double latency_ms,
-                                 const ImageCounts& counts) {
-  const std_msgs::Header header = headerOf(config_.global_frame_id, stamp);
-  if (!result.estimate.frozen) {
-    pose_.publish(toPose(result.estimate, header));
-    fix_.publish(toFix(result.estimate, headerOf(config_.base_frame_id, stamp)));
-  }
-  publishParticles(result.particles, header);
-  publishStatus(toStatus(result.estimate, header), latency_ms, counts);
+void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts& counts) {
+  const double latency_ms = latencyOf(image);
+  const Estimate& estimate = image.result.estimate;
+  const std_msgs::Header header = headerOf(config_.global_frame_id, image.header.stamp);
+  if (!estimate.frozen) publishPose(estimate, header);
+  publishParticles(image.result.particles, header);
+  publishStatus(toStatus(estimate, header), latency_ms, counts);
+  diagnostics_.imageProcessed(estimate, latency_ms);
+  publishTransform(estimate, image.header.stamp);
+  publishMatches(image);
+}
+
+void LocalizerPublisher::publishPose(const Estimate& estimate, const std_msgs::Header& header) {
+  pose_.publish(toPose(estimate, header));
+  fix_.publish(toFix(estimate, headerOf(config_.base_frame_id, header.stamp)));
+}
+
+void LocalizerPublisher::publishTransform(const Estimate& estimate, const ros::Time& stamp) {
+  if (estimate.frozen) return diagnostics_.transformMissing("the camera is frozen");  // the pose is an old one
+  const std::string missing = transform_.publish(estimate.pose, stamp);
+  diagnostics_.transformMissing(missing);
+  if (!missing.empty()) log_.warn("no transform", "No transform broadcast: " + missing);
 }
 
 void LocalizerPublisher::publishParticles(const std::vector<Particle>& all, const std_msgs::Header& header) {
@@ -80,18 +102,18 @@ void LocalizerPublisher::publishStatus(LocalizationStatus status, double latency
 }
 
 void LocalizerPublisher::publishDashboard(const LocalizationStatus& status) {
-  dashboard_.add(status);  // also while nobody looks, so that who comes later sees what was before
+  dashboard_.add(status);  // also without a subscriber: a later one sees the images before
   if (dashboard_image_.getNumSubscribers() == 0) return;
   const cv_bridge::CvImage image(status.header, sensor_msgs::image_encodings::BGR8, dashboard_.draw());
   dashboard_image_.publish(image.toImageMsg());
 }
 
-void LocalizerPublisher::publishMatches(const SharedLocalizer::Result& result, const cv::Mat& grey,
-                                        const std_msgs::Header& header) {
+void LocalizerPublisher::publishMatches(const LocalizedImage& image) {
   if (matches_.getNumSubscribers() == 0) return;
+  const SharedLocalizer::Result& result = image.result;
   const cv::Mat canvas =
-      drawMatches(grey, result.sift, *result.map, result.estimate.tracked.best_image, result.match.max_angle_ratio);
-  matches_.publish(cv_bridge::CvImage(header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
+      drawMatches(image.grey, result.sift, *result.map, result.estimate.tracked.best_image, result.match);
+  matches_.publish(cv_bridge::CvImage(image.header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
 }
 
 }  // namespace visual_localization

@@ -1,41 +1,51 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include <image_transport/image_transport.h>
-#include <opencv2/core.hpp>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <visual_localization/LocalizationStatus.h>
 
 #include "node/dashboard.h"
+#include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
 #include "node/node_config.h"
-#include "node/shared_localizer.h"
+#include "node/throttled_log.h"
+#include "node/transform_publisher.h"
 
 namespace visual_localization {
 
-/// All topics that the node publishes under its own name.
-class LocalizerPublisher {
+/// Everything that the node says about an image: topics under its own name, transform, diagnostics.
+class LocalizerPublisher : public ImageOutput {
  public:
-  LocalizerPublisher(ros::NodeHandle private_node, const NodeConfig& config);
+  /// `diagnostics` and `log` must outlive it.
+  LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHandle private_node, const NodeConfig& config,
+                     LocalizerDiagnostics& diagnostics, ThrottledLog& log);
 
   void publishMap(const TrainingMap& map);
-  /// What is known without an image: that there is no map, or that none comes. Stamped with the present.
+  /// What is known without an image: that there is no map, or that no image comes. Stamped with the present.
   void publishState(LocalizationState state, const ImageCounts& counts);
-  /// Everything that is known after an image but the drawing: no pose after one of a frozen camera. `result` must be
-  /// finite.
-  void publish(const SharedLocalizer::Result& result, const ros::Time& stamp, double latency_ms,
-               const ImageCounts& counts);
-  /// Draws and publishes the matches with the best training image if somebody looks.
-  void publishMatches(const SharedLocalizer::Result& result, const cv::Mat& grey, const std_msgs::Header& header);
+  void setTransformTolerance(double transform_tolerance_s) { transform_.setTolerance(transform_tolerance_s); }
+
+  /// No pose and no transform after an image of a frozen camera.
+  void publish(const LocalizedImage& image, const ImageCounts& counts) override;
+  void refused(const std::string& reason) override { diagnostics_.imageRefused(reason); }
+  void timeWentBack() override { transform_.forget(); }
 
  private:
+  void publishPose(const Estimate& estimate, const std_msgs::Header& header);
+  void publishTransform(const Estimate& estimate, const ros::Time& stamp);
   void publishParticles(const std::vector<Particle>& particles, const std_msgs::Header& header);
   void publishStatus(LocalizationStatus status, double latency_ms, const ImageCounts& counts);
   void publishDashboard(const LocalizationStatus& status);
+  void publishMatches(const LocalizedImage& image);
 
   const NodeConfig config_;
+  LocalizerDiagnostics& diagnostics_;
+  ThrottledLog& log_;
+  TransformPublisher transform_;
   image_transport::ImageTransport image_transport_;
   ros::Publisher pose_;
   ros::Publisher fix_;

@@ -8,15 +8,13 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "visual_localization/features/sift_matcher.h"
-
 namespace visual_localization {
 namespace {
 
-constexpr int kSmallestWidth_px = 480;  ///< of one half: lines on smaller ones cannot be told apart
+constexpr int kSmallestWidth_px = 480;  ///< of one half: lines in smaller ones lie too close together
 constexpr int kShiftBits = 4;           ///< OpenCV draws at sixteenths of a pixel
 
-/// Pure colours that differ on grey, BGR.
+/// Pure colours that stand out on grey, BGR.
 const std::array<cv::Scalar, 6> kLineColours{cv::Scalar(60, 220, 255), cv::Scalar(90, 200, 60),
                                              cv::Scalar(255, 170, 60), cv::Scalar(190, 110, 255),
                                              cv::Scalar(60, 140, 255), cv::Scalar(230, 230, 110)};
@@ -42,10 +40,15 @@ cv::Point shifted(const SiftKeypoint& keypoint, double scale, double offset_x_px
   return {cvRound(x_px * (1 << kShiftBits)), cvRound(y_px * (1 << kShiftBits))};
 }
 
+std::vector<FeatureMatch> matchesBetween(const SiftFeatures& a, const SiftFeatures& b, const MatchConfig& match) {
+  return match.mode == "symmetric" ? matchSymmetric(a, b, match.max_angle_ratio)
+                                   : matchOneWay(a, b, match.max_angle_ratio);
+}
+
 }  // namespace
 
 cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
-                    double max_angle_ratio) {
+                    const MatchConfig& match) {
   const cv::Size map_size = map.header().image_size;
   const double scale =
       map_size.width < kSmallestWidth_px ? static_cast<double>(kSmallestWidth_px) / map_size.width : 1.0;
@@ -55,10 +58,10 @@ cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const Trainin
   cv::Mat canvas;
   cv::hconcat(inColour(grey, half), previewOf(map.preview(training), half), canvas);
   std::size_t line = 0;
-  for (const FeatureMatch& match : matchSymmetric(sift, *training_sift, max_angle_ratio)) {
+  for (const FeatureMatch& pair : matchesBetween(sift, *training_sift, match)) {
     const cv::Scalar& colour = kLineColours[line++ % kLineColours.size()];
-    const cv::Point from = shifted(sift.keypoints()[match.a], scale, 0.0);
-    const cv::Point to = shifted(training_sift->keypoints()[match.b], scale, half.width);
+    const cv::Point from = shifted(sift.keypoints()[pair.a], scale, 0.0);
+    const cv::Point to = shifted(training_sift->keypoints()[pair.b], scale, half.width);
     cv::line(canvas, from, to, colour, 1, cv::LINE_AA, kShiftBits);
     cv::circle(canvas, from, 4 << kShiftBits, colour, 1, cv::LINE_AA, kShiftBits);
     cv::circle(canvas, to, 4 << kShiftBits, colour, 1, cv::LINE_AA, kShiftBits);

@@ -3,15 +3,16 @@
 #include <opencv2/core.hpp>
 
 #include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 
-/// The current image (left) beside training image `training` (right), matched features joined by lines.
-/// `grey`: 8-bit, one channel, any size; `sift`: its features in pixels of the map's image size. The map keeps
-/// only a small preview of a training image, which is enlarged; without one the right half stays dark.
-/// Returns an 8-bit BGR image.
+/// The current image (left) beside training image `training` (right), with a line for each match, by the rule that the
+/// localizer compares them by. `grey`: 8-bit, one channel, any size; `sift`: its features in pixels of the map's image
+/// size. The map keeps only a small preview of a training image, which is enlarged; without one the right half stays
+/// dark. Returns an 8-bit BGR image.
 cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
-                    double max_angle_ratio);
+                    const MatchConfig& match);
 
 }  // namespace visual_localization

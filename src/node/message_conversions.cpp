@@ -13,7 +13,7 @@ namespace visual_localization {
 namespace {
 
 constexpr std::size_t kRow = 6;              ///< of a pose's covariance: x, y, z and three rotations
-constexpr double kUnknownAltitude_m2 = 1e6;  ///< the map is flat and says nothing about height
+constexpr double kUnknownAltitude_m2 = 1e6;  ///< the map is flat and knows no height
 
 geometry_msgs::Pose poseOf(const Eigen::Vector2d& position_m, double yaw_rad) {
   geometry_msgs::Pose pose;
@@ -37,10 +37,11 @@ std::uint32_t count(std::size_t number) {
   return static_cast<std::uint32_t>(number < kMax ? number : kMax);
 }
 
-constexpr double kPlaceDiameter_m = 0.6;
+const char* const kPositions = "positions";  ///< namespace of the markers of training images
+constexpr double kImageDiameter_m = 0.6;
 constexpr double kHeadingLength_m = 1.5;
 constexpr double kHeadingWidth_m = 0.12;
-/// Of a larger map only every so many-th image is shown: a message of a million poses would stop rviz.
+/// Of a larger map only every k-th image is shown: a message of a million poses would stop rviz.
 constexpr std::size_t kMostShown = 20000;
 
 std::size_t strideThrough(const TrainingMap& map) { return (map.size() + kMostShown - 1) / kMostShown; }
@@ -49,7 +50,7 @@ struct Colour {
   float r, g, b;
 };
 
-/// One a session; readable on white and for colour-blind eyes (Okabe and Ito).
+/// One per session; readable on white and for colour-blind people (Okabe and Ito).
 constexpr std::array<Colour, 6> kSessionColours{{{0.00F, 0.45F, 0.70F},
                                                  {0.84F, 0.37F, 0.00F},
                                                  {0.00F, 0.62F, 0.45F},
@@ -81,9 +82,9 @@ visualization_msgs::Marker emptyMarker(const std::string& frame_id, const std::s
   return marker;
 }
 
-visualization_msgs::Marker emptyPlaces(int session, const std::string& frame_id) {
-  auto marker = emptyMarker(frame_id, "places", session, visualization_msgs::Marker::SPHERE_LIST);
-  marker.scale.x = marker.scale.y = marker.scale.z = kPlaceDiameter_m;
+visualization_msgs::Marker emptyPositions(int session, const std::string& frame_id) {
+  auto marker = emptyMarker(frame_id, kPositions, session, visualization_msgs::Marker::SPHERE_LIST);
+  marker.scale.x = marker.scale.y = marker.scale.z = kImageDiameter_m;
   return marker;
 }
 
@@ -230,21 +231,21 @@ nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id) {
 
 visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::string& frame_id) {
   visualization_msgs::MarkerArray markers;
-  markers.markers.push_back(emptyMarker(frame_id, "places", 0, visualization_msgs::Marker::SPHERE_LIST));
+  markers.markers.push_back(emptyMarker(frame_id, kPositions, 0, visualization_msgs::Marker::SPHERE_LIST));
   markers.markers.back().action = visualization_msgs::Marker::DELETEALL;
   const auto sessions = static_cast<int>(map.header().sessions.size());
   for (int session = 0; session < sessions; ++session) {
-    markers.markers.push_back(emptyPlaces(session, frame_id));
+    markers.markers.push_back(emptyPositions(session, frame_id));
     markers.markers.push_back(emptyHeadings(session, frame_id));
   }
   for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
-    const TrainingPlace place = map.place(i);
-    const auto session = static_cast<std::size_t>(place.session);
-    const Eigen::Vector2d direction(std::cos(place.yaw_rad), std::sin(place.yaw_rad));
-    markers.markers[2 * session + 1].points.push_back(pointAt(place.position_m));
+    const TrainingPlace image = map.place(i);
+    const auto session = static_cast<std::size_t>(image.session);
+    const Eigen::Vector2d direction(std::cos(image.yaw_rad), std::sin(image.yaw_rad));
+    markers.markers[2 * session + 1].points.push_back(pointAt(image.position_m));
     auto& heading = markers.markers[2 * session + 2].points;
-    heading.push_back(pointAt(place.position_m));
-    heading.push_back(pointAt(place.position_m + kHeadingLength_m * direction));
+    heading.push_back(pointAt(image.position_m));
+    heading.push_back(pointAt(image.position_m + kHeadingLength_m * direction));
   }
   return markers;
 }

@@ -30,11 +30,11 @@ bool isFinite(const Particle& particle);
 /// Position, heading and their covariance; height, roll and pitch are zero. `header`: map frame.
 geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header);
 
-/// The same position as latitude and longitude. No fix while the position is not known yet or lost. `header`:
-/// frame of the robot, as for a receiver.
+/// The same position as latitude and longitude. No fix while the position is unknown or lost. `header`: frame of the
+/// robot, as for a GPS receiver.
 sensor_msgs::NavSatFix toFix(const Estimate& estimate, const std_msgs::Header& header);
 
-/// Everything but what only the node knows: latency and counts of images.
+/// Everything but latency and counts of images, which only the node knows.
 LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& header);
 
 /// Particles in the map frame. Heading is the direction of the velocity, zero for a particle at rest.
@@ -43,12 +43,12 @@ Swarm toSwarm(const std::vector<Particle>& particles, const std_msgs::Header& he
 /// Fields x, y, z and intensity (the weight), 32-bit floats, so that rviz can colour by weight.
 sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, const std_msgs::Header& header);
 
-/// The recorded path, image by image; the sessions follow each other. Of a map with more than 20000 images every
-/// second one, or every third, and so on: here and in the markers.
+/// The recorded path, image by image, session by session. Of a map with more than 20000 images only every second one,
+/// or every third, and so on: here and in the markers.
 nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id);
 
-/// Per session the places of the training images and the direction each one looks at. Begins with a marker
-/// that deletes those of an earlier map.
+/// Positions and headings of the training images, per session. Begins with a marker that deletes those of an earlier
+/// map.
 visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::string& frame_id);
 
 }  // namespace visual_localization

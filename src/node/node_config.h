@@ -10,21 +10,21 @@
 
 namespace visual_localization {
 
-/// What only the ROS node needs to know.
+/// Parameters of the ROS node alone.
 struct NodeConfig {
   std::string map;                         ///< path of the map file; empty: wait for ~load_map
-  int map_cache_mb = kDefaultMapCache_mb;  ///< features of a larger map are read when needed and kept up to this
+  int map_cache_mb = kDefaultMapCache_mb;  ///< memory for features; those of a larger map are read when needed
   std::string map_directory;               ///< only maps below this folder may be opened; empty: all
   std::string image_transport = "raw";     ///< raw, compressed (decoded here), or another installed transport
   std::string tf_mode = "none";            ///< none, map_to_odom, map_to_base
-  double transform_tolerance_s = 0.1;      ///< how far transforms are dated into the future
-  double image_timeout_s = 5.0;            ///< without an image for so long it is an error
+  double transform_tolerance_s = 0.1;      ///< added to the image stamp in the stamp of the transform
+  double image_timeout_s = 5.0;            ///< longer without an image is an error
   std::string global_frame_id = "map";
   std::string odom_frame_id = "odom";
   std::string base_frame_id = "base_link";
 
   void declare(ParameterVisitor& visitor);
-  /// How ~map and the maps after it are opened; `warn` hears of features that cannot be read.
+  /// How maps are opened; `warn` is told of features that cannot be read.
   MapLoading mapLoading(std::function<void(const std::string&)> warn) const;
 };
 
@@ -36,9 +36,9 @@ struct NodeParameters {
   void declare(ParameterVisitor& visitor);
 };
 
-/// doc/parameters.md: every parameter of the localizer and of the map builder, made from their declarations.
+/// doc/parameters.md: every parameter of the localizer and of the map builder, generated from their declarations.
 std::string parametersPage();
-/// config/localizer.yaml and config/map_builder.yaml, made from the same declarations.
+/// config/localizer.yaml and config/map_builder.yaml, generated from the same declarations.
 std::string localizerYaml();
 std::string mapBuilderYaml();
 

@@ -14,16 +14,15 @@ namespace visual_localization {
 /// parameter for anything that is neither a struct nor a scalar.
 ParameterValues flatten(const XmlRpc::XmlRpcValue& tree);
 
-/// Writes values into a node's private namespace. False, and nothing is written, when there is no master: roscpp would
-/// wait for it.
+/// Writes values into a node's private namespace. Without a master it writes nothing and returns false: roscpp would
+/// wait.
 bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values);
 
 /// True for parameters that stand in a node's private namespace but belong to others: diagnostic_updater,
 /// bond, the nodelet manager, plugins of image_transport.
 bool belongsToOthers(const std::string& name);
 
-/// Reads and checks the whole private namespace. Throws ParameterError at the first parameter that is
-/// unknown or not allowed.
+/// Reads and checks the whole private namespace. Throws ParameterError at the first unknown or invalid parameter.
 NodeParameters loadParameters(const ros::NodeHandle& private_node);
 
 }  // namespace visual_localization

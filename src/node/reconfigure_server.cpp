@@ -184,7 +184,7 @@ ParameterValues toValues(const Config& config, const parameters::Declaration& de
   for (const auto& [name, value] : values) {
     if (at_start_only.names.count(name) == 0) continue;
     throw ParameterError("parameter '" + name + "' = " + parameters::toString(value) +
-                         " is not allowed: it is read when the node starts and cannot change while it runs");
+                         " is not allowed: it is read at the start and cannot change while the node runs");
   }
   return values;
 }
@@ -209,7 +209,7 @@ void ReconfigureServer::setMap(const std::string& path) {
   storeParameters(private_node_, {{"map", path}});
 }
 
-/// Whatever is wrong, the answer and the update tell everybody which values hold.
+/// Also after a refusal the answer and the update contain the values in force.
 bool ReconfigureServer::onSet(dynamic_reconfigure::Reconfigure::Request& request,
                               dynamic_reconfigure::Reconfigure::Response& response) {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -219,7 +219,8 @@ bool ReconfigureServer::onSet(dynamic_reconfigure::Reconfigure::Request& request
     const ParameterValues values = difference(parameters_, changed);
     if (!values.empty()) apply_(changed, values);
     parameters_ = changed;
-    if (!storeParameters(private_node_, values)) warn_("the new values hold, but there is no master to store them");
+    if (!storeParameters(private_node_, values))
+      warn_("the new values are in force, but there is no master to store them");
   } catch (const std::exception& error) {
     warn_(std::string("not changed: ") + error.what());
   }

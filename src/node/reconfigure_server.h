@@ -18,7 +18,7 @@ namespace visual_localization {
 
 /// What tools like rqt_reconfigure need to know of every parameter that can change while the node runs: type, range,
 /// meaning and present value as default. Names are the full ones, "dpso/particles", as on the parameter server; the
-/// group "dpso/" holds all that begin so.
+/// group "dpso/" holds all that begin with it.
 dynamic_reconfigure::ConfigDescription toDescription(const parameters::Declaration& declare);
 
 /// The present values of the same parameters.
@@ -27,15 +27,15 @@ dynamic_reconfigure::Config toConfig(const parameters::Declaration& declare);
 /// The values that a message names. Throws ParameterError, with name and value, for one that is read at the start only.
 ParameterValues toValues(const dynamic_reconfigure::Config& config, const parameters::Declaration& declare);
 
-/// The parameters while the node runs, by the protocol of dynamic_reconfigure. Its own server template wants a class
-/// that a .cfg file generates; here everything comes from the declarations that also check the start. The parameter
-/// server is kept in step, so that `rosparam dump` holds what the node does. Thread-safe.
+/// The parameters while the node runs, by the protocol of dynamic_reconfigure. Its own server template needs a class
+/// generated from a .cfg file; here everything comes from the declarations that also check the start. The values are
+/// stored on the parameter server as well, so that `rosparam dump` shows those in force. Thread-safe.
 class ReconfigureServer {
  public:
   /// Puts parameters into effect; throws when that cannot be done, and then nothing has changed. `changed`: the
   /// values that differ from before, never empty.
   using Apply = std::function<void(const NodeParameters& parameters, const ParameterValues& changed)>;
-  /// Told why a request was refused.
+  /// Is told why a request was refused.
   using Warn = std::function<void(const std::string& reason)>;
 
   /// Requests are answered in the callback queue of `private_node`.

@@ -13,26 +13,25 @@
 #include <opencv2/core.hpp>
 
 #include "visual_localization/features/sift_features.h"
-#include "visual_localization/geo/local_frame.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
 
-/// A Localizer for several threads, whose map may be absent and may be replaced.
+/// A Localizer for several threads, whose map may be missing and may be replaced.
 class SharedLocalizer {
  public:
-  /// A position with its uncertainty, as people give it.
+  /// A position with its uncertainty, as a person gives it.
   struct Guess {
     Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
     Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();
   };
 
-  /// Everything about one image, copied out so that it can be published without holding up the next one.
+  /// Everything about one image, as a copy: publishing it does not block the localizer.
   struct Result {
     Estimate estimate;
     std::vector<Particle> particles;
     SiftFeatures sift;  ///< of the image, after pruning; empty when they were not needed
-    MatchConfig match;  ///< how it was compared
+    MatchConfig match;  ///< the rule that SIFT features are matched by
     std::shared_ptr<const TrainingMap> map;
   };
 
@@ -42,7 +41,7 @@ class SharedLocalizer {
   /// `config` is invalid, and then nothing has changed.
   void configure(const LocalizerConfig& config);
 
-  /// Starts anew in `map`, or around the guess that has been waiting for a map.
+  /// From now on localises in `map`: anywhere, or around the guess that has been waiting for a map.
   void setMap(std::shared_ptr<const TrainingMap> map);
   std::shared_ptr<const TrainingMap> map() const;
   /// Never waits, unlike map(), which waits for the end of the image that is being processed.
@@ -54,10 +53,13 @@ class SharedLocalizer {
   /// See Localizer::doubt. Nothing without a map.
   std::optional<LocalizationState> doubt();
 
-  /// False without a map. Throws std::invalid_argument for a prior that is none (see prior.h).
+  /// False without a map.
   bool relocalizeAnywhere();
+  /// False without a map. Throws std::invalid_argument, with the reason in words, for a disc that around() (see
+  /// particles.h) refuses, that has no area or that does not touch the map.
   bool relocalizeAround(const Eigen::Vector2d& centre_m, double radius_m);
-  /// Without a map the guess is kept for the next one, and false is returned.
+  /// Without a map the guess is kept for the next one, and false is returned. Throws std::invalid_argument, with the
+  /// reason in words, for a guess that normallyDistributed() (see particles.h) refuses.
   bool relocalizeAt(const Guess& guess);
 
  private:
@@ -67,17 +69,13 @@ class SharedLocalizer {
   LocalizerConfig config_;
   std::shared_ptr<const TrainingMap> map_;
   std::unique_ptr<Localizer> localizer_;
-  std::optional<Guess> waiting_guess_;
+  std::optional<Prior> waiting_prior_;
   std::atomic<bool> has_map_{false};
 };
 
 /// Position and its covariance from an initial pose. The heading is not used: the training images give it.
-/// Throws std::invalid_argument with the reason in words when the frame is not `global_frame`, a number is not
-/// finite or the covariance of x and y is not symmetric and positive semi-definite.
+/// Throws std::invalid_argument, with the reason in words, when the frame is not `global_frame` or a number is not
+/// finite. Whether position and covariance make a guess is for relocalizeAt() to say.
 SharedLocalizer::Guess guessFrom(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& global_frame);
-
-/// Throws std::invalid_argument, with the reason in words, unless centre and radius are finite, on a local map and
-/// the radius is positive.
-void requireDisc(const Eigen::Vector2d& centre_m, double radius_m);
 
 }  // namespace visual_localization

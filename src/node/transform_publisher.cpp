@@ -11,9 +11,9 @@
 namespace visual_localization {
 namespace {
 
-/// How long an image waits for odometry of its stamp. Wall time: simulated time may stand still.
+/// How long an image waits for odometry of its stamp, in wall time: simulated time may stand still.
 constexpr std::chrono::milliseconds kOdometryWait{100};
-/// The same when there has never been any: every image would lose that time.
+/// The same while there has never been odometry: every image would wait in vain.
 constexpr std::chrono::milliseconds kUnknownOdometryWait{20};
 constexpr std::chrono::milliseconds kOdometryPoll{5};
 

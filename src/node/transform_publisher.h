@@ -27,9 +27,9 @@ class TransformPublisher {
   TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node);
 
   void setTolerance(double transform_tolerance_s) { tolerance_s_ = transform_tolerance_s; }
-  /// Time has gone back: what was heard of odometry is from the future.
+  /// Time has gone back: the odometry in the buffer lies in the future.
   void forget();
-  /// `stamp` of the image. Returns why nothing could be broadcast, and an empty text otherwise.
+  /// `stamp` of the image. Returns why nothing was broadcast; empty when something was, or should not be.
   std::string publish(const PoseEstimate& pose, const ros::Time& stamp);
 
  private:

@@ -69,9 +69,10 @@ void usePose(const geometry_msgs::PoseWithCovarianceStamped& pose) {
   fuzz::expect<std::invalid_argument>([&] {
     const SharedLocalizer::Guess guess = guessFrom(pose, "map");
     if (!guess.mean_m.allFinite() || !guess.covariance_m2.allFinite()) fuzz::fail("a guess that is not finite");
+    normallyDistributed(guess.mean_m, guess.covariance_m2);
   });
   const auto& position = pose.pose.pose.position;
-  fuzz::expect<std::invalid_argument>([&] { requireDisc({position.x, position.y}, position.z); });
+  fuzz::expect<std::invalid_argument>([&] { around({position.x, position.y}, position.z); });
 }
 
 }  // namespace

@@ -119,7 +119,20 @@ TEST(Prior, RefusesWhatIsNoDistribution) {
   EXPECT_THROW(around({0.0, 0.0}, -1.0), std::invalid_argument);
   EXPECT_THROW(around({0.0, 0.0}, kNan), std::invalid_argument);
   EXPECT_THROW(around({0.0, kInfinity}, 1.0), std::invalid_argument);
+  EXPECT_THROW(around({kNan, 0.0}, 1.0), std::invalid_argument);
   EXPECT_NO_THROW(normallyDistributed({0.0, 0.0}, Eigen::Matrix2d::Zero()));
+}
+
+TEST(Prior, RefusesWhatIsLargerThanAnyLocalMap) {
+  constexpr double kLargest_m = 1e6;
+  constexpr double kBeyond_m = 1.001e6;
+  EXPECT_NO_THROW(around({-kLargest_m, kLargest_m}, kLargest_m));
+  EXPECT_THROW(around({-kBeyond_m, 0.0}, 1.0), std::invalid_argument);
+  EXPECT_THROW(around({0.0, 0.0}, kBeyond_m), std::invalid_argument);
+  const Eigen::Matrix2d one = Eigen::Matrix2d::Identity();
+  EXPECT_NO_THROW(normallyDistributed({-kLargest_m, kLargest_m}, kLargest_m * kLargest_m * one));
+  EXPECT_THROW(normallyDistributed({0.0, kBeyond_m}, one), std::invalid_argument);
+  EXPECT_THROW(normallyDistributed({0.0, 0.0}, kBeyond_m * kBeyond_m * one), std::invalid_argument);
 }
 
 }  // namespace

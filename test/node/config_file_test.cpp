@@ -38,11 +38,11 @@ TEST(ConfigFile, MapBuilderListsEveryParameterWithItsDefault) {
   expectListsEveryParameter<MapBuilderConfig>(CONFIG_DIR "/map_builder.yaml");
 }
 
-TEST(ConfigFile, TheFilesAreWhatTheCodeSays) {
+TEST(ConfigFile, TheFilesAreGeneratedFromTheCode) {
   EXPECT_EQ(textOf(CONFIG_DIR "/localizer.yaml"), localizerYaml())
-      << "make it anew: localizer_node --localizer-config > config/localizer.yaml";
+      << "generate it again: localizer_node --localizer-config > config/localizer.yaml";
   EXPECT_EQ(textOf(CONFIG_DIR "/map_builder.yaml"), mapBuilderYaml())
-      << "make it anew: localizer_node --map-builder-config > config/map_builder.yaml";
+      << "generate it again: localizer_node --map-builder-config > config/map_builder.yaml";
 }
 
 TEST(NodeConfig, MapCacheIsASizeInItsRange) {
@@ -57,9 +57,9 @@ TEST(NodeConfig, MapCacheIsASizeInItsRange) {
   EXPECT_EQ(config.node.mapLoading({}).cache_bytes, 0U);
 }
 
-TEST(ConfigFile, ThePageOfParametersIsWhatTheCodeSays) {
+TEST(ConfigFile, ThePageOfParametersIsGeneratedFromTheCode) {
   EXPECT_EQ(textOf(CONFIG_DIR "/../doc/parameters.md"), parametersPage())
-      << "make it anew: localizer_node --parameters > doc/parameters.md";
+      << "generate it again: localizer_node --parameters > doc/parameters.md";
 }
 
 }  // namespace

@@ -118,7 +118,7 @@ TEST(ImageConversion, DamagedImagesNeverCrash) {
   std::mt19937 random(1);
   for (const char* extension : {".jpg", ".png"}) {
     const auto whole = compressed(extension);
-    for (int round = 0; round < 300; ++round) {
+    for (int run = 0; run < 300; ++run) {
       auto message = whole;
       message.data[random() % message.data.size()] = static_cast<std::uint8_t>(random());
       try {

@@ -5,10 +5,10 @@
 namespace visual_localization {
 namespace {
 
-Estimate estimateOf(LocalizationState state, const ImageStatistics& look, bool blind = false) {
+Estimate estimateOf(LocalizationState state, const ImageStatistics& statistics, bool blind = false) {
   Estimate estimate;
   estimate.state = state;
-  estimate.image.statistics = look;
+  estimate.image.statistics = statistics;
   estimate.evidence.blind = blind;
   estimate.image.features_extracted = estimate.image.features_kept = blind ? 4 : 300;
   return estimate;
@@ -38,9 +38,9 @@ TEST(ImageTrouble, SaysWhatAnImageOfNoUseIsLike) {
 TEST(ImageTrouble, TellsFeaturesOfUseFromAll) {
   Estimate estimate = estimateOf(kLost, kFine, true);
   estimate.image.features_extracted = 250;
-  EXPECT_EQ(imageTrouble(estimate).find("4 of 250 features in the image are of use, "), 0U);
+  EXPECT_EQ(imageTrouble(estimate).find("4 of 250 features in the image left after pruning, "), 0U);
   estimate.evidence.features = FeatureKind::kGlobal;
-  EXPECT_EQ(imageTrouble(estimate).find("Hardly anything in the image, "), 0U);
+  EXPECT_EQ(imageTrouble(estimate).find("Hardly any structure in the image, "), 0U);
 }
 
 TEST(ImageTrouble, AFrozenCameraIsOneWhateverItShows) {
@@ -54,9 +54,9 @@ TEST(ImageTrouble, AFrozenCameraIsOneWhateverItShows) {
             "The camera has sent the same image 12 times, mean grey level 0 of 255, contrast 0: dark or covered?");
 }
 
-TEST(ImageTrouble, AnotherShapeMayBeWhyNothingIsRecognised) {
+TEST(ImageTrouble, AnotherAspectRatioMayBeWhyNothingIsRecognised) {
   EXPECT_EQ(imageTrouble(estimateOf(kLost, {110.0, 50.0, 0.75})),
-            "Images are of another shape than the map's, stretched by 1.33: another camera?");
+            "Aspect ratio of the images differs from the map's by a factor of 1.33: another camera?");
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ class MapDirectory : public testing::Test {
     fs::create_symlink("../secret.map", folder_ / "maps/link.map");
     fs::create_symlink("..", folder_ / "maps/up");
     fs::create_symlink("town/b.map", folder_ / "maps/inside.map");
-    fs::create_symlink("round.map", folder_ / "maps/round.map");
+    fs::create_symlink("circular.map", folder_ / "maps/circular.map");
     fs::create_symlink("maps", folder_ / "link_to_maps");
   }
 
@@ -76,7 +76,7 @@ TEST_F(MapDirectory, RefusesWhatIsElsewhere) {
 TEST_F(MapDirectory, RefusesWhatIsNoName) {
   EXPECT_THAT(refusal(""), HasSubstr("not the name of a file"));
   EXPECT_THAT(refusal(std::string("../secret.map\0/../maps/a.map", 28)), HasSubstr("not the name of a file"));
-  EXPECT_THAT(refusal("round.map"), AllOf(StartsWith("round.map: "), HasSubstr("~map_directory")));
+  EXPECT_THAT(refusal("circular.map"), AllOf(StartsWith("circular.map: "), HasSubstr("~map_directory")));
   EXPECT_THAT(refusal(std::string(5000, 'x')), HasSubstr("~map_directory"));
   EXPECT_THAT(refusal("../two\nlines"), Not(HasSubstr("\n")));
 }

@@ -21,18 +21,18 @@ TEST(MapMessages, MarkersDeleteTheOldOnesAndShowEverySession) {
   const auto markers = toMarkers(*test::smallMap(), "map").markers;
   ASSERT_EQ(markers.size(), 5U);
   EXPECT_EQ(markers[0].action, Marker::DELETEALL);
-  std::size_t places = 0;
+  std::size_t positions = 0;
   for (const Marker& marker : markers) {
     EXPECT_EQ(marker.header.frame_id, "map");
-    if (marker.ns == "places") places += marker.points.size();
+    if (marker.ns == "positions") positions += marker.points.size();
     if (marker.ns == "headings") {
       EXPECT_EQ(marker.points.size(), 10U);
     }
   }
-  EXPECT_EQ(places, 10U);
+  EXPECT_EQ(positions, 10U);
 }
 
-TEST(MapMessages, OfACityOnlySoManyPlacesAreShown) {
+TEST(MapMessages, OfACityAtMost20000PositionsAreShown) {
   std::vector<TrainingImage> images(50001);
   for (std::size_t i = 0; i < images.size(); ++i) images[i].position_m.x() = static_cast<double>(i);
   MapHeader header = test::smallMap()->header();

@@ -1,5 +1,10 @@
 #include "node/matches_image.h"
 
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
@@ -8,15 +13,18 @@
 namespace visual_localization {
 namespace {
 
-/// Pixels of the left half that are not grey: where something is drawn.
-int colouredPixels(const cv::Mat& canvas) {
+/// Pixels of `area` that are not grey: where something is drawn.
+int colouredPixels(const cv::Mat& canvas, const cv::Rect& area) {
   cv::Mat channels[3];
-  cv::split(canvas(cv::Rect(0, 0, canvas.cols / 2, canvas.rows)), channels);
+  cv::split(canvas(area & cv::Rect({}, canvas.size())), channels);
   return cv::countNonZero(channels[0] != channels[2]);
 }
 
+/// Of the left half.
+int colouredPixels(const cv::Mat& canvas) { return colouredPixels(canvas, {0, 0, canvas.cols / 2, canvas.rows}); }
+
 TEST(MatchesImage, ShowsBothImagesSideBySide) {
-  const cv::Mat canvas = drawMatches(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)), {}, *test::smallMap(), 0, 0.6);
+  const cv::Mat canvas = drawMatches(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)), {}, *test::smallMap(), 0, {});
   EXPECT_EQ(canvas.type(), CV_8UC3);
   EXPECT_EQ(canvas.rows, 360);
   EXPECT_EQ(canvas.cols, 960);
@@ -26,8 +34,42 @@ TEST(MatchesImage, ShowsBothImagesSideBySide) {
 TEST(MatchesImage, JoinsMatchedFeatures) {
   const auto map = test::smallMap();
   const cv::Mat grey(480, 640, CV_8UC1, cv::Scalar(100));
-  EXPECT_GT(colouredPixels(drawMatches(grey, *map->sift(3), *map, 3, 0.6)), 1000);
-  EXPECT_EQ(colouredPixels(drawMatches(grey, test::randomFeatures(99, 40), *map, 3, 0.6)), 0);
+  EXPECT_GT(colouredPixels(drawMatches(grey, *map->sift(3), *map, 3, {})), 1000);
+  EXPECT_EQ(colouredPixels(drawMatches(grey, test::randomFeatures(99, 40), *map, 3, {})), 0);
+}
+
+/// The first of `features` and a twin of it half an image away, whose nearest neighbour among them is that one too.
+SiftFeatures firstAndItsTwin(const SiftFeatures& features) {
+  SiftKeypoint twin = features.keypoints().front();
+  twin.y_px += twin.y_px < 120.0F ? 120.0F : -120.0F;
+  std::vector<std::uint8_t> descriptors;
+  for (int i = 0; i < 2; ++i) {
+    descriptors.insert(descriptors.end(), features.descriptor(0),
+                       features.descriptor(0) + SiftFeatures::kDescriptorSize);
+  }
+  descriptors.back() ^= 1U;
+  return SiftFeatures({features.keypoints().front(), twin}, std::move(descriptors));
+}
+
+/// Whether something is drawn around feature `i` of the current image.
+bool isJoined(const cv::Mat& canvas, const SiftFeatures& sift, std::size_t i) {
+  constexpr double kScale = 1.5;
+  const SiftKeypoint& keypoint = sift.keypoints()[i];
+  const cv::Point centre(cvRound(keypoint.x_px * kScale), cvRound(keypoint.y_px * kScale));
+  const cv::Rect around(centre - cv::Point(8, 8), cv::Size(17, 17));
+  return colouredPixels(canvas, around) > 0;
+}
+
+TEST(MatchesImage, DrawsTheMatchesOfTheMode) {
+  const auto map = test::smallMap();
+  const cv::Mat grey(240, 320, CV_8UC1, cv::Scalar(100));
+  const SiftFeatures sift = firstAndItsTwin(*map->sift(3));
+  const cv::Mat symmetric = drawMatches(grey, sift, *map, 3, {0.6, "symmetric"});
+  EXPECT_TRUE(isJoined(symmetric, sift, 0));
+  EXPECT_FALSE(isJoined(symmetric, sift, 1)) << "the training feature is nearer to the first";
+  const cv::Mat one_way = drawMatches(grey, sift, *map, 3, {0.6, "one_way"});
+  EXPECT_TRUE(isJoined(one_way, sift, 0));
+  EXPECT_TRUE(isJoined(one_way, sift, 1));
 }
 
 }  // namespace

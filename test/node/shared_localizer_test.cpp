@@ -3,8 +3,10 @@
 #include <atomic>
 #include <limits>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "test/node/small_map.h"
@@ -58,6 +60,35 @@ TEST(SharedLocalizer, AGuessThatIsNoneIsRefusedAndNotKept) {
   EXPECT_THROW(localizer.relocalizeAt({{kNan, 0.0}, Eigen::Matrix2d::Identity()}), std::invalid_argument);
   EXPECT_THROW(localizer.relocalizeAt({{0.0, 0.0}, -Eigen::Matrix2d::Identity()}), std::invalid_argument);
   EXPECT_NO_THROW(localizer.setMap(test::smallMap()));
+}
+
+/// The reason for refusing a disc in the small map; empty when it was searched.
+std::string refusalOfDisc(const Eigen::Vector2d& centre_m, double radius_m) {
+  SharedLocalizer localizer{LocalizerConfig{}};
+  localizer.setMap(test::smallMap());
+  try {
+    EXPECT_TRUE(localizer.relocalizeAround(centre_m, radius_m));
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(SharedLocalizer, ADiscThatIsNoneIsRefusedWithTheReason) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(refusalOfDisc({0.0, 0.0}, 10.0), "");
+  for (const double radius_m : {0.0, -1.0, kNan, kInfinity, 1e7}) {
+    EXPECT_THAT(refusalOfDisc({0.0, 0.0}, radius_m), testing::HasSubstr("radius")) << radius_m;
+  }
+  for (const double y_m : {kNan, kInfinity, 1e7}) {
+    EXPECT_THAT(refusalOfDisc({0.0, y_m}, 1.0), testing::HasSubstr("centre")) << y_m;
+  }
+}
+
+TEST(SharedLocalizer, ADiscMustTouchTheMap) {
+  EXPECT_EQ(refusalOfDisc({500.0, 0.0}, 600.0), "");
+  EXPECT_THAT(refusalOfDisc({500.0, 0.0}, 10.0), testing::HasSubstr("outside the map, which covers x from "));
 }
 
 TEST(SharedLocalizer, AnUnusableImageChangesNothing) {

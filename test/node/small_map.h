@@ -10,7 +10,7 @@
 
 namespace visual_localization::test {
 
-/// `count` features at random places of a 320 x 240 image with random descriptors; the same seed, the same ones.
+/// `count` features at random points of a 320 x 240 image with random descriptors; the same seed, the same ones.
 inline SiftFeatures randomFeatures(std::uint32_t seed, std::size_t count) {
   std::mt19937 random(seed);
   std::vector<SiftKeypoint> keypoints(count);
@@ -23,7 +23,7 @@ inline SiftFeatures randomFeatures(std::uint32_t seed, std::size_t count) {
   return SiftFeatures(std::move(keypoints), std::move(descriptors));
 }
 
-/// Two sessions of five images each, one every metre eastwards, the second 20 m north of the first.
+/// Two sessions of five images each, one per metre eastwards, the second 20 m north of the first.
 inline std::shared_ptr<const TrainingMap> smallMap() {
   MapHeader header;
   header.datum = {48.5, 9.05, 340.0};

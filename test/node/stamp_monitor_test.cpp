@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kSecond_ns = 1000000000;
 
-/// One letter an image: . in order, L late, B back.
+/// One letter per image: . in order, L late, B back.
 std::string verdicts(const std::vector<int>& stamps_s) {
   StampMonitor monitor;
   std::string text;
@@ -28,7 +28,7 @@ TEST(StampMonitor, ASingleOlderImageIsLate) {
   EXPECT_EQ(verdicts({10, 9, 8, 11}), ".LL.");
 }
 
-TEST(StampMonitor, ABagThatBeginsAnewLosesOneImage) {
+TEST(StampMonitor, ABagThatStartsAgainLosesOneImage) {
   EXPECT_EQ(verdicts({100, 200, 1, 2, 3}), "..LB.");
   EXPECT_EQ(verdicts({100, 200, 1, 2, 100, 200, 1, 2}), "..LB..LB");
 }

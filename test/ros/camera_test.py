@@ -54,8 +54,8 @@ class CameraTest(unittest.TestCase):
     def setUpClass(cls):
         bag = rospy.get_param('~bag')
         cls.truth = fixture.truth_of(bag)
-        cls.round = ((cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_GRAYSCALE), image.header.stamp)
-                     for image in fixture.images_of(bag))
+        cls.images = ((cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_GRAYSCALE), image.header.stamp)
+                      for image in fixture.images_of(bag))
         cls.generator = np.random.default_rng(1)
         cls.diagnostics = fixture.Diagnostics('localizer')
         cls.log = fixture.LogRecorder()
@@ -65,9 +65,9 @@ class CameraTest(unittest.TestCase):
         fixture.wait_for(cls.log.is_connected, DEADLINE_S, 'the log')
 
     def drive(self, count, change=lambda grey: grey, encoding='mono8'):
-        """Shows the next images of the round as `change` makes them; their statuses."""
+        """Shows the next images of the drive as `change` makes them; their statuses."""
         return [self.camera.show(fixture.image_of(change(grey), encoding, stamp))
-                for grey, stamp in itertools.islice(self.round, count)]
+                for grey, stamp in itertools.islice(self.images, count)]
 
     def spoilt(self, fault):
         return lambda grey: faults.FAULTS[fault](grey, 0, self.generator)
@@ -135,9 +135,9 @@ class CameraTest(unittest.TestCase):
 
     def test_4_a_frozen_camera(self):
         self.drive_until_tracking(in_a_row=5)
-        grey, _ = next(self.round)
+        grey, _ = next(self.images)
         self.log.clear()
-        shown = [fixture.image_of(grey, 'mono8', stamp) for _, stamp in itertools.islice(self.round, 12)]
+        shown = [fixture.image_of(grey, 'mono8', stamp) for _, stamp in itertools.islice(self.images, 12)]
         states = [self.camera.show(image).state for image in shown]
         self.assertEqual(states[:3], 3 * [TRACKING], 'some cameras send an image twice')
         self.assertEqual(set(states[3:]), {LocalizationStatus.UNCERTAIN})

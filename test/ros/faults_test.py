@@ -18,6 +18,7 @@ from visual_localization.srv import LoadMap, Relocalize, RelocalizeRequest
 
 DEADLINE_S = 30.0
 NEAR_M = 8.0
+ENDS = ['Processed', 'Dropped', 'Late', 'Refused', 'Without a map']  # of an image, in the diagnostics
 TRACKING = LocalizationStatus.TRACKING
 
 
@@ -61,7 +62,7 @@ class FaultsTest(unittest.TestCase):
         fixes = [fix for fix in self.localizer.fix.messages() if fix.header.stamp.to_nsec() in self.truth]
         return fixture.errors_m(fixes[-1:], self.truth)[0]
 
-    def restart_round(self):
+    def restart_drive(self):
         """The same images from the beginning: the first one of them is late until it comes again."""
         type(self).next_image = 1
         self.camera.show(self.images[0], insist=True)
@@ -91,12 +92,12 @@ class FaultsTest(unittest.TestCase):
             self.assertEqual(after.state, TRACKING)
             return after.images_dropped - before.images_dropped == 2
         fixture.wait_for(two_were_left_out, DEADLINE_S, 'two late images to be left out')
-        self.log.wait_for('older than one before it', DEADLINE_S)
+        self.log.wait_for('older than the newest one', DEADLINE_S)
 
-    def test_3_a_bag_that_begins_anew(self):
+    def test_3_a_bag_that_starts_again(self):
         self.drive(30)
         self.log.clear()
-        self.restart_round()
+        self.restart_drive()
         self.log.wait_for('Time went back by', DEADLINE_S)
         count = self.drive_until_tracking()
         self.drive(3)
@@ -158,9 +159,24 @@ class FaultsTest(unittest.TestCase):
     def measured_rate_hz(self):
         return float(self.diagnostics.value('images', 'Rate (Hz)'))
 
+    def check_every_image_is_counted(self):
+        """Each one that was received has come to one end, and the diagnostics agree with the status."""
+        def ends():
+            if not self.diagnostics.last_of('images'):
+                return None
+            counts = {end: int(self.diagnostics.value('images', end)) for end in ENDS + ['Received']}
+            return counts if sum(counts[end] for end in ENDS) == counts['Received'] else None
+        self.diagnostics.clear()
+        counts = fixture.wait_for(ends, DEADLINE_S, 'every received image to be counted')
+        print(counts)
+        status = self.localizer.status.last()
+        self.assertEqual((status.images_processed, status.images_dropped, status.images_refused),
+                         (counts['Processed'], counts['Dropped'] + counts['Late'], counts['Refused']))
+
     def test_6_from_half_an_image_a_second_to_thirty(self):
         self.assertEqual(self.check_rate(0.5, 4), 4)
         self.assertGreater(self.check_rate(30.0, 330), 10)
+        self.check_every_image_is_counted()
         fixture.wait_for(lambda: 20.0 < self.measured_rate_hz() < 40.0, DEADLINE_S, 'the rate in the diagnostics')
 
     def test_7_a_listener_that_does_not_listen(self):
@@ -220,7 +236,7 @@ class FaultsTest(unittest.TestCase):
             with concurrent.futures.ThreadPoolExecutor(8) as clients:
                 self.assertTrue(all(clients.map(ask, range(8))))
         self.while_images_arrive(work)
-        self.restart_round()
+        self.restart_drive()
         print('TRACKING again after %d images' % self.drive_until_tracking())
 
 

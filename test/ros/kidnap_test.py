@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A robot that is carried elsewhere and told so by ~relocalize finds its new place."""
+"""A robot that is carried elsewhere and told so by ~relocalize finds its new position."""
 import sys
 import unittest
 

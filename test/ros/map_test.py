@@ -21,6 +21,7 @@ class MapTest(unittest.TestCase):
     def setUp(self):
         self.camera = rospy.Publisher('/stereo/left/image_raw/compressed', CompressedImage, queue_size=1)
         self.initial_pose = rospy.Publisher('/initialpose', PoseWithCovarianceStamped, queue_size=1)
+        self.diagnostics = fixture.Diagnostics('localizer')
         self.particles = fixture.Recorder('/localizer/particles', PoseArray)
         self.localizer = fixture.Localizer()
         self.localizer.wait_until_up()
@@ -45,6 +46,15 @@ class MapTest(unittest.TestCase):
         self.assertFalse(answer.success)
         self.assertIn('map', answer.message)
         self.assertFalse(self.load_map('/does/not/exist.map').success)
+        self.check_images_without_a_map_are_counted()
+
+    def check_images_without_a_map_are_counted(self):
+        def counted():
+            return self.diagnostics.last_of('images') and int(self.diagnostics.value('images', 'Without a map')) == 1
+        self.camera.publish(fixture.images_of(rospy.get_param('~bag'), count=1)[0])
+        fixture.wait_for(counted, DEADLINE_S, 'an image to be counted')
+        self.assertEqual(int(self.diagnostics.value('images', 'Received')), 1)
+        self.assertEqual(self.localizer.status.last().images_refused, 0)
 
     def give_initial_pose(self, x, y):
         pose = PoseWithCovarianceStamped()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A recorded round through the running node: it finds its place and stays there; all topics agree."""
+"""A recorded drive through the running node: it finds its position and keeps it; all topics agree."""
 import math
 import os
 import pathlib
@@ -45,7 +45,7 @@ class ReplayTest(unittest.TestCase):
         self.addCleanup(self.plot.wait)
         self.addCleanup(self.plot.terminate)
 
-    def test_a_round_is_followed(self):
+    def test_a_drive_is_followed(self):
         player = fixture.Player(self.bag, rate=rospy.get_param('~rate'), duration_s=rospy.get_param('~duration'))
         try:
             self.localizer.wait_for_state(LocalizationStatus.TRACKING, 120.0)

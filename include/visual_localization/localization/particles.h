@@ -62,10 +62,11 @@ using Prior = std::function<Eigen::Vector2d(Random&)>;
 
 /// Anywhere in the area, uniformly.
 Prior anywhere(const Area& area);
-/// Uniform in a disc. Throws std::invalid_argument unless the centre is finite and the radius finite and >= 0.
+/// Uniform in a disc. Throws std::invalid_argument unless the centre may lie on a local map (see kLargestCoordinate_m)
+/// and the radius is from 0 to the size of one.
 Prior around(const Eigen::Vector2d& centre_m, double radius_m);
-/// Normal distribution. Throws std::invalid_argument unless the mean is finite and the covariance finite,
-/// symmetric and positive semi-definite.
+/// Normal distribution. Throws std::invalid_argument unless the mean may lie on a local map and the covariance is no
+/// larger than one, symmetric and positive semi-definite.
 Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& covariance_m2);
 /// From the particles of another tracker, whose weights need not sum to one: half of the draws by weight, so that the
 /// best places are among few particles too, the other half from all alike, so that rivals are not forgotten. Throws
