@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/global_extractor.h"
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/map/training_map.h"
 

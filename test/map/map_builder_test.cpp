@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "test/support/temporary_folder.h"
-#include "visual_localization/features/global_extractor.h"
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
