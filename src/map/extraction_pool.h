@@ -12,9 +12,9 @@
 
 namespace visual_localization {
 
-/// An image that has its place, but no features yet.
+/// An image that has its pose, but no features yet.
 struct RawImage {
-  TrainingPlace place;
+  TrainingPose pose;
   cv::Mat grey;  ///< 8-bit, one channel, of the map's size
 };
 

@@ -238,7 +238,7 @@ visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::str
     markers.markers.push_back(emptyHeadings(session, frame_id));
   }
   for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
-    const TrainingPlace place = map.place(i);
+    const TrainingPose place = map.pose(i);
     const auto session = static_cast<std::size_t>(place.session);
     const Eigen::Vector2d direction(std::cos(place.yaw_rad), std::sin(place.yaw_rad));
     markers.markers[2 * session + 1].points.push_back(pointAt(place.position_m));

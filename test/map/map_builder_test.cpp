@@ -136,8 +136,8 @@ TEST(MapBuilder, RoundsBecomeSessionsOfOneMap) {
   }
   const auto map = builder.build();
   EXPECT_EQ(map->size(), 6U);
-  EXPECT_EQ(map->place(2).session, 0);
-  EXPECT_EQ(map->place(3).session, 1);
+  EXPECT_EQ(map->pose(2).session, 0);
+  EXPECT_EQ(map->pose(3).session, 1);
 }
 
 TEST(MapBuilder, ARoundIsPrunedAsIfItWereAlone) {
