@@ -22,7 +22,6 @@
 #include "evaluation/evaluator.h"
 #include "evaluation/experiment.h"
 #include "evaluation/result_folder.h"
-#include "evaluation/result_tables.h"
 #include "evaluation/round_recorder.h"
 
 namespace visual_localization::apps {

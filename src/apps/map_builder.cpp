@@ -142,7 +142,7 @@ void addRound(MapBuilder& builder, const std::string& path, const Options& optio
 
 void printFixes(const apps::PlottedRound& round) {
   constexpr std::array<FixVerdict, 5> verdicts{FixVerdict::kKept, FixVerdict::kNoFix, FixVerdict::kDisordered,
-                                               FixVerdict::kSpike, FixVerdict::kBend};
+                                               FixVerdict::kSpike, FixVerdict::kMultipath};
   std::cout << round.name << ": " << round.fixes.size() << " fixes:";
   for (const FixVerdict verdict : verdicts) {
     const auto count = std::count(round.cleaned.verdicts.begin(), round.cleaned.verdicts.end(), verdict);

@@ -82,7 +82,7 @@ class Line {
 void addPaths(const TrainingMap& map, std::vector<std::string>& features) {
   std::vector<Line> paths(map.header().sessions.size());
   for (std::size_t i = 0; i < map.size(); ++i) {
-    paths[static_cast<std::size_t>(map.place(i).session)].add(coordinates(map, i));
+    paths[static_cast<std::size_t>(map.pose(i).session)].add(coordinates(map, i));
   }
   for (std::size_t s = 0; s < paths.size(); ++s) {
     if (paths[s].points() == 0) continue;
@@ -101,7 +101,7 @@ void addStretches(const TrainingMap& map, const std::vector<Stretch>& stretches,
     of_session[static_cast<std::size_t>(stretches[s].session)].push_back(s);  // the first one at the back
   }
   for (std::size_t i = 0; i < map.size(); ++i) {
-    auto& waiting = of_session[static_cast<std::size_t>(map.place(i).session)];
+    auto& waiting = of_session[static_cast<std::size_t>(map.pose(i).session)];
     if (waiting.empty() || i < stretches[waiting.back()].first) continue;
     lines[waiting.back()].add(coordinates(map, i));
     if (i == stretches[waiting.back()].last) waiting.pop_back();
@@ -131,7 +131,7 @@ void addGaps(const TrainingMap& map, const MapFindings& findings, std::vector<st
 void addImages(const TrainingMap& map, const MapFindings& findings, std::vector<std::string>& features) {
   const std::vector<bool> ambiguous = ambiguousImages(map, findings);
   for (std::size_t i = 0; i < map.size(); ++i) {
-    const TrainingPlace image = map.place(i);
+    const TrainingPose image = map.pose(i);
     std::ostringstream properties;
     properties << "\"image\":" << i << ",\"session\":" << sessionName(map, image.session, "\\\"", true)
                << ",\"stamp\":\"" << seconds(image.stamp_ns) << "\",\"yaw_rad\":" << image.yaw_rad
@@ -150,7 +150,7 @@ std::string toCsv(const TrainingMap& map, const MapFindings& findings) {
   out << "stamp,session,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,features,weak,ambiguous\n"
       << std::setprecision(17);
   for (std::size_t i = 0; i < map.size(); ++i) {
-    const TrainingPlace image = map.place(i);
+    const TrainingPose image = map.pose(i);
     const GeodeticPoint place = map.frame().toGeodetic(image.position_m);
     out << seconds(image.stamp_ns) << ',' << sessionName(map, image.session, "\"\"", false) << ','
         << image.position_m.x() << ',' << image.position_m.y() << ',' << image.yaw_rad << ',' << place.latitude_deg

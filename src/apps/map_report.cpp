@@ -227,7 +227,7 @@ void printAmbiguity(std::ostream& out, const TrainingMap& map, const AmbiguousPl
   out << key("") << found.global_only << " by global features alone (features: global)\n";
   printStretches(out, map, found.stretches, [&](const Stretch& stretch) {
     const auto first = std::find_if(found.images.begin(), found.images.end(), [&](const AmbiguousImage& image) {
-      return image.image >= stretch.first && map.place(image.image).session == stretch.session;
+      return image.image >= stretch.first && map.pose(image.image).session == stretch.session;
     });
     std::ostringstream text;
     text << std::fixed << std::setprecision(2);

@@ -31,7 +31,7 @@ struct Style {
 
 constexpr std::array<Style, 5> kStyles{
     {{FixVerdict::kKept, "kept", "fill=\"#c4c4c4\"", "m-3 0a3 3 0 1 0 6 0a3 3 0 1 0 -6 0z"},
-     {FixVerdict::kBend, "multipath (a bend)", "fill=\"#e69f00\"", "m0 -3.2l3 5.2h-6z"},
+     {FixVerdict::kMultipath, "multipath (a bend)", "fill=\"#e69f00\"", "m0 -3.2l3 5.2h-6z"},
      {FixVerdict::kNoFix, "no fix, drawn on the path", "fill=\"none\" stroke=\"black\" stroke-width=\"0.7\"",
       "m-3.4 0a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0z"},
      {FixVerdict::kDisordered, "out of order", "fill=\"#9467bd\"", "m-3 -3h6v6h-6z"},
@@ -74,7 +74,7 @@ Area areaOf(const std::vector<const PlottedRound*>& rounds, const LocalFrame& fr
   Area shown = paths;
   for (const PlottedRound* round : rounds) {
     for (std::size_t i = 0; i < round->fixes.size(); ++i) {
-      if (round->cleaned.verdicts[i] != FixVerdict::kBend) continue;
+      if (round->cleaned.verdicts[i] != FixVerdict::kMultipath) continue;
       const Eigen::Vector2d bend_m = frame.toEastNorth(round->fixes[i].position);
       include(bend_m.cwiseMax(paths.min_m - room_m).cwiseMin(paths.max_m + room_m), shown);
     }

@@ -28,12 +28,15 @@ std::vector<std::thread> startThreads(std::size_t wanted, const std::function<vo
 /// The tasks that are left, shared by the threads that do them.
 class TaskQueue {
  public:
-  TaskQueue(std::size_t count, const std::function<void(std::size_t)>& task) : count_(count), task_(task) {}
+  using Task = std::function<void(std::size_t i, std::size_t worker)>;
+
+  TaskQueue(std::size_t count, const Task& task) : count_(count), task_(task) {}
 
   void work() noexcept {
+    const std::size_t worker = workers_++;
     for (std::size_t i = next_++; i < count_; i = next_++) {
       try {
-        task_(i);
+        task_(i, worker);
       } catch (...) {
         const std::lock_guard<std::mutex> lock(mutex_);
         if (!error_) error_ = std::current_exception();
@@ -46,7 +49,7 @@ class TaskQueue {
     changed_.notify_all();
   }
 
-  void waitFor(std::size_t threads, const ProgressCallback& progress) {
+  void waitFor(std::size_t threads, const Progress& progress) {
     constexpr std::chrono::milliseconds kInterval{100};
     std::unique_lock<std::mutex> lock(mutex_);
     while (!changed_.wait_for(lock, kInterval, [&] { return finished_threads_ == threads; })) {
@@ -60,7 +63,8 @@ class TaskQueue {
 
  private:
   const std::size_t count_;
-  const std::function<void(std::size_t)>& task_;
+  const Task& task_;
+  std::atomic<std::size_t> workers_{0};
   std::atomic<std::size_t> next_{0};
   std::atomic<std::size_t> done_{0};
   std::mutex mutex_;
@@ -71,20 +75,28 @@ class TaskQueue {
 
 }  // namespace
 
-void parallelFor(std::size_t count, std::size_t threads, const std::function<void(std::size_t)>& task,
-                 const ProgressCallback& progress) {
+void parallelFor(std::size_t count, std::size_t threads,
+                 const std::function<void(std::size_t i, std::size_t worker)>& task, const Progress& progress) {
   TaskQueue queue(count, task);
   const std::size_t wanted = std::max<std::size_t>(1, std::min(threads, count));
-  std::vector<std::thread> pool = startThreads(wanted, [&queue] { queue.work(); });
-  if (pool.empty()) queue.work();
+  // The calling thread works as well, unless it has something to report meanwhile.
+  std::vector<std::thread> pool = startThreads(progress ? wanted : wanted - 1, [&queue] { queue.work(); });
+  const bool works = !progress || pool.empty();
+  if (works) queue.work();
   std::exception_ptr error;
   try {
-    queue.waitFor(std::max<std::size_t>(1, pool.size()), progress);
+    queue.waitFor(pool.size() + (works ? 1 : 0), progress);
   } catch (...) {
     error = std::current_exception();
   }
   for (std::thread& thread : pool) thread.join();
   if (error) std::rethrow_exception(error);
+}
+
+void parallelFor(std::size_t count, std::size_t threads, const std::function<void(std::size_t)>& task,
+                 const Progress& progress) {
+  parallelFor(
+      count, threads, [&task](std::size_t i, std::size_t) { task(i); }, progress);
 }
 
 }  // namespace visual_localization

@@ -1,5 +1,7 @@
 #include "base/text.h"
 
+#include <locale>
+
 namespace visual_localization {
 
 std::size_t characterBytes(const std::string& text, std::size_t at) {
@@ -40,6 +42,23 @@ std::string oneLine(std::string text, std::size_t most) {
     if ((c >= 0 && c < 32) || c == 127) c = ' ';
   }
   return text;
+}
+
+std::string csvQuoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+std::string csvField(const std::string& text) {
+  return text.find_first_of(",\"\n") == std::string::npos ? text : csvQuoted(text);
+}
+
+std::ostringstream numberStream(int digits) {
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out.precision(digits);
+  return out;
 }
 
 }  // namespace visual_localization

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <iterator>
+#include <limits>
+#include <sstream>
 #include <string>
 
 namespace visual_localization {
@@ -19,5 +22,28 @@ std::string lastCharacters(const std::string& text, std::size_t most);
 /// Foreign text for a message of one line: control characters become spaces, and only so many bytes are shown, without
 /// half a character of UTF-8 at the end.
 std::string oneLine(std::string text, std::size_t most = 300);
+
+/// The elements of a list of texts with `separator` between them.
+template <class Texts>
+std::string joined(const Texts& texts, const std::string& separator = ", ") {
+  std::string all;
+  for (const auto& text : texts) {
+    if (&text != &*std::begin(texts)) all += separator;
+    all += text;
+  }
+  return all;
+}
+
+/// A field of a CSV file in quotes (RFC 4180).
+std::string csvQuoted(const std::string& text);
+
+/// A field of a CSV file, in quotes where it needs them.
+std::string csvField(const std::string& text);
+
+/// Decimal digits with which every number reads back as the same double.
+constexpr int kFullPrecision = std::numeric_limits<double>::max_digits10;
+
+/// An empty text to write numbers into, with `digits` significant digits and a decimal point whatever the locale.
+std::ostringstream numberStream(int digits = kFullPrecision);
 
 }  // namespace visual_localization

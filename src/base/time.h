@@ -1,9 +1,26 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <ctime>
+#include <string>
 
 namespace visual_localization {
+
+/// Seconds from `from_ns` to `to_ns`.
+inline double secondsBetween(std::int64_t from_ns, std::int64_t to_ns) {
+  return static_cast<double>(to_ns - from_ns) * 1e-9;
+}
+
+/// A stamp as seconds with all nine decimals: a double would lose the last ones.
+inline std::string secondsText(std::int64_t stamp_ns) {
+  constexpr std::uint64_t kNanoseconds = 1'000'000'000;
+  const auto bits = static_cast<std::uint64_t>(stamp_ns);
+  const std::uint64_t magnitude = stamp_ns < 0 ? 0 - bits : bits;
+  const std::string decimals = std::to_string(magnitude % kNanoseconds);
+  return (stamp_ns < 0 ? "-" : "") + std::to_string(magnitude / kNanoseconds) + '.' +
+         std::string(9 - decimals.size(), '0') + decimals;
+}
 
 /// Wall-clock time since it was made.
 class Stopwatch {

@@ -11,7 +11,7 @@ namespace {
 
 void requireIndex(const std::string& name, std::size_t index, std::size_t images) {
   if (index < images) return;
-  throw std::invalid_argument(name + " " + std::to_string(index) + " is not allowed: the round has images 0 to " +
+  throw std::invalid_argument(name + " " + std::to_string(index) + " is not allowed: the drive has images 0 to " +
                               std::to_string(images - 1));
 }
 

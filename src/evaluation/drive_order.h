@@ -15,22 +15,22 @@ struct Kidnapping {
   std::size_t to = 0;  ///< index of the first image after it
 };
 
-/// The order in which a run sees the images of a closed round: every step one image, starting at `start`, wrapping
+/// The order in which a run sees the images of a closed drive: every step one image, starting at `start`, wrapping
 /// at the end, with an optional jump (protocol of Kronfeld et al. (journal), section 6). As many steps as the
-/// round has images. Throws std::invalid_argument, naming the allowed range, for an index beyond the round.
+/// drive has images. Throws std::invalid_argument, naming the allowed range, for an index beyond the drive.
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const std::optional<Kidnapping>& kidnapping);
 
-/// How the runs of an experiment go through a round.
+/// How the runs of an experiment go through a drive.
 struct RunShape {
-  bool closed = true;      ///< indices wrap; an open round is driven to its end
-  double speed = 1.0;      ///< images of the round per step: at 2 every other one, at 1/2 each one twice
-  bool kidnapped = false;  ///< after half of the run carried by half of the round; closed rounds only
+  bool closed = true;      ///< indices wrap; an open drive is followed to its end
+  double speed = 1.0;      ///< images of the drive per step: at 2 every other one, at 1/2 each one twice
+  bool kidnapped = false;  ///< after half of the run carried by half of the drive; closed drives only
 };
 
-/// The images that the run beginning at `start` sees: once around a closed round, to the end of an open one.
+/// The images that the run beginning at `start` sees: once around a closed drive, to the end of an open one.
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const RunShape& shape);
 
-/// Where the runs begin: every image of a closed round, or of the first half of an open one; `count` of them, evenly
+/// Where the runs begin: every image of a closed drive, or of the first half of an open one; `count` of them, evenly
 /// spread, unless that is 0 or more than there are.
 std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_t count);
 

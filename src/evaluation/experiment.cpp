@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "base/text.h"
 #include "parameters/yaml_map.h"
 
 namespace visual_localization {
@@ -63,7 +64,7 @@ std::vector<std::size_t> roundsNamed(const std::string& name, const std::vector<
 std::vector<PairSpec> readPairs(YamlMap& yaml, const std::vector<RoundSpec>& rounds) {
   std::vector<PairSpec> pairs;
   for (const std::vector<std::string>& names : yaml.textLists("pairs", 2)) {
-    const std::string shown = "[" + names[0] + ", " + names[1] + "]";
+    const std::string shown = "[" + joined(names) + "]";
     for (const std::string& name : names) {
       if (roundsNamed(name, rounds).empty())
         yaml.refuse("pairs", shown + ": no round or group is called '" + name + "'");
@@ -199,9 +200,8 @@ std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
     if (!is_recogniser) chosen["tracker"] = entry.method.tracker;
     assignParameters(entry.method.localizer, chosen);
   } catch (const ParameterError& error) {
-    std::string others;
-    for (const std::string& name : recognisers) others += ", " + name;
-    yaml.refuse("name", "'" + entry.name + "': " + error.what() + " (beside the trackers: " + others.substr(2) + ")");
+    yaml.refuse("name",
+                "'" + entry.name + "': " + error.what() + " (beside the trackers: " + joined(recognisers) + ")");
   }
   if (is_recogniser && entry.method.localizer.features == "hybrid") {
     yaml.refuse("features", "= hybrid needs a tracker's cloud, and '" + entry.method.tracker + "' has none");
@@ -273,8 +273,6 @@ bool MethodSpec::isTracker() const {
   const std::vector<std::string>& recognisers = placeRecogniserNames();
   return std::find(recognisers.begin(), recognisers.end(), tracker) == recognisers.end();
 }
-
-Experiment readExperiment(const std::string& path) { return parse(YamlMap::load(path)); }
 
 Experiment parseExperiment(const std::string& yaml, const std::string& path) {
   return parse(YamlMap::parse(yaml, path));

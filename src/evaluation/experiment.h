@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "evaluation/place_recogniser_factory.h"
+#include "evaluation/place_recogniser.h"
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/map/map_builder.h"
 
@@ -33,8 +33,8 @@ struct MethodSpec {
   std::string tracker;        ///< "dpso", ... or a name of placeRecogniserNames()
   LocalizerConfig localizer;  ///< its `features` hold for place recognisers too
   PlaceRecogniserConfig recogniser;
-  double speed = 1.0;      ///< simulated speed: images of the round per step
-  bool kidnapped = false;  ///< carried to the other side of the round after half of the run
+  double speed = 1.0;      ///< simulated speed: images of the drive per step
+  bool kidnapped = false;  ///< carried to the other side of the drive after half of the run
   double map_gap = 0.0;    ///< share of the map's images that are left out
   double covered = 0.0;    ///< share of the run, after its half, during which something covers the camera
   std::vector<std::pair<std::string, std::string>> settings;  ///< all of the above that the experiment sets, as text
@@ -55,10 +55,8 @@ struct Experiment {
   std::vector<MethodSpec> methods;
 };
 
-/// Reads an experiment's YAML file. Throws ParameterError, in one line that names the file and the key, for anything
-/// unknown, missing or contradictory.
-Experiment readExperiment(const std::string& path);
-/// The same of the file's text; `path` is for messages.
+/// The experiment that the text of a YAML file describes; `path` is for messages. Throws ParameterError, in one line
+/// that names the file and the key, for anything unknown, missing or contradictory.
 Experiment parseExperiment(const std::string& yaml, const std::string& path);
 
 }  // namespace visual_localization

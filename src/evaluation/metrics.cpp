@@ -7,19 +7,27 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/statistics.h"
+
 namespace visual_localization {
+namespace {
+
+/// NaN without any.
+double share(std::size_t part, std::size_t rest) {
+  return static_cast<double>(part) / static_cast<double>(part + rest);
+}
+
+}  // namespace
 
 ErrorStatistics summarise(std::vector<double> errors_m) {
   ErrorStatistics statistics;
   if (errors_m.empty()) return statistics;
-  constexpr double kNear = 5.0;
   const auto count = static_cast<double>(errors_m.size());
   std::sort(errors_m.begin(), errors_m.end());
-  const std::size_t middle = errors_m.size() / 2;
   statistics.count = errors_m.size();
   statistics.mean_m = std::accumulate(errors_m.begin(), errors_m.end(), 0.0) / count;
-  statistics.median_m = errors_m.size() % 2 == 1 ? errors_m[middle] : 0.5 * (errors_m[middle - 1] + errors_m[middle]);
-  const auto near = std::lower_bound(errors_m.begin(), errors_m.end(), kNear) - errors_m.begin();
+  statistics.median_m = median(errors_m);
+  const auto near = std::lower_bound(errors_m.begin(), errors_m.end(), kRight_m) - errors_m.begin();
   statistics.within_5m = static_cast<double>(near) / count;
   return statistics;
 }
@@ -42,5 +50,38 @@ double recallAtPrecision(std::vector<Decision> decisions, double precision) {
   }
   return all == 0 ? 0.0 : static_cast<double>(recalled) / static_cast<double>(all);
 }
+
+void Trust::add(const StepRecord& step) {
+  if (std::isnan(step.error_m) || step.state == LocalizationState::kNoMap) return;
+  const bool right = static_cast<double>(step.error_m) < kRight_m;
+  if (step.state == LocalizationState::kTracking) {
+    ++(right ? tracking_right : tracking_wrong);
+  } else {
+    ++(right ? lost_wrong : lost_right);
+  }
+  if (step.state == LocalizationState::kOffMap) {
+    ++(step.off_map ? off_map_right : off_map_wrong);
+  } else if (step.off_map) {
+    ++off_map_missed;
+  }
+}
+
+Trust& Trust::operator+=(const Trust& other) {
+  tracking_right += other.tracking_right;
+  tracking_wrong += other.tracking_wrong;
+  lost_right += other.lost_right;
+  lost_wrong += other.lost_wrong;
+  off_map_right += other.off_map_right;
+  off_map_wrong += other.off_map_wrong;
+  off_map_missed += other.off_map_missed;
+  return *this;
+}
+
+double Trust::trackingShare() const { return share(tracking_right + tracking_wrong, lost_right + lost_wrong); }
+double Trust::wrongTracking() const { return share(tracking_wrong, tracking_right); }
+double Trust::lostPrecision() const { return share(lost_right, lost_wrong); }
+double Trust::lostRecall() const { return share(lost_right, tracking_wrong); }
+double Trust::offMapPrecision() const { return share(off_map_right, off_map_wrong); }
+double Trust::offMapRecall() const { return share(off_map_right, off_map_missed); }
 
 }  // namespace visual_localization

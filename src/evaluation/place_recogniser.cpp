@@ -4,7 +4,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "evaluation/place_recogniser_factory.h"
+#include "base/text.h"
+#include "evaluation/sequence_matcher.h"
+#include "evaluation/topological_bayes_filter.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -60,9 +62,8 @@ std::unique_ptr<PlaceRecogniser> makePlaceRecogniser(const std::string& name, co
   if (name == "exhaustive") return std::make_unique<BestSingleImage>();
   if (name == "sequence") return std::make_unique<SequenceMatcher>(config.sequence, closed);
   if (name == "topological") return std::make_unique<TopologicalBayesFilter>(config.bayes, closed);
-  std::string allowed;
-  for (const auto& known : placeRecogniserNames()) allowed += (allowed.empty() ? "" : ", ") + known;
-  throw std::invalid_argument("place recogniser '" + name + "' is unknown; known are " + allowed);
+  throw std::invalid_argument("place recogniser '" + name + "' is unknown; known are " +
+                              joined(placeRecogniserNames()));
 }
 
 }  // namespace visual_localization

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "visual_localization/parameters/parameter_visitor.h"
+
 namespace visual_localization {
 
 /// The order of the training images along the drive; on a closed route the first follows the last.
@@ -49,8 +51,6 @@ struct Recognition {
 class PlaceRecogniser {
  public:
   virtual ~PlaceRecogniser() = default;
-  /// The position is unknown again.
-  virtual void reset() = 0;
   /// One image further. `similarities`: of the current image to every training image, in the map's order, in [0, 1].
   virtual Recognition update(const std::vector<double>& similarities) = 0;
 };
@@ -64,11 +64,50 @@ void requireRow(const std::vector<double>& similarities, std::size_t training_im
 /// Its similarity is the confidence.
 class BestSingleImage final : public PlaceRecogniser {
  public:
-  void reset() override {}
   Recognition update(const std::vector<double>& similarities) override;
 
  private:
   std::size_t training_images_ = 0;  ///< of the first row; later ones must be as long
 };
+
+/// Parameters of sequence matching; symbols of Milford and Wyeth (ICRA 2012).
+struct SequenceConfig {
+  int length = 10;                ///< d_s, images
+  int normalisation_radius = 10;  ///< R_window reaches so many training images to each side
+  double min_contrast = 0.05;     ///< smaller standard deviations of similarity are noise, normalised as if so large
+  double min_speed = 0.8;         ///< V_min, training images per image
+  double max_speed = 1.2;         ///< V_max
+  double speed_step = 0.1;        ///< V_step
+  int uniqueness_radius = 10;     ///< training images this close to the best one are no rivals of it
+
+  void declare(ParameterVisitor& visitor);
+};
+
+/// Parameters of the topological filter.
+struct TopologicalBayesConfig {
+  int min_step = -1;     ///< w_l, training images moved per image
+  int max_step = 3;      ///< w_u
+  double reset = 0.001;  ///< probability that the robot is anywhere after an image
+  double delta = 5.0;    ///< likelihood ratio between very similar and very different training images
+  int window = 15;       ///< training images that count as one place, odd
+
+  void declare(ParameterVisitor& visitor);
+};
+
+/// Parameters of all place recognisers; the exhaustive one has none.
+struct PlaceRecogniserConfig {
+  SequenceConfig sequence;
+  TopologicalBayesConfig bayes;
+
+  void declare(ParameterVisitor& visitor);
+};
+
+/// What makePlaceRecogniser knows: "exhaustive", "sequence", "topological".
+const std::vector<std::string>& placeRecogniserNames();
+
+/// The place recogniser called `name`. `closed`: the first training image follows the last. Throws
+/// std::invalid_argument for another name, naming those allowed, and for a configuration with violations.
+std::unique_ptr<PlaceRecogniser> makePlaceRecogniser(const std::string& name, const PlaceRecogniserConfig& config,
+                                                     bool closed);
 
 }  // namespace visual_localization

@@ -1,14 +1,13 @@
-#include "evaluation/result_tables.h"
-
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <locale>
 #include <numeric>
 #include <sstream>
 #include <utility>
 
 #include "base/files.h"
+#include "base/statistics.h"
+#include "base/text.h"
+#include "evaluation/result_folder.h"
 
 namespace visual_localization {
 namespace {
@@ -18,26 +17,12 @@ const char* const kMeasures =
     "steps_to_relocalise,recall_at_p99,extract_ms,match_ms,update_ms,tracking_share,wrong_tracking,lost_precision,"
     "lost_recall,off_map_precision,off_map_recall";
 
-/// A field of a CSV file (RFC 4180).
-std::string field(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + '"';
-}
+constexpr int kDigits = 6;
 
 std::ostringstream table(const std::string& header) {
-  std::ostringstream out;
-  out.imbue(std::locale::classic());
-  out.precision(6);
+  std::ostringstream out = numberStream(kDigits);
   out << header << '\n';
   return out;
-}
-
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Mean of a figure over runs, each counted by its images.
@@ -117,16 +102,15 @@ std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
   const double extract_ms = meanOf(runs, [](const RunFigures& run) { return run.extract_ms; });
   const double match_ms = meanOf(runs, [](const RunFigures& run) { return run.match_ms; });
   const double update_ms = meanOf(runs, [](const RunFigures& run) { return run.update_ms; });
-  std::ostringstream out;
-  out.imbue(std::locale::classic());
+  std::ostringstream out = numberStream(kDigits);
   out << runs.size() << ',' << Known{meanOfJudged(runs, [](const RunFigures& run) { return run.mean_err_m; })} << ','
       << Known{deviationOf(runs)} << ','
       << meanOf(runs, [](const RunFigures& run) { return run.comparisons_per_image; }) << ','
       << extract_ms + match_ms + update_ms << ',' << meanOf(runs, [](const RunFigures& run) { return run.sift_share; })
       << ',' << Known{meanOfPairs(units, &UnitResult::median_err_m)} << ','
-      << Known{meanOfJudged(runs, [](const RunFigures& run) { return run.within_5m; })} << ',' << medianOf(localised)
+      << Known{meanOfJudged(runs, [](const RunFigures& run) { return run.within_5m; })} << ',' << upperMedian(localised)
       << ',';
-  if (kidnapped) out << medianOf(relocalised);
+  if (kidnapped) out << upperMedian(relocalised);
   out << ',' << Known{meanOfPairs(units, &UnitResult::recall_at_p99)} << ',' << extract_ms << ',' << match_ms << ','
       << update_ms;
   Trust trust;
@@ -187,8 +171,8 @@ void writeGroupTables(const Experiment& experiment, const ResultFolder& results)
       const MethodSpec& spec = experiment.methods[method];
       std::vector<UnitResult> units;
       for (const std::size_t pair : pairs) units.push_back(results.load(pair, method));
-      const std::string prefix = field(groups.first) + ',' + field(groups.second) + ',' + field(spec.name);
-      summary << field(experiment.name) << ',' << prefix << ',' << measuresOf(units, spec.kidnapped) << '\n';
+      const std::string prefix = csvField(groups.first) + ',' + csvField(groups.second) + ',' + csvField(spec.name);
+      summary << csvField(experiment.name) << ',' << prefix << ',' << measuresOf(units, spec.kidnapped) << '\n';
       addSteps(sumOfSteps(units), prefix, steps);
     }
   }
@@ -205,9 +189,10 @@ void writePairTables(const Experiment& experiment, const ResultFolder& results) 
     for (std::size_t method = 0; method < experiment.methods.size(); ++method) {
       const MethodSpec& spec = experiment.methods[method];
       const UnitResult unit = results.load(pair, method);
-      measures << field(map.name) << ',' << field(drive.name) << ',' << field(map.group) << ',' << field(drive.group)
-               << ',' << field(spec.name) << ',' << measuresOf({unit}, spec.kidnapped) << '\n';
-      const std::string prefix = field(map.name) + ',' + field(drive.name) + ',' + field(spec.name) + ',';
+      measures << csvField(map.name) << ',' << csvField(drive.name) << ',' << csvField(map.group) << ','
+               << csvField(drive.group) << ',' << csvField(spec.name) << ',' << measuresOf({unit}, spec.kidnapped)
+               << '\n';
+      const std::string prefix = csvField(map.name) + ',' + csvField(drive.name) + ',' + csvField(spec.name) + ',';
       for (const std::string& row : unit.trace) traces << prefix << row << '\n';
     }
   }
@@ -219,7 +204,7 @@ void writeMethods(const Experiment& experiment, const ResultFolder& results) {
   std::ostringstream out = table("method,key,value");
   for (const MethodSpec& method : experiment.methods) {
     for (const auto& [key, value] : method.settings) {
-      out << field(method.name) << ',' << field(key) << ',' << field(value) << '\n';
+      out << csvField(method.name) << ',' << csvField(key) << ',' << csvField(value) << '\n';
     }
   }
   writeFile(results.path() + "/methods.csv", out.str());

@@ -66,9 +66,8 @@ class TrackerContestant final : public Contestant {
   /// The best match in units of what counts as recognised, so that both kinds of features can be compared; none when
   /// the match is not where the estimate is.
   double evidenceOf(const Estimate& estimate) const {
-    constexpr double kNear_m = 5.0;
     const TrackerEstimate& tracked = estimate.tracked;
-    if (tracked.best_distance_m > kNear_m) return 0.0;
+    if (tracked.best_distance_m > kRight_m) return 0.0;
     const double recognised =
         estimate.evidence.features == FeatureKind::kSift ? similarity_.sift_recognised : similarity_.global_recognised;
     return recognised > 0.0 ? tracked.best.similarity / recognised : tracked.best.similarity;

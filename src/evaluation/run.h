@@ -36,7 +36,7 @@ struct TraceRecord {
   Estimate estimate;
 };
 
-/// One run of one method over one driven round.
+/// One run of one method over one drive.
 struct RunRecord {
   std::size_t start = 0;
   std::vector<StepRecord> steps;

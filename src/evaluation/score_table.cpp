@@ -6,7 +6,7 @@
 namespace visual_localization {
 namespace {
 
-/// Times of one row, so that no two threads write to the same place.
+/// Times of one row, so that no two threads write to the same memory.
 struct RowTimes {
   double sift_ms = 0.0;
   double global_ms = 0.0;

@@ -16,7 +16,7 @@
 
 namespace visual_localization {
 
-/// One image of a round that is driven, as the front end of the localizer sees it.
+/// One image of a drive, as the front end of the localizer sees it.
 struct DriveImage {
   std::int64_t stamp_ns = 0;
   std::optional<GeodeticPoint> truth;  ///< absent when it has no true position
@@ -24,7 +24,7 @@ struct DriveImage {
   GlobalFeatures global;
 };
 
-/// A round as images to localise.
+/// A recorded round as images to localise.
 struct Drive {
   std::vector<DriveImage> images;
   cv::Size image_size;     ///< pixels
@@ -32,13 +32,13 @@ struct Drive {
   double global_ms = 0.0;  ///< mean time to extract its global features
 };
 
-/// A round in the roles it plays in an experiment; a role it does not play is empty.
+/// A recorded round in the roles it plays in an experiment; a role it does not play is empty.
 struct RecordedRound {
   std::shared_ptr<const TrainingMap> map;
   std::shared_ptr<const Drive> drive;
 };
 
-/// All similarities between a driven round and a map, computed once and shared by all runs of an experiment.
+/// All similarities between a drive and a map, computed once and shared by all runs of an experiment.
 class ScoreTable {
  public:
   struct Entry {
@@ -71,8 +71,8 @@ class ScoreTable {
 /// Recorded images whose scores are looked up instead of computed. Counts what live images would have cost.
 class RecordedImage final : public QueryImage {
  public:
-  /// `table` must outlive it. Of its training images only `training_images` are in the map, and counted by their place
-  /// in this list, which must outlive it too; all when it is empty.
+  /// `table` must outlive it. Of its training images only `training_images` are in the map, and counted by their
+  /// index in this list, which must outlive it too; all when it is empty.
   RecordedImage(const ScoreTable& table, const std::vector<std::size_t>& training_images, const MatchConfig& match,
                 const SimilarityConfig& similarity);
 

@@ -2,26 +2,11 @@
 
 #include <cstddef>
 #include <deque>
-#include <string>
 #include <vector>
 
 #include "evaluation/place_recogniser.h"
-#include "visual_localization/parameters/parameter_visitor.h"
 
 namespace visual_localization {
-
-/// Parameters of sequence matching; symbols of Milford and Wyeth (ICRA 2012).
-struct SequenceConfig {
-  int length = 10;                ///< d_s, images
-  int normalisation_radius = 10;  ///< R_window reaches so many training images to each side
-  double min_contrast = 0.05;     ///< smaller standard deviations of similarity are noise, normalised as if so large
-  double min_speed = 0.8;         ///< V_min, training images per image
-  double max_speed = 1.2;         ///< V_max
-  double speed_step = 0.1;        ///< V_step
-  int uniqueness_radius = 10;     ///< training images this close to the best one are no rivals of it
-
-  void declare(ParameterVisitor& visitor);
-};
 
 /// Recognises short sequences instead of single images, in the manner of SeqSLAM (Milford and Wyeth, "SeqSLAM:
 /// Visual Route-Based Navigation for Sunny Summer Days and Stormy Winter Nights", ICRA 2012), but online: the answer is
@@ -36,7 +21,6 @@ class SequenceMatcher final : public PlaceRecogniser {
   /// `config` must be without violations. `closed`: the first training image follows the last.
   SequenceMatcher(const SequenceConfig& config, bool closed);
 
-  void reset() override { columns_.clear(); }
   Recognition update(const std::vector<double>& similarities) override;
 
  private:

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "evaluation/place_recogniser.h"
+#include "base/statistics.h"
 
 namespace visual_localization {
 namespace {
@@ -12,14 +12,6 @@ namespace {
 void normalise(std::vector<double>& masses) {
   const double sum = std::accumulate(masses.begin(), masses.end(), 0.0);
   for (double& mass : masses) mass /= sum;
-}
-
-/// Value below which `share` of the sorted values lie, linear between neighbours.
-double quantile(const std::vector<double>& sorted, double share) {
-  const double rank = share * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<std::size_t>(rank);
-  const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (rank - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
 }  // namespace
@@ -38,11 +30,6 @@ void TopologicalBayesConfig::declare(ParameterVisitor& visitor) {
 
 TopologicalBayesFilter::TopologicalBayesFilter(const TopologicalBayesConfig& config, bool closed)
     : config_(config), closed_(closed), route_(0, closed) {}
-
-void TopologicalBayesFilter::reset() {
-  lambda_ = 0.0;
-  posterior_.clear();
-}
 
 Recognition TopologicalBayesFilter::update(const std::vector<double>& similarities) {
   requireRow(similarities, route_.size());

@@ -1,24 +1,11 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
 #include <vector>
 
 #include "evaluation/place_recogniser.h"
-#include "visual_localization/parameters/parameter_visitor.h"
 
 namespace visual_localization {
-
-/// Parameters of the topological filter.
-struct TopologicalBayesConfig {
-  int min_step = -1;     ///< w_l, training images moved per image
-  int max_step = 3;      ///< w_u
-  double reset = 0.001;  ///< probability that the robot is anywhere after an image
-  double delta = 5.0;    ///< likelihood ratio between very similar and very different training images
-  int window = 15;       ///< training images that count as one place, odd
-
-  void declare(ParameterVisitor& visitor);
-};
 
 /// A discrete Bayes filter whose states are the training images, in the manner of the topological filter of Xu,
 /// Suenderhauf and Milford ("Probabilistic Visual Place Recognition for Hierarchical Localization", RA-L 2021).
@@ -34,7 +21,6 @@ class TopologicalBayesFilter final : public PlaceRecogniser {
   /// `config` must be without violations. `closed`: the first training image follows the last.
   TopologicalBayesFilter(const TopologicalBayesConfig& config, bool closed);
 
-  void reset() override;
   Recognition update(const std::vector<double>& similarities) override;
 
  private:
@@ -48,7 +34,7 @@ class TopologicalBayesFilter final : public PlaceRecogniser {
   bool closed_;
   Route route_;                    ///< empty until the first image tells how long it is
   double lambda_ = 0.0;            ///< 0 until calibrated
-  std::vector<double> posterior_;  ///< sums to one; empty before the first image since the reset
+  std::vector<double> posterior_;  ///< sums to one; empty before the first image
   std::vector<double> buffer_;     ///< scratch; kept to save the allocation
 };
 

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "base/text.h"
 #include "evaluation/metrics.h"
 
 namespace visual_localization {
@@ -14,12 +15,7 @@ namespace {
 
 constexpr double kPrecision = 0.99;
 
-std::ostringstream numbers() {
-  std::ostringstream out;
-  out.imbue(std::locale::classic());
-  out.precision(std::numeric_limits<double>::digits10);
-  return out;
-}
+std::ostringstream numbers() { return numberStream(std::numeric_limits<double>::digits10); }
 
 RunFigures figuresOf(const RunRecord& run, const StageCosts& costs) {
   RunFigures figures;

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/metrics.h"
 #include "evaluation/run.h"
-#include "evaluation/trust.h"
 
 namespace visual_localization {
 

@@ -5,7 +5,6 @@
 
 #include "base/time.h"
 #include "visual_localization/features/sift_matcher.h"
-#include "visual_localization/geo/geodetic_point.h"
 
 namespace visual_localization {
 namespace {

@@ -1,9 +1,5 @@
-// Compiled once for each kind of CPU by foreach_target.h; HWY_DYNAMIC_DISPATCH takes the best one at run time.
-// Vectors whose length is not known to the compiler cannot be kept in arrays, as it is done here.
-#if defined(__clang__) || !defined(__GNUC__) || __GNUC__ >= 11  // GCC 10 does not know all that Highway 1.0 asks for
-#define HWY_WANT_AVX3_DL
-#endif
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+// Compiled once for each kind of CPU, see highway.h.
+#define VISUAL_LOCALIZATION_WANT_VNNI
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "features/nearest_descriptors.cpp"
 #include "features/nearest_descriptors.h"
@@ -11,9 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-#include <hwy/aligned_allocator.h>
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
+#include "features/highway.h"
 
 HWY_BEFORE_NAMESPACE();
 #if HWY_TARGET == HWY_AVX3_DL

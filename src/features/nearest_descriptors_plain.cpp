@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "features/nearest_descriptors.h"
@@ -27,6 +29,18 @@ void findNearestPlain(const SiftFeatures& a, const SiftFeatures& b, NearestDescr
       offer(nearest.of_b[j], cosine, i);
     }
   }
+}
+
+AngleRatioTest::AngleRatioTest(double max_angle_ratio) : max_angle_ratio_(max_angle_ratio) {
+  for (std::size_t i = 0; i <= kCells; ++i) {
+    bounds_[i] = std::cos(max_angle_ratio * std::acos(static_cast<double>(i) / kCells));
+  }
+}
+
+bool AngleRatioTest::exactly(float best, float second) const {
+  const double nearest = std::acos(std::min(1.0, static_cast<double>(best)));
+  const double next = std::acos(std::min(1.0, static_cast<double>(second)));
+  return nearest < max_angle_ratio_ * next;
 }
 
 #ifndef VISUAL_LOCALIZATION_HIGHWAY

@@ -19,8 +19,6 @@ class OpenCvSiftExtractor : public SiftExtractor {
       : sift_(cv::SIFT::create(config.max_features, config.octave_layers, config.contrast_threshold,
                                config.edge_threshold, config.sigma_px, CV_8U)) {}
 
-  const char* backend() const override { return kOpenCvSift; }
-
   using SiftExtractor::extract;
   void extract(const cv::Mat& grey, SiftFeatures& features) override {
     requireExtractable(grey);
@@ -42,13 +40,16 @@ class OpenCvSiftExtractor : public SiftExtractor {
 
 }  // namespace
 
+bool isExtractable(const cv::Mat& grey) {
+  return grey.type() == CV_8UC1 && grey.rows >= kSmallestImageSide_px && grey.cols >= kSmallestImageSide_px;
+}
+
 void requireExtractable(const cv::Mat& grey) {
-  constexpr int kSmallestSide = 16;
+  if (isExtractable(grey)) return;
   if (grey.type() != CV_8UC1) throw std::invalid_argument("image must be 8-bit with one channel");
-  if (grey.rows < kSmallestSide || grey.cols < kSmallestSide) {
-    throw std::invalid_argument("image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
-                                " pixels, must be at least 16x16");
-  }
+  const std::string side = std::to_string(kSmallestImageSide_px);
+  throw std::invalid_argument("image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
+                              " pixels, must be at least " + side + "x" + side);
 }
 
 void SiftConfig::declare(ParameterVisitor& visitor) {

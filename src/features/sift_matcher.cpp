@@ -1,10 +1,9 @@
 #include "visual_localization/features/sift_matcher.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
-#include "features/angle_ratio_test.h"
+#include "base/statistics.h"
 #include "features/nearest_descriptors.h"
 
 namespace visual_localization {
@@ -56,18 +55,6 @@ void forEachSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_a
 
 }  // namespace
 
-AngleRatioTest::AngleRatioTest(double max_angle_ratio) : max_angle_ratio_(max_angle_ratio) {
-  for (std::size_t i = 0; i <= kCells; ++i) {
-    bounds_[i] = std::cos(max_angle_ratio * std::acos(static_cast<double>(i) / kCells));
-  }
-}
-
-bool AngleRatioTest::exactly(float best, float second) const {
-  const double nearest = std::acos(std::min(1.0, static_cast<double>(best)));
-  const double next = std::acos(std::min(1.0, static_cast<double>(second)));
-  return nearest < max_angle_ratio_ * next;
-}
-
 void MatchConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"match/max_angle_ratio", "1", "largest ratio of the angles to the nearest and second nearest (delta)"},
                max_angle_ratio, 0.1, 1.0);
@@ -107,9 +94,7 @@ double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vect
     if (std::isfinite(scale) && scale > 0.0F) scales.push_back(scale);  // a map may claim any size
   }
   if (scales.empty()) return 1.0;
-  const auto middle = scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2);
-  std::nth_element(scales.begin(), middle, scales.end());
-  return static_cast<double>(*middle);
+  return static_cast<double>(upperMedian(scales));
 }
 
 SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,

@@ -5,17 +5,12 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/statistics.h"
+
 namespace visual_localization {
 namespace {
 
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Mean speeds over the shortest spans of at least `min_span_s`.
 std::vector<double> spanSpeeds(const std::vector<PathSample>& samples, double min_span_s) {
@@ -54,9 +49,9 @@ SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_
   std::sort(speeds.begin(), speeds.end());
   const double fast_mps = speeds[speeds.size() * 3 / 4];
   speeds.erase(speeds.begin(), std::lower_bound(speeds.begin(), speeds.end(), kStanding * fast_mps));
-  const double median_mps = median(speeds);
+  const double median_mps = upperMedian(speeds);
   for (double& speed : speeds) speed = std::abs(speed - median_mps);
-  return {median_mps, 1.4826 * median(speeds)};
+  return {median_mps, 1.4826 * upperMedian(speeds)};
 }
 
 std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const DrivingModel& motion) {

@@ -34,8 +34,8 @@ SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_
 
 /// Which samples a vehicle that moves like this can have visited one after the other: the subset with the least
 /// cost, where a step faster than the model costs its squared excess and a sample left out costs a constant
-/// (dynamic programming, like the most probable path of a hidden Markov model). A multipath bend has to be driven
-/// faster than the path it leaves, going out and coming back, and so loses as a whole.
+/// (dynamic programming, like the most probable path of a hidden Markov model). A deviation by multipath has to be
+/// driven faster than the path it leaves, going out and coming back, and so loses as a whole.
 std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const DrivingModel& motion);
 
 }  // namespace visual_localization

@@ -8,6 +8,8 @@
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
 
+#include "base/statistics.h"
+
 namespace visual_localization {
 namespace {
 
@@ -43,9 +45,7 @@ SmoothedPath gridOver(const std::vector<PathSample>& samples, double smoothing_t
 double medianInterval(const std::vector<PathSample>& samples) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < samples.size(); ++i) intervals.push_back(samples[i].time_s - samples[i - 1].time_s);
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return upperMedian(intervals);
 }
 
 /// Integrated squared acceleration, in units of one sample's residual: its weight is the fourth power of the
@@ -96,7 +96,7 @@ void addSample(const GridPosition& where, const Eigen::Vector2d& position_m, dou
   }
 }
 
-/// One round of reweighted least squares.
+/// One iteration of reweighted least squares.
 void solve(const std::vector<PathSample>& samples, const std::vector<double>& weights, double stiffness,
            double speed_mps, double speed_weight, SmoothedPath& grid) {
   const auto points = static_cast<Eigen::Index>(grid.positions_m.size());

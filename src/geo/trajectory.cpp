@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "base/angles.h"
-#include "visual_localization/geo/geodetic_point.h"
+#include "base/time.h"
 
 namespace visual_localization {
 

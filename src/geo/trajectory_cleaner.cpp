@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "base/angles.h"
+#include "base/statistics.h"
+#include "base/time.h"
 #include "geo/consistent_path.h"
 #include "geo/path_smoother.h"
 
@@ -15,7 +17,7 @@ namespace {
 constexpr double kLeastSpeed = 0.05;  // m/s: below this a robot stands
 constexpr double kSpike = 3.0;        // lengths of a node
 
-/// Fixes of one round with their local positions; indices refer to the fixes as given.
+/// Fixes of one recording with their local positions; indices refer to the fixes as given.
 struct UsableFixes {
   std::vector<PathSample> samples;
   std::vector<std::size_t> indices;
@@ -26,13 +28,6 @@ struct Node {
   PathSample sample;
   std::vector<std::size_t> members;  ///< of UsableFixes
 };
-
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, std::vector<FixVerdict>& verdicts) {
   UsableFixes usable;
@@ -55,7 +50,7 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
 double typicalInterval(const std::vector<PathSample>& samples) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < samples.size(); ++i) intervals.push_back(samples[i].time_s - samples[i - 1].time_s);
-  return medianOf(std::move(intervals));
+  return median(std::move(intervals));
 }
 
 PathSample medianSample(const std::vector<PathSample>& samples, const std::vector<std::size_t>& members) {
@@ -67,7 +62,7 @@ PathSample medianSample(const std::vector<PathSample>& samples, const std::vecto
     east.push_back(samples[i].position_m.x());
     north.push_back(samples[i].position_m.y());
   }
-  return {medianOf(std::move(time)), {medianOf(std::move(east)), medianOf(std::move(north))}};
+  return {median(std::move(time)), {median(std::move(east)), median(std::move(north))}};
 }
 
 std::vector<Node> summarise(const std::vector<PathSample>& samples, double node_s) {
@@ -90,7 +85,7 @@ std::vector<PathSample> samplesOf(const std::vector<Node>& nodes) {
   return samples;
 }
 
-/// `rough_mps` stands in where the round is too short to measure its speed over several nodes.
+/// `rough_mps` stands in where the recording is too short to measure its speed over several nodes.
 DrivingModel motionOf(const std::vector<Node>& nodes, double node_s, double rough_mps,
                       const TrajectoryCleanerConfig& config) {
   constexpr double kLongSpan = 4.0;  // nodes
@@ -106,8 +101,8 @@ DrivingModel motionOf(const std::vector<Node>& nodes, double node_s, double roug
   return motion;
 }
 
-/// The feet of a bend look like the path they leave and point the wrong way: a rejected stretch of more than one
-/// node grows by `margin_s` at both ends.
+/// Where multipath begins and ends its fixes look like the path they leave and point the wrong way: a rejected stretch
+/// of more than one node grows by `margin_s` at both ends.
 void widenRejections(const std::vector<Node>& nodes, double margin_s, std::vector<bool>& believed) {
   const std::vector<bool> before = believed;
   for (std::size_t begin = 0; begin < nodes.size(); ++begin) {
@@ -135,7 +130,7 @@ void judgeNodes(const std::vector<Node>& nodes, const std::vector<bool>& believe
       if (distance_m > spike_m) {
         verdict = FixVerdict::kSpike;
       } else if (!believed[n]) {
-        verdict = alone && nodes[n].members.size() == 1 ? FixVerdict::kSpike : FixVerdict::kBend;
+        verdict = alone && nodes[n].members.size() == 1 ? FixVerdict::kSpike : FixVerdict::kMultipath;
       }
     }
   }
@@ -211,7 +206,7 @@ std::string toString(FixVerdict verdict) {
       return "out of order";
     case FixVerdict::kSpike:
       return "spike";
-    case FixVerdict::kBend:
+    case FixVerdict::kMultipath:
       return "multipath";
   }
   return "unknown";

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <numeric>
 
+#include "base/time.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -47,7 +48,7 @@ double MotionConsistency::residual_m() const {
   const auto count = static_cast<double>(points_.size());
   const auto timeOf = [&](std::size_t i) {
     // From the first image on: differences of stamps are exact, stamps as double would not be.
-    return timed ? 1e-9 * static_cast<double>(points_[i].stamp_ns - points_[0].stamp_ns) : static_cast<double>(i);
+    return timed ? secondsBetween(points_[0].stamp_ns, points_[i].stamp_ns) : static_cast<double>(i);
   };
   double mean_time = 0.0;
   Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();

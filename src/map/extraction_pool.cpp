@@ -1,13 +1,12 @@
 #include "map/extraction_pool.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <future>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "base/parallel.h"
 #include "visual_localization/features/front_end.h"
 
 namespace visual_localization {
@@ -40,23 +39,14 @@ ExtractionPool::~ExtractionPool() = default;
 TrainingImage ExtractionPool::extract(const RawImage& image, Worker& worker) const {
   const GreyLevels levels = greyLevelsOf(image.grey);  // named: GCC 13 and later take the result for a part of it
   const cv::Mat& grey = withUsualContrast(image.grey, levels, worker.spread);
-  return {image.place, worker.sift->extract(grey), worker.global.extract(grey),
+  return {image.pose, worker.sift->extract(grey), worker.global.extract(grey),
           previewOf(image.grey, preview_width_px_)};
 }
 
 std::vector<TrainingImage> ExtractionPool::extract(const std::vector<RawImage>& images) {
   std::vector<TrainingImage> extracted(images.size());
-  std::atomic<std::size_t> next{0};
-  const auto work = [&](Worker& worker) {
-    for (std::size_t i = next++; i < images.size(); i = next++) extracted[i] = extract(images[i], worker);
-  };
-  // A future waits for its thread when it goes, and hands on what was thrown there.
-  std::vector<std::future<void>> others;
-  for (std::size_t i = 1; i < std::min(workers_.size(), images.size()); ++i) {
-    others.push_back(std::async(std::launch::async, work, std::ref(workers_[i])));
-  }
-  work(workers_.front());
-  for (std::future<void>& other : others) other.get();
+  parallelFor(images.size(), workers_.size(),
+              [&](std::size_t i, std::size_t worker) { extracted[i] = extract(images[i], workers_[worker]); });
   return extracted;
 }
 

@@ -6,15 +6,15 @@
 
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/global_extractor.h"
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 
-/// An image that has its place, but no features yet.
+/// An image that has its pose, but no features yet.
 struct RawImage {
-  TrainingPlace place;
+  TrainingPose pose;
   cv::Mat grey;  ///< 8-bit, one channel, of the map's size
 };
 

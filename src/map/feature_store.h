@@ -2,10 +2,17 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <list>
 #include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
+#include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/map/training_map.h"
@@ -31,7 +38,7 @@ class FeatureStore {
 /// Everything in memory: nothing is locked, counted or copied.
 class MemoryFeatureStore final : public FeatureStore {
  public:
-  /// Takes what the images looked like; of `images` is left where they were taken.
+  /// Takes what the images looked like; of `images` only the poses are left.
   explicit MemoryFeatureStore(std::vector<TrainingImage>&& images);
 
   std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
@@ -43,6 +50,96 @@ class MemoryFeatureStore final : public FeatureStore {
   std::vector<SiftFeatures> sift_;
   std::vector<GlobalFeatures> global_;
   std::vector<std::vector<std::uint8_t>> previews_;
+};
+
+/// Keeps what was used last, up to a number of bytes. Not thread-safe. `T`: what is kept; never null.
+template <class T>
+class FeatureCache {
+ public:
+  using Pointer = std::shared_ptr<const T>;
+  /// What a value costs besides: nodes of two containers, and the heap's own bookkeeping.
+  static constexpr std::size_t kBookkeeping_bytes = 256;
+
+  explicit FeatureCache(std::size_t limit_bytes) : limit_bytes_(limit_bytes) {}
+
+  /// Null when it is not kept (any more).
+  Pointer find(std::uint64_t key) {
+    const auto found = entry_of_.find(key);
+    if (found == entry_of_.end()) return nullptr;
+    entries_.splice(entries_.begin(), entries_, found->second);
+    return found->second->value;
+  }
+
+  /// Keeps `value`, that takes `bytes`, instead of what was used longest ago. One that is larger than the limit
+  /// or is kept already changes nothing.
+  void add(std::uint64_t key, Pointer value, std::size_t bytes) {
+    bytes += kBookkeeping_bytes;
+    if (bytes > limit_bytes_ || entry_of_.count(key) != 0) return;
+    while (used_bytes_ > limit_bytes_ - bytes) {
+      used_bytes_ -= entries_.back().bytes;
+      entry_of_.erase(entries_.back().key);
+      entries_.pop_back();
+    }
+    entries_.push_front({key, std::move(value), bytes});
+    entry_of_.emplace(key, entries_.begin());
+    used_bytes_ += bytes;
+  }
+
+  std::size_t size() const { return entries_.size(); }
+  std::size_t used_bytes() const { return used_bytes_; }
+
+ private:
+  struct Entry {
+    std::uint64_t key;
+    Pointer value;
+    std::size_t bytes;
+  };
+  std::size_t limit_bytes_;
+  std::size_t used_bytes_ = 0;
+  std::list<Entry> entries_;  ///< the one used last first
+  std::unordered_map<std::uint64_t, typename std::list<Entry>::iterator> entry_of_;
+};
+
+/// Reads what an image looked like from the map's file when it is first needed, verifies it, and keeps what was used
+/// last. What cannot be read, does not agree with its checksum or has another number of features than the map says
+/// counts as without features: the file may be damaged, cut or overwritten at any time. For several threads at once;
+/// one of them reads at a time.
+class FileFeatureStore final : public FeatureStore {
+ public:
+  /// Called with one line about the first image that cannot be read, by the thread that needs it; never again.
+  using Warn = std::function<void(const std::string&)>;
+
+  /// `path`: to be named in the warning. `feature_counts`: of the images. `cache_bytes`: what may be kept; 0
+  /// keeps nothing.
+  FileFeatureStore(sqlite::Database database, std::string path, std::vector<std::uint32_t> feature_counts,
+                   std::size_t cache_bytes, Warn warn);
+
+  std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
+  std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
+  std::vector<std::uint8_t> preview(std::size_t image) const override;
+  std::size_t globalsKept() const override;
+
+ private:
+  template <class T, class Read>
+  std::shared_ptr<const T> get(std::uint64_t key, Read readIt) const;
+  std::shared_ptr<const void> find(std::uint64_t key) const;
+  template <class Decode>
+  auto read(std::size_t image, sqlite::Statement& row, const char* what, Decode decode) const -> decltype(decode(row));
+  void warnOnce(std::size_t image, const char* what, const std::string& reason) const;
+
+  const std::string path_;
+  const std::vector<std::uint32_t> feature_counts_;
+  const std::size_t cache_bytes_;
+  const Warn warn_;
+  mutable std::mutex reading_;  ///< held while the file is read
+  sqlite::Database database_;
+  mutable sqlite::Statement sift_rows_;
+  mutable sqlite::Statement global_rows_;
+  mutable sqlite::Statement preview_rows_;
+  mutable bool warned_ = false;
+
+  mutable std::mutex keeping_;  ///< held while the cache is touched, never while the file is read
+  mutable FeatureCache<void> cache_;
 };
 
 }  // namespace visual_localization

@@ -7,18 +7,20 @@
 
 #include <GeographicLib/Geodesic.hpp>
 
+#include "base/files.h"
+#include "base/statistics.h"
 #include "map/extraction_pool.h"
-#include "map/image_spool.h"
 #include "map/map_writer.h"
 #include "map/pruning_neighbours.h"
 #include "visual_localization/features/front_end.h"
+#include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr int kSmallestSide_px = 16;
 constexpr std::size_t kWaitingPerThread = 4;  ///< images: so that no thread waits long for the slowest
 
 GeodeticPoint datumAt(const GeodeticPoint& position) {
@@ -37,10 +39,7 @@ GeodeticPoint middleOf(const std::vector<Fix>& fixes) {
     longitudes.push_back(fix.position.longitude_deg);
   }
   if (latitudes.empty()) throw std::runtime_error("none of its " + std::to_string(fixes.size()) + " fixes is valid");
-  const auto middle = static_cast<std::ptrdiff_t>(latitudes.size() / 2);
-  std::nth_element(latitudes.begin(), latitudes.begin() + middle, latitudes.end());
-  std::nth_element(longitudes.begin(), longitudes.begin() + middle, longitudes.end());
-  return {latitudes[latitudes.size() / 2], longitudes[longitudes.size() / 2], 0.0};
+  return {upperMedian(latitudes), upperMedian(longitudes), 0.0};
 }
 
 /// A frame around the first believable fix.
@@ -53,18 +52,14 @@ LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig
 }
 
 /// On the earth, since a tangent plane shows its far side near the datum again.
-void requireNear(const GeodeticPoint& place, const GeodeticPoint& datum) {
+void requireNear(const GeodeticPoint& position, const GeodeticPoint& datum) {
   double distance_m = 0.0;
-  GeographicLib::Geodesic::WGS84().Inverse(datum.latitude_deg, datum.longitude_deg, place.latitude_deg,
-                                           place.longitude_deg, distance_m);
+  GeographicLib::Geodesic::WGS84().Inverse(datum.latitude_deg, datum.longitude_deg, position.latitude_deg,
+                                           position.longitude_deg, distance_m);
   if (distance_m <= kFarthestSession_m) return;
   throw std::runtime_error("is " + std::to_string(std::llround(1e-3 * distance_m)) +
                            " km away from where the map begins, and one map reaches " +
                            std::to_string(std::llround(1e-3 * kFarthestSession_m)) + " km: build two maps");
-}
-
-bool isUsable(const cv::Mat& grey) {
-  return grey.type() == CV_8UC1 && grey.rows >= kSmallestSide_px && grey.cols >= kSmallestSide_px;
 }
 
 /// The unpruned features of the images that tell what is noise in image `i`.
@@ -83,11 +78,48 @@ std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<co
 
 }  // namespace
 
+/// Where images wait until all are known, because only then their neighbours are: in memory, or in a temporary file.
+class ImageSpool {
+ public:
+  /// `beside`: the temporary file is made beside this one; empty: in memory. Throws FileError or MapStoreError.
+  explicit ImageSpool(const std::string& beside) {
+    if (beside.empty()) return;
+    file_ = std::make_unique<PartialFile>(beside);
+    writer_ = std::make_unique<MapWriter>(file_->path());
+  }
+
+  /// Throws MapStoreError, for instance when the disk is full.
+  void append(const TrainingImage& image) {
+    if (writer_) {
+      writer_->append(image);
+    } else {
+      in_memory_.push_back(image);
+    }
+  }
+
+  /// All images, in their order, for as long as the spool lives. Ends it. There must be one; throws MapStoreError.
+  std::shared_ptr<const TrainingMap> finish(const MapHeader& header) {
+    if (!writer_) return std::make_shared<const TrainingMap>(header, std::move(in_memory_));
+    writer_->finish(header);
+    writer_.reset();
+    // An image that cannot be read back is no image without features: the map would be wrong without a word.
+    return loadMap(file_->path(), {kSpoolCache_bytes, [](const std::string& reason) { throw MapStoreError(reason); }});
+  }
+
+ private:
+  /// Neighbours are mostly images that were recorded shortly before and after.
+  static constexpr std::size_t kSpoolCache_bytes = std::size_t{64} << 20U;
+
+  std::vector<TrainingImage> in_memory_;
+  std::unique_ptr<PartialFile> file_;
+  std::unique_ptr<MapWriter> writer_;
+};
+
 void MapBuilderConfig::declare(ParameterVisitor& visitor) {
-  visitor.real({"map/min_spacing", "m", "skip an image closer than this to the last kept one of its round"},
+  visitor.real({"map/min_spacing", "m", "skip an image closer than this to the last kept one of its session"},
                min_spacing_m, 0.0, 1000.0);
   visitor.flag(
-      {"map/prune", "", "keep only features that one of the two nearest training images of its round shows too"},
+      {"map/prune", "", "keep only features that one of the two nearest training images of its session shows too"},
       prune);
   visitor.integer({"map/preview_width", "px", "width of the stored previews; 0 stores none"}, preview_width_px, 0, 640);
   visitor.choice(
@@ -131,12 +163,12 @@ bool MapBuilder::wants(std::int64_t stamp_ns) {
     return false;
   }
   last_stamp_ns_ = stamp_ns;
-  const std::optional<TrajectoryPoint> place = report_.sessions.back().trajectory.at(stamp_ns);
-  if (!place) {
+  const std::optional<TrajectoryPoint> point = report_.sessions.back().trajectory.at(stamp_ns);
+  if (!point) {
     ++report_.images_without_position;
     return false;
   }
-  if (last_kept_m_ && (place->position_m - *last_kept_m_).norm() < config_.min_spacing_m) {
+  if (last_kept_m_ && (point->position_m - *last_kept_m_).norm() < config_.min_spacing_m) {
     ++report_.images_too_close;
     return false;
   }
@@ -145,23 +177,23 @@ bool MapBuilder::wants(std::int64_t stamp_ns) {
 
 void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   if (report_.sessions.empty()) throw std::logic_error("map builder: image before the first session");
-  const std::optional<TrajectoryPoint> place = report_.sessions.back().trajectory.at(stamp_ns);
-  if (!place || !isUsable(grey)) {
-    ++(place ? report_.images_unusable : report_.images_without_position);
+  const std::optional<TrajectoryPoint> point = report_.sessions.back().trajectory.at(stamp_ns);
+  if (!point || !isExtractable(grey)) {
+    ++(point ? report_.images_unusable : report_.images_without_position);
     return;
   }
   if (report_.images_kept == 0) header_.image_size = grey.size();
   RawImage image;
-  image.place = {stamp_ns, static_cast<int>(header_.sessions.size()) - 1, place->position_m, place->yaw_rad};
+  image.pose = {stamp_ns, static_cast<int>(header_.sessions.size()) - 1, point->position_m, point->yaw_rad};
   // A camera's or a decoder's buffer does not stay.
   cv::Mat resized;
   image.grey = fitted(grey, header_.image_size, resized).clone();
   waiting_.push_back(std::move(image));
-  last_kept_m_ = place->position_m;
+  last_kept_m_ = point->position_m;
   SessionImages& session = report_.session_images.back();
   if (session.kept == 0) session.recorded = grey.size();
   ++session.kept;
-  session.positions_m.push_back(place->position_m);
+  session.positions_m.push_back(point->position_m);
   ++report_.images_kept;
   if (waiting_.size() >= most_waiting_) extractWaiting();
 }
@@ -174,7 +206,7 @@ void MapBuilder::extractWaiting() {
   waiting_.clear();
 }
 
-void MapBuilder::prune(const Sink& sink, const BuildProgress& progress) {
+void MapBuilder::prune(const Sink& sink, const Progress& progress) {
   if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
   extractWaiting();
   const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
@@ -193,13 +225,13 @@ void MapBuilder::prune(const Sink& sink, const BuildProgress& progress) {
   }
 }
 
-std::shared_ptr<const TrainingMap> MapBuilder::build(const BuildProgress& progress) {
+std::shared_ptr<const TrainingMap> MapBuilder::build(const Progress& progress) {
   std::vector<TrainingImage> images;
   prune([&images](const TrainingImage& image) { images.push_back(image); }, progress);
   return std::make_shared<const TrainingMap>(header_, std::move(images));
 }
 
-void MapBuilder::save(const std::string& path, const BuildProgress& progress) {
+void MapBuilder::save(const std::string& path, const Progress& progress) {
   MapWriter writer(path);
   prune([&writer](const TrainingImage& image) { writer.append(image); }, progress);
   writer.finish(header_);

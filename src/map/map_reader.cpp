@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/text.h"
-#include "map/file_feature_store.h"
+#include "map/feature_store.h"
 #include "map/map_rows.h"
 #include "map/map_schema.h"
 #include "map/sqlite.h"
@@ -94,36 +94,36 @@ std::size_t expectedImages(const sqlite::Database& database, std::int64_t file_s
 }
 
 /// Where the images were taken, verified row by row.
-TrainingPlaces readPlaces(const sqlite::Database& database, std::int64_t file_size, std::size_t session_count,
-                          map_schema::Checksum& checksum) {
-  TrainingPlaces places;
-  places.reserve(expectedImages(database, file_size));
+TrainingPoses readPoses(const sqlite::Database& database, std::int64_t file_size, std::size_t session_count,
+                        map_schema::Checksum& checksum) {
+  TrainingPoses poses;
+  poses.reserve(expectedImages(database, file_size));
   Statement row(database,
                 "SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count FROM images ORDER BY id");
   while (row.step()) {
     const ImageRow image = imageRow(row);
-    requirePlausible(image, places.size(), session_count);
+    requirePlausible(image, poses.size(), session_count);
     image.addTo(checksum);
-    places.add({image.stamp_ns, static_cast<int>(image.session), {image.east_m, image.north_m}, image.yaw_rad},
-               static_cast<std::size_t>(image.feature_count));
+    poses.add({image.stamp_ns, static_cast<int>(image.session), {image.east_m, image.north_m}, image.yaw_rad},
+              static_cast<std::size_t>(image.feature_count));
   }
-  return places;
+  return poses;
 }
 
 /// What is read of every map when it is opened.
 struct Opened {
   MapHeader header;
-  TrainingPlaces places;
+  TrainingPoses poses;
   map_rows::Budget budget;  ///< for the rest
 };
 
-Opened readPlacesAndHeader(const sqlite::Database& database, std::int64_t file_size) {
+Opened readPosesAndHeader(const sqlite::Database& database, std::int64_t file_size) {
   map_rows::Budget budget(file_size);
   ParameterValues meta = readMeta(database, budget);
   const std::int64_t expected = takeChecksum(meta);
   map_schema::Checksum checksum;
   Opened opened{map_schema::toHeader(meta), {}, budget};
-  opened.places = readPlaces(database, file_size, opened.header.sessions.size(), checksum);
+  opened.poses = readPoses(database, file_size, opened.header.sessions.size(), checksum);
   checksum.add(meta);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
   return opened;
@@ -144,17 +144,17 @@ std::uint64_t storedBytes(const TrainingImage& image) {
 
 /// Reads and verifies what all images looked like, one after the other.
 void forEachImage(const sqlite::Database& database, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
-  const TrainingPlaces& places = opened.places;
+  const TrainingPoses& poses = opened.poses;
   const std::string in_order = " ORDER BY image";
   Statement sift(database, map_rows::kSelectSift + in_order);
   Statement global(database, map_rows::kSelectGlobal + in_order);
   Statement preview(database, map_rows::kSelectPreview + in_order);
-  for (std::size_t i = 0; i < places.size(); ++i) {
+  for (std::size_t i = 0; i < poses.size(); ++i) {
     stepTo(i, sift, "features");
     stepTo(i, global, "global features");
     stepTo(i, preview, "bytes of the preview");
-    TrainingImage image{{places.stamps_ns[i], places.sessions[i], places.positions_m[i], places.yaws_rad[i]},
-                        map_rows::siftOf(sift, places.feature_counts[i]),
+    TrainingImage image{{poses.stamps_ns[i], poses.sessions[i], poses.positions_m[i], poses.yaws_rad[i]},
+                        map_rows::siftOf(sift, poses.feature_counts[i]),
                         map_rows::globalOf(global),
                         map_rows::previewOf(preview)};
     opened.budget.spend(storedBytes(image));
@@ -167,7 +167,7 @@ void forEachImage(const sqlite::Database& database, Opened& opened, const std::f
 
 std::shared_ptr<const TrainingMap> readWhole(const sqlite::Database& database, Opened opened) {
   std::vector<TrainingImage> images;
-  images.reserve(opened.places.size());
+  images.reserve(opened.poses.size());
   forEachImage(database, opened, [&images](TrainingImage&& image) { images.push_back(std::move(image)); });
   return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(images));
 }
@@ -197,21 +197,21 @@ auto withMapFile(const std::string& path, Read read) {
 
 std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoading& loading) {
   return withMapFile(path, [&](sqlite::Database&& database, std::int64_t size) {
-    Opened opened = readPlacesAndHeader(database, size);
+    Opened opened = readPosesAndHeader(database, size);
     if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(database, std::move(opened));
-    auto store = std::make_unique<FileFeatureStore>(std::move(database), path, opened.places.feature_counts,
+    auto store = std::make_unique<FileFeatureStore>(std::move(database), path, opened.poses.feature_counts,
                                                     loading.cache_bytes, loading.warn);
-    return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.places), std::move(store));
+    return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.poses), std::move(store));
   });
 }
 
 void checkMap(const std::string& path) {
   withMapFile(path, [](const sqlite::Database& database, std::int64_t size) {
-    Opened opened = readPlacesAndHeader(database, size);
+    Opened opened = readPosesAndHeader(database, size);
     forEachImage(database, opened, [](TrainingImage&&) {});
     requireIntegrity(database);
     // What a map may not be besides.
-    const TrainingMap map(std::move(opened.header), std::move(opened.places),
+    const TrainingMap map(std::move(opened.header), std::move(opened.poses),
                           std::make_unique<MemoryFeatureStore>(std::vector<TrainingImage>()));
   });
 }

@@ -47,7 +47,7 @@ constexpr const char* kSelectPreview = "SELECT image, jpeg, crc32 FROM previews"
 
 // What is in the current row of such a statement. Each throws Refusal when it does not agree with its checksum, and
 // sqlite::Error or std::exception when it is not even of the right form.
-/// Throws Refusal, too, when they are not `count`: what the image's place says, and others rely on.
+/// Throws Refusal, too, when they are not `count`: what the table of images says, and others rely on.
 SiftFeatures siftOf(const sqlite::Statement& row, std::size_t count);
 GlobalFeatures globalOf(const sqlite::Statement& row);
 std::vector<std::uint8_t> previewOf(const sqlite::Statement& row);

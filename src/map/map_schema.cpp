@@ -24,9 +24,9 @@ T take(ParameterValues& meta, const std::string& key) {
 
 int takeSide(ParameterValues& meta, const std::string& key) {
   const auto side = take<std::int64_t>(meta, key);
-  if (side < kMinImageSide_px || side > kMaxImageSide_px) {
+  if (side < kSmallestImageSide_px || side > kMaxImageSide_px) {
     throw std::runtime_error("meta value '" + key + "' = " + std::to_string(side) + " is not in [" +
-                             std::to_string(kMinImageSide_px) + ", " + std::to_string(kMaxImageSide_px) + "]");
+                             std::to_string(kSmallestImageSide_px) + ", " + std::to_string(kMaxImageSide_px) + "]");
   }
   return static_cast<int>(side);
 }

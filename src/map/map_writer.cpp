@@ -49,22 +49,20 @@ class MapWriter::Tables {
 
   void append(const TrainingImage& image) {
     requireStorable(image);
-    looks_->write(static_cast<std::int64_t>(places_.size()), image);
-    places_.add(image, image.sift.size());
+    looks_->write(static_cast<std::int64_t>(poses_.size()), image);
+    poses_.add(image, image.sift.size());
   }
 
   void finish(const MapHeader& header) {
     // Behind each other in the file, because they are read together when the map is opened.
-    for (std::size_t i = 0; i < places_.size(); ++i) writePlace(i);
+    for (std::size_t i = 0; i < poses_.size(); ++i) writePose(i);
     writeMeta(map_schema::toMeta(header));
     looks_.reset();
-    place_row_.reset();
+    pose_row_.reset();
     database_.execute("COMMIT");
     database_.close();
     file_.commit();
   }
-
-  std::size_t size() const { return places_.size(); }
 
  private:
   /// Writes what an image looked like.
@@ -100,32 +98,32 @@ class MapWriter::Tables {
 
   void requireStorable(const TrainingImage& image) const {
     if (image.sift.size() <= static_cast<std::size_t>(map_schema::kMaxFeaturesPerImage)) return;
-    throw sqlite::Error("image " + std::to_string(size()) + " has " + std::to_string(image.sift.size()) +
+    throw sqlite::Error("image " + std::to_string(poses_.size()) + " has " + std::to_string(image.sift.size()) +
                         " features, the limit is " + std::to_string(map_schema::kMaxFeaturesPerImage));
   }
 
-  void writePlace(std::size_t i) {
-    if (!place_row_) place_row_ = std::make_unique<Statement>(database_, "INSERT INTO images VALUES(?,?,?,?,?,?,?)");
+  void writePose(std::size_t i) {
+    if (!pose_row_) pose_row_ = std::make_unique<Statement>(database_, "INSERT INTO images VALUES(?,?,?,?,?,?,?)");
     ImageRow row;
     row.id = static_cast<std::int64_t>(i);
-    row.session = places_.sessions[i];
-    row.stamp_ns = places_.stamps_ns[i];
-    row.east_m = places_.positions_m[i].x();
-    row.north_m = places_.positions_m[i].y();
-    row.yaw_rad = places_.yaws_rad[i];
-    row.feature_count = places_.feature_counts[i];
+    row.session = poses_.sessions[i];
+    row.stamp_ns = poses_.stamps_ns[i];
+    row.east_m = poses_.positions_m[i].x();
+    row.north_m = poses_.positions_m[i].y();
+    row.yaw_rad = poses_.yaws_rad[i];
+    row.feature_count = poses_.feature_counts[i];
     row.addTo(checksum_);
-    place_row_->bind(0, row.id);
-    place_row_->bind(1, row.session);
-    place_row_->bind(2, row.stamp_ns);
-    place_row_->bind(3, row.east_m);
-    place_row_->bind(4, row.north_m);
-    place_row_->bind(5, row.yaw_rad);
-    place_row_->bind(6, row.feature_count);
-    place_row_->run();
+    pose_row_->bind(0, row.id);
+    pose_row_->bind(1, row.session);
+    pose_row_->bind(2, row.stamp_ns);
+    pose_row_->bind(3, row.east_m);
+    pose_row_->bind(4, row.north_m);
+    pose_row_->bind(5, row.yaw_rad);
+    pose_row_->bind(6, row.feature_count);
+    pose_row_->run();
   }
 
-  /// To be called last: the checksum among its values covers the places as well.
+  /// To be called last: the checksum among its values covers the poses as well.
   void writeMeta(ParameterValues meta) {
     checksum_.add(meta);
     meta["checksum"] = checksum_.value();
@@ -142,8 +140,8 @@ class MapWriter::Tables {
   PartialFile file_;
   sqlite::Database database_;
   std::unique_ptr<Looks> looks_;
-  std::unique_ptr<Statement> place_row_;
-  TrainingPlaces places_;
+  std::unique_ptr<Statement> pose_row_;
+  TrainingPoses poses_;
   map_schema::Checksum checksum_;
 };
 
@@ -155,8 +153,6 @@ MapWriter::~MapWriter() = default;
 void MapWriter::append(const TrainingImage& image) {
   withPath(path_, [&] { tables_->append(image); });
 }
-
-std::size_t MapWriter::size() const { return tables_->size(); }
 
 void MapWriter::finish(const MapHeader& header) {
   withPath(path_, [&] { tables_->finish(header); });

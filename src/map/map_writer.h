@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <memory>
 #include <string>
 
@@ -8,7 +7,7 @@
 
 namespace visual_localization {
 
-/// Writes a map image by image, so that it need not fit into memory; only the places are kept until the end. One SQLite
+/// Writes a map image by image, so that it need not fit into memory; only the poses are kept until the end. One SQLite
 /// file, filled in one transaction under a temporary name beside its own: without finish() nothing has happened.
 class MapWriter {
  public:
@@ -20,8 +19,7 @@ class MapWriter {
 
   /// The next image. Throws MapStoreError, for instance when the disk is full or the image has too many features.
   void append(const TrainingImage& image);
-  std::size_t size() const;
-  /// Puts the file in its place. To be called once. Throws MapStoreError.
+  /// Puts the file in its pose. To be called once. Throws MapStoreError.
   void finish(const MapHeader& header);
 
  private:

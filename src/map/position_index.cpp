@@ -114,7 +114,7 @@ NearestGrid::NearestGrid(const std::vector<Eigen::Vector2d>& positions_m, const 
   columns_ = static_cast<std::size_t>(range_m.x() / cell_m_) + 1;
   rows_ = static_cast<std::size_t>(range_m.y() / cell_m_) + 1;
 
-  // Whatever is nearest to a place of the cell is hardly farther from its centre than the centre's own nearest is.
+  // Whatever is nearest to a position of the cell is hardly farther from its centre than the centre's own nearest is.
   const double reach_m = std::sqrt(2.0) * cell_m_ * (1.0 + 1e-9);
   begins_.push_back(0);
   for (std::size_t cell = 0; cell < columns_ * rows_; ++cell) {
@@ -126,8 +126,8 @@ NearestGrid::NearestGrid(const std::vector<Eigen::Vector2d>& positions_m, const 
   }
 }
 
-std::optional<NearestGrid::Found> NearestGrid::nearest(const Eigen::Vector2d& place_m) const {
-  const Eigen::Vector2d cell = (place_m - min_m_) / cell_m_;
+std::optional<NearestGrid::Found> NearestGrid::nearest(const Eigen::Vector2d& position_m) const {
+  const Eigen::Vector2d cell = (position_m - min_m_) / cell_m_;
   const bool inside = cell.x() >= 0.0 && cell.y() >= 0.0 && cell.x() < static_cast<double>(columns_) &&
                       cell.y() < static_cast<double>(rows_);
   if (!inside) return std::nullopt;
@@ -135,9 +135,9 @@ std::optional<NearestGrid::Found> NearestGrid::nearest(const Eigen::Vector2d& pl
   const std::uint32_t begin = begins_[index];
   const std::uint32_t end = begins_[index + 1];
   if (begin == end) return std::nullopt;
-  Found found{candidates_[begin], (positions_m_[candidates_[begin]] - place_m).squaredNorm()};
+  Found found{candidates_[begin], (positions_m_[candidates_[begin]] - position_m).squaredNorm()};
   for (std::uint32_t i = begin + 1; i < end; ++i) {
-    const double squared_m2 = (positions_m_[candidates_[i]] - place_m).squaredNorm();
+    const double squared_m2 = (positions_m_[candidates_[i]] - position_m).squaredNorm();
     if (squared_m2 < found.squared_m2) found = {candidates_[i], squared_m2};
   }
   return found;
@@ -192,7 +192,7 @@ PositionIndex::PositionIndex(std::vector<Eigen::Vector2d> positions_m) {
   tree_ = std::make_unique<Tree>(std::move(positions_m));
   if (tree_->positions().size() > kLargestGrid) return;
   grid_ = std::make_unique<NearestGrid>(
-      tree_->positions(), [this](const Eigen::Vector2d& place_m) { return tree_->nearest(place_m).distance_m; },
+      tree_->positions(), [this](const Eigen::Vector2d& position_m) { return tree_->nearest(position_m).distance_m; },
       [this](const Eigen::Vector2d& centre_m, double radius_m) { return tree_->within(centre_m, radius_m); });
 }
 
@@ -207,6 +207,20 @@ Neighbour PositionIndex::nearest(const Eigen::Vector2d& position_m) const {
 void PositionIndex::nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
   found.clear();
   if (count > 0 && position_m.allFinite()) tree_->nearest(position_m, count, found);
+}
+
+void PositionIndex::nearest(const Eigen::Vector2d& position_m, const Search& search,
+                            const std::function<bool(std::size_t)>& accept, std::vector<Neighbour>& found) const {
+  constexpr std::size_t kMost = 1024;
+  for (std::size_t count = search.count;; count = std::min(4 * count, kMost)) {
+    nearest(position_m, count, found);
+    const bool all = found.size() < count || found.back().distance_m > search.radius_m;
+    const auto is_other = [&](const Neighbour& neighbour) {
+      return neighbour.distance_m > search.radius_m || !accept(neighbour.image);
+    };
+    found.erase(std::remove_if(found.begin(), found.end(), is_other), found.end());
+    if (found.size() >= search.wanted || all || count >= kMost) return;
+  }
 }
 
 }  // namespace visual_localization

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -14,14 +15,14 @@
 namespace visual_localization {
 
 /// The nearest of a few thousand positions in constant time: a grid of cells, each with the positions that are the
-/// nearest of some place in it. Exact; a place that has no cell, or a cell with too many candidates, has no answer
-/// here.
+/// nearest of some position in it. Exact; a position that has no cell, or a cell with too many candidates, has no
+/// answer here.
 class NearestGrid {
  public:
   /// All positions within `radius_m` of `centre_m`, in order of index.
   using Within = std::function<std::vector<std::uint32_t>(const Eigen::Vector2d& centre_m, double radius_m)>;
   /// Distance to the nearest position.
-  using Distance = std::function<double(const Eigen::Vector2d& place_m)>;
+  using Distance = std::function<double(const Eigen::Vector2d& position_m)>;
 
   /// `positions_m` must outlive the grid.
   NearestGrid(const std::vector<Eigen::Vector2d>& positions_m, const Distance& distance, const Within& within);
@@ -31,7 +32,7 @@ class NearestGrid {
     std::uint32_t index = 0;
     double squared_m2 = 0.0;
   };
-  std::optional<Found> nearest(const Eigen::Vector2d& place_m) const;
+  std::optional<Found> nearest(const Eigen::Vector2d& position_m) const;
 
  private:
   const std::vector<Eigen::Vector2d>& positions_m_;
@@ -58,6 +59,17 @@ class PositionIndex {
   /// Into `found`: the `count` nearest, closest first; fewer when there are fewer. A position that is not finite has
   /// none.
   void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const;
+
+  /// How far a search among the nearest positions goes.
+  struct Search {
+    std::size_t wanted = 1;                                     ///< so many that are accepted are enough
+    std::size_t count = 1;                                      ///< positions that are looked at, at least
+    double radius_m = std::numeric_limits<double>::infinity();  ///< and none farther away
+  };
+  /// Into `found`: of the `search.count` nearest those within the radius that `accept` takes, closest first. Where
+  /// fewer than wanted are taken four times as many are looked at, and so on up to 1024.
+  void nearest(const Eigen::Vector2d& position_m, const Search& search, const std::function<bool(std::size_t)>& accept,
+               std::vector<Neighbour>& found) const;
 
  private:
   class Tree;

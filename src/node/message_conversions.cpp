@@ -239,7 +239,7 @@ visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::str
     markers.markers.push_back(emptyHeadings(session, frame_id));
   }
   for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
-    const TrainingPlace image = map.place(i);
+    const TrainingPose image = map.pose(i);
     const auto session = static_cast<std::size_t>(image.session);
     const Eigen::Vector2d direction(std::cos(image.yaw_rad), std::sin(image.yaw_rad));
     markers.markers[2 * session + 1].points.push_back(pointAt(image.position_m));

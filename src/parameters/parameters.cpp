@@ -23,19 +23,14 @@ namespace visual_localization::parameters {
 namespace {
 
 std::string number(double value) {
-  std::ostringstream out;
-  out.precision(std::numeric_limits<double>::max_digits10 - 2);
+  std::ostringstream out = numberStream(std::numeric_limits<double>::digits10);
   out << value;
   return out.str();
 }
 
 std::string range(double min, double max) { return "[" + number(min) + ", " + number(max) + "]"; }
 
-std::string oneOf(const std::vector<std::string>& options) {
-  std::string text;
-  for (const auto& option : options) text += (text.empty() ? "" : ", ") + option;
-  return "one of " + text;
-}
+std::string oneOf(const std::vector<std::string>& options) { return "one of " + joined(options); }
 
 bool contains(const std::vector<std::string>& options, const std::string& value) {
   for (const auto& option : options) {
@@ -113,9 +108,8 @@ class Assigner : public ParameterVisitor {
   void refuseUnknown() const {
     for (const auto& [name, value] : values_) {
       if (known_.count(name) != 0) continue;
-      std::string all;
-      for (const auto& known : known_) all += (all.empty() ? "" : ", ") + known;
-      throw ParameterError("parameter '" + name + "' = " + toString(value) + " is unknown; known are " + all);
+      throw ParameterError("parameter '" + name + "' = " + toString(value) + " is unknown; known are " +
+                           joined(known_));
     }
   }
 

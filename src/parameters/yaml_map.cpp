@@ -9,6 +9,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "base/files.h"
+#include "base/text.h"
 
 namespace visual_localization::parameters {
 namespace {
@@ -103,14 +104,6 @@ YamlMap::YamlMap(const YAML::Node& node, std::string path, std::string prefix)
   for (const auto& entry : *node_) {
     const std::string key = keyOf(entry.first, prefix_.empty() ? path_ : path_ + ": " + quoted(prefix_));
     if (!keys.insert(key).second) refuse(key, "appears twice");
-  }
-}
-
-YamlMap YamlMap::load(const std::string& path) {
-  try {
-    return parse(readFile(path), path);
-  } catch (const FileError& error) {
-    throw ParameterError(error.what());
   }
 }
 
@@ -252,9 +245,7 @@ void YamlMap::requireNoMore() const {
   for (const auto& entry : *node_) {
     const std::string key = entry.first.Scalar();
     if (known_.count(key) != 0) continue;
-    std::string allowed;
-    for (const std::string& name : known_) allowed += (allowed.empty() ? "" : ", ") + name;
-    refuse(key, "is unknown; allowed here: " + allowed);
+    refuse(key, "is unknown; allowed here: " + joined(known_));
   }
 }
 

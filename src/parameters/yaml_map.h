@@ -23,9 +23,7 @@ class YamlMap {
   YamlMap& operator=(YamlMap&&) noexcept;
   ~YamlMap();
 
-  /// The mapping at the top of a file.
-  static YamlMap load(const std::string& path);
-  /// The same of a text; `path` is for messages.
+  /// The mapping at the top of a text; `path` is for messages.
   static YamlMap parse(const std::string& text, const std::string& path);
 
   bool has(const std::string& key) const;

@@ -4,14 +4,12 @@
 #include <memory>
 #include <utility>
 
-#include "map/same_view.h"
 #include "visual_localization/localization/scores.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kNearImages = 16;      ///< looked at
-constexpr std::size_t kMostLookedAt = 1024;  ///< where many images face another way
+constexpr std::size_t kNearImages = 16;  ///< looked at
 constexpr std::size_t kNearCompared = 4;
 
 struct Alike {
@@ -85,16 +83,9 @@ class Search {
   std::vector<Alike> nearImages(std::size_t image) {
     std::vector<Alike> near;
     const auto global = map_.global(image);
-    for (std::size_t count = kNearImages; near.empty(); count *= 4) {
-      map_.nearest(map_.position_m(image), count, neighbours_);
-      for (const Neighbour& neighbour : neighbours_) {
-        const std::size_t other = neighbour.image;
-        if (other == image || neighbour.distance_m > config_.near_m) continue;
-        if (!faceAlike(map_.yaw_rad(image), map_.yaw_rad(other))) continue;
-        near.push_back({other, globally(*global, *map_.global(other))});
-      }
-      const bool all = neighbours_.size() < count || neighbours_.back().distance_m > config_.near_m;
-      if (all || count == kMostLookedAt) break;
+    map_.nearestFacing(image, kNearImages, config_.near_m, neighbours_);
+    for (const Neighbour& neighbour : neighbours_) {
+      near.push_back({neighbour.image, globally(*global, *map_.global(neighbour.image))});
     }
     keepBest(kNearCompared, near);
     return near;
@@ -115,7 +106,7 @@ class Search {
   double globally(const GlobalFeatures& a, const GlobalFeatures& b) const { return global_.compare(a, b).similarity; }
   double bySift(std::size_t a, std::size_t b) const { return sift_.compare(*map_.sift(a), *map_.sift(b)).similarity; }
 
-  /// What the places say saves reading what is too much; what the features are is what counts.
+  /// The feature counts of the map save reading what is too much; the features themselves are what counts.
   bool takeWork(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far) {
     const auto said = [this](std::size_t i) { return map_.featureCount(i); };
     if (workOf(image, near, far, said) > work_left_) return false;
@@ -146,7 +137,7 @@ class Search {
     const auto found = std::lower_bound(result_.images.begin(), result_.images.end(), asked,
                                         [](const AmbiguousImage& a, std::size_t b) { return a.image < b; });
     return found != result_.images.end() && found->image == asked &&
-           map_.place(asked).session == map_.place(image).session;
+           map_.pose(asked).session == map_.pose(image).session;
   }
 
   const TrainingMap& map_;
@@ -161,8 +152,7 @@ class Search {
 
 }  // namespace
 
-AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfig& config,
-                                    const AmbiguityProgress& progress) {
+AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfig& config, const Progress& progress) {
   Search search(map, config);
   for (std::size_t number = 0; number < search.images(); ++number) {
     search.ask(number);

@@ -2,10 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "survey/map_survey.h"
+#include "visual_localization/base/progress.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/localization/score.h"
 #include "visual_localization/map/training_map.h"
@@ -44,13 +44,10 @@ struct AmbiguousPlaces {
   std::size_t global_only = 0;  ///< images that are ambiguous when only global features are compared
 };
 
-/// Called between two images: so many of so many are done.
-using AmbiguityProgress = std::function<void(std::size_t done, std::size_t total)>;
-
 /// Looks for images whose best match far away is nearly as good as the best of their neighbours that face alike, of
 /// whichever session: a twin of another session at the same place is no rival. Global features make a shortlist of far
 /// images, SIFT decides.
 AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfig& config = {},
-                                    const AmbiguityProgress& progress = {});
+                                    const Progress& progress = {});
 
 }  // namespace visual_localization

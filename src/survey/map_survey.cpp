@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "base/statistics.h"
+
 namespace visual_localization {
 namespace {
 
@@ -13,7 +15,7 @@ template <class Use>
 void forEachStep(const TrainingMap& map, Use use) {
   LastOfSession last(map.header().sessions.size());
   for (std::size_t i = 0; i < map.size(); ++i) {
-    auto& before = last[static_cast<std::size_t>(map.place(i).session)];
+    auto& before = last[static_cast<std::size_t>(map.pose(i).session)];
     use(i, before);
     before = i;
   }
@@ -26,14 +28,14 @@ double between_m(const TrainingMap& map, std::size_t a, std::size_t b) {
 SightGrid gridOf(const TrainingMap& map, const OfImage& belongs) {
   SightGrid grid;
   for (std::size_t i = 0; i < map.size(); ++i) {
-    if (belongs(i)) grid.add(map.position_m(i), map.yaw_rad(i), map.place(i).session);
+    if (belongs(i)) grid.add(map.position_m(i), map.yaw_rad(i), map.pose(i).session);
   }
   return grid;
 }
 
-void addImage(const TrainingPlace& place, SessionSurvey& session) {
-  session.first_ns = session.images == 0 ? place.stamp_ns : std::min(session.first_ns, place.stamp_ns);
-  session.last_ns = session.images == 0 ? place.stamp_ns : std::max(session.last_ns, place.stamp_ns);
+void addImage(const TrainingPose& pose, SessionSurvey& session) {
+  session.first_ns = session.images == 0 ? pose.stamp_ns : std::min(session.first_ns, pose.stamp_ns);
+  session.last_ns = session.images == 0 ? pose.stamp_ns : std::max(session.last_ns, pose.stamp_ns);
   ++session.images;
 }
 
@@ -44,21 +46,23 @@ void summarise(std::vector<Step>& steps, std::size_t most_listed, MapSurvey& res
   std::sort(steps.begin(), steps.end(), [](const Step& a, const Step& b) {
     return a.length_m != b.length_m ? a.length_m > b.length_m : a.to < b.to;
   });
-  result.median_step_m = steps[steps.size() / 2].length_m;
-  result.long_step_m = steps[steps.size() / 20].length_m;
+  std::vector<double> lengths_m;
+  for (const Step& step : steps) lengths_m.push_back(step.length_m);
+  result.median_step_m = nearestRank(lengths_m, 0.5);
+  result.long_step_m = nearestRank(lengths_m, 0.95);
   steps.resize(std::min(steps.size(), most_listed));
   result.longest_steps = std::move(steps);
 }
 
-void addStep(const TrainingPlace& place, double length_m, const SightGrid& grid, MapSurvey& result) {
-  SessionSurvey& session = result.sessions[static_cast<std::size_t>(place.session)];
-  const bool shared = grid.otherSession(place.position_m, place.yaw_rad, place.session);
+void addStep(const TrainingPose& pose, double length_m, const SightGrid& grid, MapSurvey& result) {
+  SessionSurvey& session = result.sessions[static_cast<std::size_t>(pose.session)];
+  const bool shared = grid.otherSession(pose.position_m, pose.yaw_rad, pose.session);
   result.driven_m += length_m;
   session.driven_m += length_m;
   if (shared) session.shared_m += length_m;
-  result.heading_m[static_cast<std::size_t>(octantOf(place.yaw_rad))] += length_m;
-  if (!grid.oppositeWay(place.position_m, place.yaw_rad)) result.one_way_m += length_m;
-  if (grid.earlierSession(place.position_m, place.yaw_rad, place.session)) return;
+  result.heading_m[static_cast<std::size_t>(octantOf(pose.yaw_rad))] += length_m;
+  if (!grid.oppositeWay(pose.position_m, pose.yaw_rad)) result.one_way_m += length_m;
+  if (grid.earlierSession(pose.position_m, pose.yaw_rad, pose.session)) return;
   result.route_m += length_m;
   if (shared) result.shared_m += length_m;
 }
@@ -70,7 +74,7 @@ std::vector<Stretch> stretchesOf(const TrainingMap& map, double gap_m, const OfI
   std::vector<Stretch> stretches;
   std::vector<std::optional<std::size_t>> open(map.header().sessions.size());  // of each session: into `stretches`
   forEachStep(map, [&](std::size_t i, std::optional<std::size_t> before) {
-    const int session = map.place(i).session;
+    const int session = map.pose(i).session;
     auto& current = open[static_cast<std::size_t>(session)];
     if (!belongs(i)) {
       current.reset();
@@ -100,18 +104,18 @@ MapSurvey survey(const TrainingMap& map, const SurveyConfig& config) {
   result.cells = all.cells();
   std::vector<Step> steps;
   forEachStep(map, [&](std::size_t i, std::optional<std::size_t> before) {
-    const TrainingPlace place = map.place(i);
-    SessionSurvey& session = result.sessions[static_cast<std::size_t>(place.session)];
-    addImage(place, session);
+    const TrainingPose pose = map.pose(i);
+    SessionSurvey& session = result.sessions[static_cast<std::size_t>(pose.session)];
+    addImage(pose, session);
     if (is_weak(i)) ++result.weak_images;
     if (!before) return;
     const double length_m = between_m(map, *before, i);
     session.path_m += length_m;
-    steps.push_back({place.session, *before, i, length_m});
+    steps.push_back({pose.session, *before, i, length_m});
     if (length_m > config.gap_m) {
       ++result.gaps;
     } else {
-      addStep(place, length_m, all, result);
+      addStep(pose, length_m, all, result);
     }
   });
   summarise(steps, config.most_listed, result);
@@ -119,7 +123,7 @@ MapSurvey survey(const TrainingMap& map, const SurveyConfig& config) {
                                [&](std::size_t i) { return !all.oppositeWay(map.position_m(i), map.yaw_rad(i)); });
   const SightGrid sound = gridOf(map, [&](std::size_t i) { return !is_weak(i); });
   result.weak = stretchesOf(map, config.gap_m, is_weak, [&](std::size_t i) {
-    return sound.otherSession(map.position_m(i), map.yaw_rad(i), map.place(i).session);
+    return sound.otherSession(map.position_m(i), map.yaw_rad(i), map.pose(i).session);
   });
   return result;
 }

@@ -13,7 +13,7 @@
 
 namespace visual_localization {
 
-/// What one recorded round brought.
+/// What one session brought.
 struct SessionSurvey {
   std::size_t images = 0;
   std::int64_t first_ns = 0;  ///< earliest stamp

@@ -14,8 +14,8 @@ constexpr int kOctants = 8;
 /// Which eighth of the compass, counter-clockwise: 0 is centred on east, 2 on north.
 int octantOf(double yaw_rad);
 
-/// Which sessions have looked which way at which place: cells of a grid, eight directions in each. "Here" is a cell and
-/// those around it, so within about 4 m. Takes time in proportion to the logarithm of the number of cells, wherever
+/// Which sessions have looked which way at which position: cells of a grid, eight directions in each. "Here" is a cell
+/// and those around it, so within about 4 m. Takes time in proportion to the logarithm of the number of cells, wherever
 /// they lie.
 class SightGrid {
  public:

@@ -64,6 +64,34 @@ TEST(ParallelFor, WorksOnSeveralTasksAtOnce) {
   EXPECT_TRUE(met);
 }
 
+TEST(ParallelFor, NoTwoTasksHaveTheSameWorkerAtTheSameTime) {
+  for (const std::size_t threads : {1, 2, 7}) {
+    std::vector<std::atomic<int>> busy(threads);
+    std::atomic<bool> shared{false};
+    std::atomic<int> done{0};
+    parallelFor(200, threads, [&](std::size_t, std::size_t worker) {
+      if (worker >= threads || ++busy[worker] != 1) {
+        shared = true;
+        return;
+      }
+      std::this_thread::yield();
+      --busy[worker];
+      ++done;
+    });
+    EXPECT_FALSE(shared) << threads << " threads";
+    EXPECT_EQ(done, 200);
+  }
+}
+
+TEST(ParallelFor, OneThreadIsTheCallingOneUnlessItReports) {
+  std::thread::id working;
+  const auto task = [&working](std::size_t) { working = std::this_thread::get_id(); };
+  parallelFor(3, 1, task);
+  EXPECT_EQ(working, std::this_thread::get_id());
+  parallelFor(3, 1, task, [](std::size_t, std::size_t) {});
+  EXPECT_NE(working, std::this_thread::get_id());
+}
+
 TEST(ParallelFor, AnErrorEndsTheWorkAndIsThrownAgain) {
   std::atomic<int> done{0};
   const auto task = [&done](std::size_t i) {

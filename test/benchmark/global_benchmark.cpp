@@ -4,7 +4,6 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/imgproc.hpp>
 
-#include "visual_localization/features/global_extractor.h"
 #include "visual_localization/features/global_features.h"
 
 namespace visual_localization::benchmarks {

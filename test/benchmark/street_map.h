@@ -41,21 +41,21 @@ class StreetMap {
   /// Training image `i`.
   TrainingImage image(std::size_t i) const {
     TrainingImage image;
-    static_cast<TrainingPlace&>(image) = place(i);
+    static_cast<TrainingPose&>(image) = place(i);
     image.sift = view(i, 0);
     image.global = global(i);
     return image;
   }
 
   /// East-west streets first, up and down like a plough, then those from south to north.
-  TrainingPlace place(std::size_t i) const {
+  TrainingPose place(std::size_t i) const {
     const std::size_t length_m = (streets_ - 1) * kBlock_m;
     const std::size_t street = i / length_m;
     const bool back = street % 2 == 1;
     const auto along_m = static_cast<double>(back ? length_m - i % length_m : i % length_m);
     const auto across_m = static_cast<double>(street % streets_ * kBlock_m);
     const bool northwards = street >= streets_;
-    TrainingPlace place;
+    TrainingPose place;
     place.stamp_ns = static_cast<std::int64_t>(i) * 1'000'000'000;
     place.position_m = northwards ? Eigen::Vector2d(across_m, along_m) : Eigen::Vector2d(along_m, across_m);
     place.yaw_rad = (northwards ? 0.5 * kPi : 0.0) + (back ? kPi : 0.0);

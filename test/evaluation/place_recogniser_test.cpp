@@ -1,3 +1,5 @@
+#include "evaluation/place_recogniser.h"
+
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -10,7 +12,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "evaluation/place_recogniser_factory.h"
 #include "test/evaluation/place_rows.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -65,17 +66,18 @@ TEST_P(EveryRecogniser, DarknessIsSurvived) {
   EXPECT_EQ(test::drive(*recogniser, 20, 20, 60, closed()).training_image, 39u);
 }
 
-TEST_P(EveryRecogniser, ResetForgetsEverything) {
+TEST_P(EveryRecogniser, SharesNothingWithOthersOfItsKind) {
   std::mt19937 generator(11);
-  const auto used = make();
-  for (std::size_t at = 30; at < 45; ++at) used->update(test::noisy(test::rowAt(at, 60, closed()), 0.4, generator));
-  used->reset();
-  const auto fresh = make();
+  const auto alone = make();
+  std::vector<Recognition> expected;
+  for (std::size_t step = 0; step < 12; ++step) expected.push_back(alone->update(test::rowAt(5 + step, 60, closed())));
+  const auto other = make();
+  const auto beside = make();
   for (std::size_t step = 0; step < 12; ++step) {
-    const Recognition after_reset = used->update(test::rowAt(5 + step, 60, closed()));
-    const Recognition expected = fresh->update(test::rowAt(5 + step, 60, closed()));
-    EXPECT_EQ(after_reset.training_image, expected.training_image);
-    EXPECT_EQ(after_reset.confidence, expected.confidence);
+    other->update(test::noisy(test::rowAt(30 + step, 60, closed()), 0.4, generator));
+    const Recognition answer = beside->update(test::rowAt(5 + step, 60, closed()));
+    EXPECT_EQ(answer.training_image, expected[step].training_image);
+    EXPECT_EQ(answer.confidence, expected[step].confidence);
   }
 }
 

@@ -1,10 +1,9 @@
-#include "evaluation/result_tables.h"
-
 #include <map>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "evaluation/result_folder.h"
 #include "test/evaluation/small_experiment.h"
 
 namespace visual_localization {

@@ -1,8 +1,8 @@
-#include "evaluation/trust.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "evaluation/metrics.h"
 
 namespace visual_localization {
 namespace {

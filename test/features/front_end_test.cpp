@@ -137,7 +137,7 @@ TEST_F(FrontEndTest, ADullImageIsTheSameInTraining) {
     FrontEnd front_end = makeFrontEnd();
     front_end.setImage(0, dull);
     ExtractionPool pool(SiftConfig(), kNativeSift, 0, 1);
-    const std::vector<TrainingImage> training = pool.extract({RawImage{TrainingPlace(), dull}});
+    const std::vector<TrainingImage> training = pool.extract({RawImage{TrainingPose(), dull}});
     EXPECT_EQ(front_end.sift().descriptors(), training.front().sift.descriptors()) << gain;
     EXPECT_EQ(front_end.global().wgii, training.front().global.wgii) << gain;
   }

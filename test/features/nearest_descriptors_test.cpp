@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "features/angle_ratio_test.h"
 #include "test/support/synthetic.h"
 
 namespace visual_localization {

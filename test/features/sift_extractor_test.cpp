@@ -58,6 +58,20 @@ TEST(SiftExtractor, HonoursTheLargestNumberOfFeatures) {
   EXPECT_GE(features.size(), 40u);
 }
 
+TEST(SiftExtractor, TakesTheSmallestImageAndNoneSmaller) {
+  EXPECT_TRUE(isExtractable(cv::Mat(kSmallestImageSide_px, kSmallestImageSide_px, CV_8UC1, cv::Scalar(0))));
+  EXPECT_FALSE(isExtractable(cv::Mat(kSmallestImageSide_px - 1, 320, CV_8UC1)));
+  EXPECT_FALSE(isExtractable(cv::Mat(320, kSmallestImageSide_px - 1, CV_8UC1)));
+  EXPECT_FALSE(isExtractable(cv::Mat(320, 240, CV_8UC3)));
+  EXPECT_NO_THROW(makeSiftExtractor(SiftConfig())->extract(cv::Mat(16, 16, CV_8UC1, cv::Scalar(0))));
+  try {
+    requireExtractable(cv::Mat(15, 320, CV_8UC1));
+    ADD_FAILURE() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "image is 320x15 pixels, must be at least 16x16");
+  }
+}
+
 TEST(SiftExtractor, RefusesWhatIsNoGreyImage) {
   const auto extractor = makeSiftExtractor(SiftConfig());
   EXPECT_THROW(extractor->extract(cv::Mat()), std::invalid_argument);

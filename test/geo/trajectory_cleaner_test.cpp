@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "base/time.h"
 
 namespace visual_localization {
 namespace {
@@ -146,8 +147,8 @@ TEST(TrajectoryCleaner, DropsMultipathBendsInAnyDirection) {
     const auto errors_m = errorsOf(cleaned, block, 250.0);
     EXPECT_LT(meanOf(errors_m), 0.25) << "direction " << direction;
     EXPECT_LT(largestOf(errors_m), 2.0) << "direction " << direction;
-    EXPECT_GT(countOf(cleaned, FixVerdict::kBend), 30u);
-    EXPECT_LT(countOf(cleaned, FixVerdict::kBend), 250u);
+    EXPECT_GT(countOf(cleaned, FixVerdict::kMultipath), 30u);
+    EXPECT_LT(countOf(cleaned, FixVerdict::kMultipath), 250u);
   }
 }
 
@@ -178,7 +179,7 @@ TEST(TrajectoryCleaner, LeavesLongGapsOpen) {
 TEST(TrajectoryCleaner, ARobotMayStandStill) {
   const Path stopping = [](double time_s) { return block(time_s < 50.0 ? time_s : std::max(50.0, time_s - 60.0)); };
   const CleanedTrajectory cleaned = clean(record(stopping, 250.0));
-  EXPECT_LT(countOf(cleaned, FixVerdict::kBend), 60u);
+  EXPECT_LT(countOf(cleaned, FixVerdict::kMultipath), 60u);
   EXPECT_LT(meanOf(errorsOf(cleaned, stopping, 250.0)), 0.2);
   for (const TrajectoryPoint& point : cleaned.trajectory.points()) ASSERT_TRUE(std::isfinite(point.yaw_rad));
 }

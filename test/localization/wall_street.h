@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
-#include "visual_localization/features/global_extractor.h"
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/map/training_map.h"
 

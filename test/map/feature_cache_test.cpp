@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "map/file_feature_store.h"
+#include "map/feature_store.h"
 
 namespace visual_localization {
 namespace {

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "test/support/temporary_folder.h"
-#include "visual_localization/features/global_extractor.h"
+#include "visual_localization/features/global_features.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
@@ -136,8 +136,8 @@ TEST(MapBuilder, RoundsBecomeSessionsOfOneMap) {
   }
   const auto map = builder.build();
   EXPECT_EQ(map->size(), 6U);
-  EXPECT_EQ(map->place(2).session, 0);
-  EXPECT_EQ(map->place(3).session, 1);
+  EXPECT_EQ(map->pose(2).session, 0);
+  EXPECT_EQ(map->pose(3).session, 1);
 }
 
 TEST(MapBuilder, ARoundIsPrunedAsIfItWereAlone) {

@@ -45,6 +45,39 @@ TEST(TrainingMap, ManyImagesAtOnePlaceKeepTheirOrder) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(found[i].image, i);
 }
 
+TEST(TrainingMap, NearestFacingAreTheOthersThatLookTheSameWay) {
+  std::vector<TrainingImage> images = imagesAt({{0.0, 0.0}, {1.0, 0.0}, {2.0, 0.0}, {3.0, 0.0}, {9.0, 0.0}});
+  images[1].yaw_rad = 3.0;
+  images[2].yaw_rad = 1.5;
+  const TrainingMap map(test::exampleHeader(), images);
+  std::vector<Neighbour> found;
+  const auto facing = [&](std::size_t i, std::size_t count, double radius_m) {
+    map.nearestFacing(i, count, radius_m, found);
+    std::vector<std::size_t> others;
+    for (const Neighbour& neighbour : found) others.push_back(neighbour.image);
+    return others;
+  };
+  EXPECT_THAT(facing(0, 5, 100.0), testing::ElementsAre(2, 3, 4));
+  EXPECT_THAT(facing(0, 5, 3.0), testing::ElementsAre(2, 3));
+  EXPECT_THAT(facing(0, 3, 100.0), testing::ElementsAre(2));
+  EXPECT_THAT(facing(0, 2, 100.0), testing::ElementsAre(2, 3, 4)) << "none of two, so eight are looked at";
+  EXPECT_THAT(facing(0, 2, 1.5), testing::IsEmpty());
+  EXPECT_THAT(facing(1, 5, 100.0), testing::ElementsAre(2));
+}
+
+TEST(TrainingMap, NearestFacingLooksAtAThousandAtMost) {
+  for (const std::size_t before : {1022U, 1023U}) {
+    std::vector<Eigen::Vector2d> positions{{0.0, 0.0}};
+    for (std::size_t i = 1; i <= before; ++i) positions.emplace_back(0.001 * static_cast<double>(i), 0.0);
+    positions.emplace_back(2.0, 0.0);
+    std::vector<TrainingImage> images = imagesAt(positions);
+    for (std::size_t i = 1; i <= before; ++i) images[i].yaw_rad = 3.0;
+    std::vector<Neighbour> found;
+    TrainingMap(test::exampleHeader(), images).nearestFacing(0, 16, 100.0, found);
+    EXPECT_EQ(found.size(), before == 1022U ? 1U : 0U);
+  }
+}
+
 TEST(TrainingMap, CollinearImages) {
   std::vector<Eigen::Vector2d> positions;
   for (int i = 0; i < 50; ++i) positions.emplace_back(2.0 * i, 0.0);
@@ -80,7 +113,7 @@ TEST(TrainingMap, OrderOfImagesDoesNotMatterForTheNearest) {
   for (double x = -60.0; x < 60.0; x += 3.7) {
     const Neighbour a = map.nearest({x, 0.3 * x});
     const Neighbour b = shuffled.nearest({x, 0.3 * x});
-    EXPECT_EQ(map.place(a.image).stamp_ns, shuffled.place(b.image).stamp_ns);
+    EXPECT_EQ(map.pose(a.image).stamp_ns, shuffled.pose(b.image).stamp_ns);
     EXPECT_DOUBLE_EQ(a.distance_m, b.distance_m);
   }
 }

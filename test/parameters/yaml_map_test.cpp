@@ -156,11 +156,11 @@ TEST(YamlMap, RefusesATextThatIsNoMapping) {
   }
 }
 
-TEST(YamlMap, NamesAFileThatCannotBeRead) {
+TEST(ReadYaml, NamesAFileThatCannotBeRead) {
   const test::TemporaryFolder folder;
   for (const std::string& path : {folder / "absent.yaml", folder.path()}) {
     try {
-      YamlMap::load(path);
+      readYaml(path);
       ADD_FAILURE() << "accepted: " << path;
     } catch (const ParameterError& error) {
       EXPECT_THAT(error.what(), StartsWith(path + ": cannot be read: "));

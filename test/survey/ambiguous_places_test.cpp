@@ -101,9 +101,9 @@ TEST(AmbiguousPlaces, EndsWhenThereIsNoWorkLeft) {
 
 TEST(AmbiguousPlaces, WorkIsWhatTheFeaturesAreAndNotWhatThePlacesClaim) {
   std::vector<TrainingImage> images = street(0);
-  TrainingPlaces places;
-  for (const TrainingImage& image : images) places.add(image, 1);
-  const TrainingMap map(test::exampleHeader(), places, std::make_unique<MemoryFeatureStore>(std::move(images)));
+  TrainingPoses poses;
+  for (const TrainingImage& image : images) poses.add(image, 1);
+  const TrainingMap map(test::exampleHeader(), poses, std::make_unique<MemoryFeatureStore>(std::move(images)));
   AmbiguityConfig config;
   config.most_work = 200'000;
   EXPECT_GT(findAmbiguousPlaces(map, config).unasked, 40U);

@@ -30,8 +30,12 @@ constexpr const char* kOpenCvSift = "opencv";
 /// Those of this build.
 const std::vector<std::string>& siftBackends();
 
-/// Throws std::invalid_argument, naming what is wrong, unless the image is 8-bit with one channel and at least
-/// 16 x 16 pixels.
+/// Width and height of the smallest image that features are extracted from.
+constexpr int kSmallestImageSide_px = 16;
+
+/// Whether the image is 8-bit with one channel and large enough.
+bool isExtractable(const cv::Mat& grey);
+/// Throws std::invalid_argument, naming what is wrong, unless it is.
 void requireExtractable(const cv::Mat& grey);
 
 /// Image in, SIFT features out. Not thread-safe: one extractor a thread.
@@ -46,12 +50,10 @@ class SiftExtractor {
   }
   /// The same into `features`, whose memory is used again.
   virtual void extract(const cv::Mat& grey, SiftFeatures& features) = 0;
-  /// Which of siftBackends() this is.
-  virtual const char* backend() const = 0;
 };
 
 /// Throws std::invalid_argument when there is no such backend. Where the package was built without Highway, "native"
-/// gives OpenCV's extractor, and its backend() says so.
+/// gives OpenCV's extractor.
 std::unique_ptr<SiftExtractor> makeSiftExtractor(const SiftConfig& config, const std::string& backend = kNativeSift);
 
 }  // namespace visual_localization

@@ -18,9 +18,4 @@ struct Fix {
   bool has_fix = false;       ///< the receiver's own claim
 };
 
-/// Seconds from `from_ns` to `to_ns`.
-inline double secondsBetween(std::int64_t from_ns, std::int64_t to_ns) {
-  return static_cast<double>(to_ns - from_ns) * 1e-9;
-}
-
 }  // namespace visual_localization

@@ -17,7 +17,7 @@ enum class FixVerdict {
   kNoFix,       ///< the receiver said so, or the coordinates are not finite or out of range
   kDisordered,  ///< stamp not after the one before
   kSpike,       ///< single outlier
-  kBend,        ///< slow deviation from the smooth path although the receiver claims a fix (multipath)
+  kMultipath,   ///< slow deviation from the smooth path although the receiver claims a fix: a reflected signal
 };
 
 std::string toString(FixVerdict verdict);
@@ -46,7 +46,7 @@ struct CleanedTrajectory {
 };
 
 /// Turns raw DGPS fixes into the smooth path that a robot at nearly constant speed must have driven (Kronfeld et
-/// al. (journal), section 6, where people did this by hand): drops invalid fixes, spikes and multipath bends,
+/// al. (journal), section 6, where people did this by hand): drops invalid fixes, spikes and multipath,
 /// closes gaps along the smoothest path between their ends. Throws std::runtime_error, in one line, when fewer
 /// than two believable fixes remain.
 CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFrame& frame,

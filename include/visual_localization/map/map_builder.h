@@ -10,6 +10,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "visual_localization/base/progress.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
@@ -21,7 +22,7 @@ class ExtractionPool;
 class ImageSpool;
 struct RawImage;
 
-/// How a recorded round becomes training images.
+/// How a recording becomes training images.
 struct MapBuilderConfig {
   double min_spacing_m = 0.0;              ///< skip an image closer than this to the last kept one of its session
   bool prune = true;                       ///< keep only features seen again in a neighbouring training image
@@ -34,7 +35,7 @@ struct MapBuilderConfig {
   void declare(ParameterVisitor& visitor);
 };
 
-/// What one recorded round brought.
+/// What one session brought.
 struct SessionImages {
   std::string name;
   std::size_t kept = 0;
@@ -54,7 +55,7 @@ struct MapBuildReport {
   std::size_t images_unusable = 0;          ///< could not be decoded, or too small
   std::size_t features_extracted = 0;
   std::size_t features_kept = 0;              ///< after pruning
-  std::vector<CleanedTrajectory> sessions;    ///< one per recorded round
+  std::vector<CleanedTrajectory> sessions;    ///< one per session
   std::vector<SessionImages> session_images;  ///< the same
 };
 
@@ -65,16 +66,13 @@ struct MapBuilderResources {
   std::string spool_beside;
 };
 
-/// Called while a map is made: so many of so many images are done.
-using BuildProgress = std::function<void(std::size_t done, std::size_t total)>;
-
-/// Collects rounds and makes the map: first all fixes of a session, then its images in order of time.
+/// Collects sessions and makes the map: first all fixes of a session, then its images in order of time.
 class MapBuilder {
  public:
   explicit MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources = {});
   ~MapBuilder();
 
-  /// Starts a round: cleans its fixes. The first believable fix ever given becomes the datum. Throws
+  /// Starts a session: cleans its fixes. The first believable fix ever given becomes the datum. Throws
   /// std::runtime_error naming the session when the fixes are not enough for a path, or when it lies farther than
   /// kFarthestSession_m from the datum.
   void beginSession(const std::string& name, const std::vector<Fix>& fixes);
@@ -84,10 +82,10 @@ class MapBuilder {
   /// `grey`: 8-bit, one channel; resized to the size of the first image. An empty one counts as unusable.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
   /// Prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
-  std::shared_ptr<const TrainingMap> build(const BuildProgress& progress = {});
-  /// The same map as a file, written image by image: what is in memory does not grow with the map, but for the places.
+  std::shared_ptr<const TrainingMap> build(const Progress& progress = {});
+  /// The same map as a file, written image by image: what is in memory does not grow with the map, but for the poses.
   /// Throws MapStoreError besides.
-  void save(const std::string& path, const BuildProgress& progress = {});
+  void save(const std::string& path, const Progress& progress = {});
 
   /// Its features are complete when the map is built.
   const MapBuildReport& report() const { return report_; }
@@ -97,7 +95,7 @@ class MapBuilder {
  private:
   using Sink = std::function<void(const TrainingImage& image)>;
   void extractWaiting();
-  void prune(const Sink& sink, const BuildProgress& progress);
+  void prune(const Sink& sink, const Progress& progress);
 
   MapBuilderConfig config_;
   MapBuildReport report_;

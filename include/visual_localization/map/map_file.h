@@ -24,7 +24,7 @@ constexpr int kDefaultMapCache_mb = 256;
 
 /// How a map is opened.
 struct MapLoading {
-  /// A file that is not larger than this is read into memory and verified as a whole. Of a larger one only the places
+  /// A file that is not larger than this is read into memory and verified as a whole. Of a larger one only the poses
   /// are read at once; features are read when they are first needed, verified then, and kept up to this limit.
   std::size_t cache_bytes = std::size_t{kDefaultMapCache_mb} << 20U;
   /// Called once, with one line, when features of an open map cannot be read; by the thread that needs them.

@@ -21,7 +21,7 @@ class FeatureStore;
 class PositionIndex;
 
 /// Where and when an image of the map was taken.
-struct TrainingPlace {
+struct TrainingPose {
   std::int64_t stamp_ns = 0;
   int session = 0;                                       ///< which of MapHeader::sessions it came from
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north in the map frame
@@ -29,14 +29,14 @@ struct TrainingPlace {
 };
 
 /// One image of the map: where it was taken and what it looked like.
-struct TrainingImage : TrainingPlace {
+struct TrainingImage : TrainingPose {
   SiftFeatures sift;                       ///< after pruning
   GlobalFeatures global;                   ///< of the whole image
   std::vector<std::uint8_t> preview_jpeg;  ///< small grey JPEG for people; may be empty
 };
 
 /// Where the images of a map were taken, image by image: 40 bytes each, all that is always in memory of a large map.
-struct TrainingPlaces {
+struct TrainingPoses {
   std::vector<Eigen::Vector2d> positions_m;  ///< east, north in the map frame
   std::vector<double> yaws_rad;              ///< direction of travel, 0 = east, counter-clockwise
   std::vector<std::int64_t> stamps_ns;
@@ -45,18 +45,18 @@ struct TrainingPlaces {
 
   std::size_t size() const { return stamps_ns.size(); }
   void reserve(std::size_t count);
-  void add(const TrainingPlace& place, std::size_t feature_count);
+  void add(const TrainingPose& pose, std::size_t feature_count);
 };
 
-/// The places of these images, in their order.
-TrainingPlaces placesOf(const std::vector<TrainingImage>& images);
+/// The poses of these images, in their order.
+TrainingPoses posesOf(const std::vector<TrainingImage>& images);
 
 /// What holds for all images of a map.
 struct MapHeader {
   GeodeticPoint datum;                ///< origin of the map frame
   cv::Size image_size;                ///< pixels; live images are resized to it
   SiftConfig sift;                    ///< how features were extracted
-  std::vector<std::string> sessions;  ///< names of the recorded rounds
+  std::vector<std::string> sessions;  ///< their names
 };
 
 /// Axis-aligned rectangle in the map frame, metres. A range may be zero (a single straight street).
@@ -72,7 +72,7 @@ struct Neighbour {
   double distance_m = 0.0;
 };
 
-/// The map: places of the training images in memory with a spatial index over them, and what the images looked like
+/// The map: poses of the training images in memory with a spatial index over them, and what the images looked like
 /// wherever the store has it. Immutable, so that it can be shared between threads.
 class TrainingMap {
  public:
@@ -80,23 +80,23 @@ class TrainingMap {
   /// not positive, a position or heading is not finite or a session index is out of range.
   TrainingMap(MapHeader header, std::vector<TrainingImage> images);
   /// A map whose images' looks are in `store`. Throws like the other one.
-  TrainingMap(MapHeader header, TrainingPlaces places, std::unique_ptr<const FeatureStore> store);
+  TrainingMap(MapHeader header, TrainingPoses poses, std::unique_ptr<const FeatureStore> store);
   ~TrainingMap();
   TrainingMap(const TrainingMap&) = delete;
   TrainingMap& operator=(const TrainingMap&) = delete;
 
   const MapHeader& header() const { return header_; }
   const LocalFrame& frame() const { return frame_; }
-  std::size_t size() const { return places_.size(); }
+  std::size_t size() const { return poses_.size(); }
   /// Bounding box of the training positions.
   const Area& area() const { return area_; }
 
   // Of training image `i`, which is below size().
-  const Eigen::Vector2d& position_m(std::size_t i) const { return places_.positions_m[i]; }
-  double yaw_rad(std::size_t i) const { return places_.yaws_rad[i]; }
-  TrainingPlace place(std::size_t i) const;
+  const Eigen::Vector2d& position_m(std::size_t i) const { return poses_.positions_m[i]; }
+  double yaw_rad(std::size_t i) const { return poses_.yaws_rad[i]; }
+  TrainingPose pose(std::size_t i) const;
   /// Number of SIFT features, without reading them.
-  std::size_t featureCount(std::size_t i) const { return places_.feature_counts[i]; }
+  std::size_t featureCount(std::size_t i) const { return poses_.feature_counts[i]; }
 
   // What training image `i` looked like, for as long as the map and the pointer live. Read from the map's file when it
   // is not in memory: what cannot be read there, or does not agree with its checksum, counts as without features.
@@ -115,11 +115,15 @@ class TrainingMap {
   std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const;
   /// The same into memory that is there already.
   void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const;
+  /// Into `found`: of the `count` training images nearest to image `i`, itself included, the others that are within
+  /// `radius_m` and face alike, so that they can show the same; closest first. Where none does four times as many are
+  /// looked at, and so on up to 1024.
+  void nearestFacing(std::size_t i, std::size_t count, double radius_m, std::vector<Neighbour>& found) const;
 
  private:
   MapHeader header_;
   LocalFrame frame_;
-  TrainingPlaces places_;
+  TrainingPoses poses_;
   std::unique_ptr<const FeatureStore> store_;
   Area area_;
   std::unique_ptr<const PositionIndex> index_;

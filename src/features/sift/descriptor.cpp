@@ -1,5 +1,4 @@
-// Compiled once for each kind of CPU, see nearest_descriptors.cpp.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+// Compiled once for each kind of CPU, see highway.h.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "features/sift/descriptor.cpp"
 #include "features/sift/descriptor.h"
@@ -8,11 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include <hwy/cache_control.h>
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-
-#include "features/sift/gradient-inl.h"
+#include "features/highway.h"
+#include "features/sift/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace visual_localization {

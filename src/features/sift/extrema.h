@@ -53,7 +53,7 @@ class SiftExtremaSearch {
   Workspace work_;
 };
 
-/// A place in scale space that is described once for each of its orientations.
+/// A point in scale space that is described once for each of its orientations.
 struct SiftPoint {
   int octave = 0;          ///< 0: twice the image's resolution
   int level = 0;           ///< whose gradients describe it: 1 .. octave_layers

@@ -51,7 +51,7 @@ SiftKeypoint keypointOf(const SiftPoint& point) {
   return {point.x_px * px, point.y_px * px, 2.0F * point.sigma_px * px, point.angle_deg};
 }
 
-/// What makes two points the same feature; larger ones first where several are at the same place.
+/// What makes two points the same feature; larger ones first where several are at the same position.
 auto identity(const SiftPoint& point) {
   const SiftKeypoint keypoint = keypointOf(point);
   return std::make_tuple(keypoint.x_px, keypoint.y_px, -keypoint.size_px, keypoint.angle_deg);

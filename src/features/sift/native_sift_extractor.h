@@ -21,7 +21,6 @@ class NativeSiftExtractor : public SiftExtractor {
   using SiftExtractor::extract;
   /// Allocates nothing once it has seen the largest image and the most features.
   void extract(const cv::Mat& grey, SiftFeatures& features) override;
-  const char* backend() const override { return kNativeSift; }
 
  private:
   void detect();

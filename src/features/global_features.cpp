@@ -1,4 +1,4 @@
-#include "visual_localization/features/global_extractor.h"
+#include "visual_localization/features/global_features.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "features/global_histograms.h"
-#include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_extractor.h"
 
 namespace visual_localization {

@@ -1,4 +1,4 @@
-#include "visual_localization/features/global_extractor.h"
+#include "visual_localization/features/global_features.h"
 
 #include <numeric>
 #include <stdexcept>
@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
-#include "visual_localization/features/global_features.h"
 
 namespace visual_localization {
 namespace {

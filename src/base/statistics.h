@@ -1,0 +1,29 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace visual_localization {
+
+/// The middle value; of an even number the mean of the two in the middle; 0 of none.
+double median(std::vector<double> values);
+
+/// The middle value; of an even number the larger of the two in the middle, so that it is always one of the values.
+/// Datum and cleaned path of a map and the scale of a match rest on this one: with median() every map and every track
+/// would change. Reorders `values`, of which there must be one.
+template <class T>
+T upperMedian(std::vector<T>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The smallest value that at least `share` of all are not above (nearest rank): always one of the values. Reorders
+/// `values`, of which there must be one.
+double nearestRank(std::vector<double>& values, double share);
+
+/// Value below which `share` of the sorted values lie, linear between neighbours.
+double quantile(const std::vector<double>& sorted, double share);
+
+}  // namespace visual_localization
