@@ -1,69 +1,81 @@
 #include "apps/app_support.h"
 
-#include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <iostream>
-#include <new>
-#include <string>
-#include <vector>
+#include <utility>
 
-#include "base/files.h"
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char** environ;
 
 namespace visual_localization::apps {
 namespace {
 
-int fail(const CLI::App& app, std::string reason, int code) {
-  std::replace(reason.begin(), reason.end(), '\n', ' ');
-  std::cout.flush();
-  std::cerr << app.get_name() << ": " << reason << std::endl;
-  return code;
-}
+namespace fs = std::filesystem;
 
-/// roslaunch appends "__name:=..." and "__log:=..." to every command line.
-std::vector<const char*> withoutRosNames(int argc, char** argv) {
-  std::vector<const char*> arguments(argv, argv + argc);
-  const auto is_ros_name = [](const char* argument) {
-    const std::string text = argument;
-    return text.rfind("__", 0) == 0 && text.find(":=") != std::string::npos;
-  };
-  arguments.erase(std::remove_if(arguments.begin(), arguments.end(), is_ros_name), arguments.end());
-  return arguments;
-}
+constexpr std::chrono::milliseconds kDelay{2000};
+constexpr std::chrono::milliseconds kInterval{100};
+constexpr std::size_t kWidth = 40;
 
-int runBody(const CLI::App& app, const std::function<void()>& body) {
-  try {
-    body();
-    std::cout.flush();
-    return std::cout ? kSuccess : fail(app, "standard output cannot be written", kFailedRun);
-  } catch (const UsageError& error) {
-    return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
-  } catch (const std::bad_alloc&) {
-    return fail(app, "out of memory", kFailedRun);
-  } catch (const std::exception& error) {
-    return fail(app, error.what(), kFailedRun);
+std::string readAll(int descriptor) {
+  std::string text;
+  std::array<char, 4096> block{};
+  for (;;) {
+    const ssize_t count = ::read(descriptor, block.data(), block.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return text;
+    text.append(block.data(), static_cast<std::size_t>(count));
   }
+}
+
+std::string lastLine(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text.substr(text.rfind('\n') + 1);
+}
+
+/// Starts a program whose standard error goes to `error_output`; 0, or the error number.
+int start(std::vector<std::string> command, int error_output, pid_t& process) {
+  std::vector<char*> words;
+  for (std::string& word : command) words.push_back(word.data());
+  words.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, error_output, STDERR_FILENO);
+  const int error = ::posix_spawn(&process, words.front(), &actions, nullptr, words.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+/// What a program writes to its standard error until it ends. Throws std::runtime_error with the reason when it cannot
+/// be started or fails.
+std::string errorOutputOf(const std::vector<std::string>& command) {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::strerror(errno));
+  pid_t process = 0;
+  const int error = start(command, pipe[1], process);
+  ::close(pipe[1]);
+  const std::string output = readAll(pipe[0]);
+  ::close(pipe[0]);
+  // The file exists: what is missing is the interpreter that its first line names.
+  if (error != 0)
+    throw std::runtime_error(std::string("cannot be started: is Python 3 installed? ") + std::strerror(error));
+  int status = 0;
+  while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (status != 0) throw std::runtime_error("failed: " + (output.empty() ? "without a message" : lastLine(output)));
+  return output;
 }
 
 }  // namespace
 
-int runProgram(CLI::App& app, int argc, char** argv, const std::function<void()>& body) {
-  app.set_version_flag("--version", app.get_name() + " " + VISUAL_LOCALIZATION_VERSION);
-  try {
-    const auto arguments = withoutRosNames(argc, argv);
-    app.parse(static_cast<int>(arguments.size()), arguments.data());
-  } catch (const CLI::Success& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
-  }
-  removePartialFilesOnSignals();
-  return runBody(app, body);
-}
-
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs) {
-  namespace fs = std::filesystem;
   for (const std::string& input : inputs) {
     std::error_code none;
     const bool same_name = !input.empty() && fs::weakly_canonical(output, none) == fs::weakly_canonical(input, none);
@@ -82,6 +94,47 @@ std::string humanSize(double bytes) {
   }
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), unit == 0 ? "%.0f %s" : "%.1f %s", bytes, units[unit]);
+  return text.data();
+}
+
+void runScript(const std::string& name, const std::vector<std::string>& arguments) {
+  const fs::path script = fs::read_symlink("/proc/self/exe").parent_path() / name;
+  std::vector<std::string> command{script.string(), "--"};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  std::fflush(stdout);
+  try {
+    if (!fs::exists(script)) throw std::runtime_error("is missing");
+    std::cerr << errorOutputOf(command);  // warnings
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(script.string() + ": " + error.what());
+  }
+}
+
+ProgressBar::ProgressBar(std::string label)
+    : label_(std::move(label)), terminal_(::isatty(STDERR_FILENO) == 1), start_(Clock::now()), next_(start_ + kDelay) {}
+
+ProgressBar::~ProgressBar() {
+  if (visible_) std::fputs("\r\033[K", stderr);
+}
+
+void ProgressBar::show(std::size_t done, std::size_t total) {
+  if (!terminal_ || total == 0 || Clock::now() < next_) return;
+  next_ = Clock::now() + kInterval;
+  visible_ = true;
+  const std::size_t filled = kWidth * done / total;
+  const std::string bar = std::string(filled, '#') + std::string(kWidth - filled, '.');
+  std::fprintf(stderr, "\r%s [%s] %zu/%zu%s\033[K", label_.c_str(), bar.c_str(), done, total,
+               timeLeft(done, total).c_str());
+  std::fflush(stderr);
+}
+
+/// From the pace so far; nothing while that says little.
+std::string ProgressBar::timeLeft(std::size_t done, std::size_t total) const {
+  if (done == 0) return "";
+  const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
+  const auto left_s = static_cast<long>(elapsed_s * static_cast<double>(total - done) / static_cast<double>(done));
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), ", %ld:%02ld left", left_s / 60, left_s % 60);
   return text.data();
 }
 

@@ -1,33 +1,51 @@
 #pragma once
 
-#include <functional>
+#include <chrono>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
-/// What all programs share: options in, one line of error out.
+/// What several programs share.
 namespace visual_localization::apps {
 
-/// The command line asks for something that makes no sense. Ends the program with kBadUsage.
+/// The command line asks for something that makes no sense; the program ends with exit code 2.
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
-
-constexpr int kSuccess = 0;
-constexpr int kFailedRun = 1;
-constexpr int kBadUsage = 2;
-
-/// Adds --version, parses the command line and runs `body`; returns the program's exit code. Whatever goes wrong
-/// becomes one line on standard error. Unfinished output disappears, also when the program is interrupted.
-int runProgram(CLI::App& app, int argc, char** argv, const std::function<void()>& body);
 
 /// Throws UsageError, naming the option, when the file to write is one of the files to read.
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 
 /// "1.2 kB", "3.4 MB".
 std::string humanSize(double bytes);
+
+/// Runs a script that is installed beside this program with these arguments, and shows its warnings. Throws
+/// std::runtime_error, in one line, with the last line that the script wrote to its standard error.
+void runScript(const std::string& name, const std::vector<std::string>& arguments);
+
+/// A line on standard error that shows how far a long step is and how long it will take. It appears only on a terminal
+/// and only when the step takes more than two seconds, and leaves nothing behind.
+class ProgressBar {
+ public:
+  explicit ProgressBar(std::string label);
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void show(std::size_t done, std::size_t total);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::string timeLeft(std::size_t done, std::size_t total) const;
+
+  std::string label_;
+  bool terminal_;
+  bool visible_ = false;
+  Clock::time_point start_;
+  Clock::time_point next_;
+};
 
 }  // namespace visual_localization::apps

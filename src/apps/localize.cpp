@@ -1,4 +1,4 @@
-// Localises the images of a recorded round against a map: what the robot does, without a robot.
+// Localises a recorded drive against a map: what the robot does, without a robot.
 
 #include <cstdio>
 #include <iostream>
@@ -6,10 +6,8 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "apps/app_support.h"
-#include "apps/progress_bar.h"
+#include "apps/command_line.h"
 #include "base/files.h"
 #include "evaluation/drive_order.h"
 #include "evaluation/metrics.h"
@@ -26,44 +24,7 @@
 namespace visual_localization::apps {
 namespace {
 
-struct Options {
-  std::string map;
-  std::string bag;
-  std::string output;
-  std::string config;
-  std::string tracker;
-  std::string features;
-  std::string image_topic = "/stereo/left/image_raw";
-  std::string truth_topic;
-  std::optional<std::int64_t> particles;
-  std::optional<std::int64_t> seed;
-  std::optional<std::int64_t> map_cache_mb;
-  std::size_t start_index = 0;
-  std::optional<std::size_t> kidnap_at;
-  std::optional<std::size_t> kidnap_to;
-};
-
-void declareOptions(CLI::App& app, Options& options) {
-  app.add_option("--map", options.map, "Map file")->required();
-  app.add_option("--bag", options.bag, "Recorded round")->required();
-  app.add_option("--output", options.output, "Track to write, CSV")->required();
-  app.add_option("--config", options.config, "Parameters, YAML (see config/localizer.yaml)");
-  app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
-  app.add_option("--features", options.features, "Features (parameter 'features')");
-  app.add_option("--particles", options.particles, "Number of particles of the tracker");
-  app.add_option("--seed", options.seed, "Seed of the random generator (parameter 'seed')");
-  app.add_option("--map-cache-mb", options.map_cache_mb, "Features of a larger map are read when needed (parameter)");
-  app.add_option("--start-index", options.start_index, "First image; the round is closed, indices wrap");
-  auto* at = app.add_option("--kidnap-at", options.kidnap_at, "Jump after so many images ...");
-  auto* to = app.add_option("--kidnap-to", options.kidnap_to, "... to this image of the round");
-  at->needs(to);
-  to->needs(at);
-  app.add_option("--image-topic", options.image_topic, "Raw topic, or the one that '/compressed' belongs to")
-      ->capture_default_str();
-  app.add_option("--truth-topic", options.truth_topic, "NavSatFix topic with true positions: prints the error");
-}
-
-NodeParameters configOf(const Options& options) {
+NodeParameters configOf(const LocalizeOptions& options) {
   // The file is the node's: most of what only the node needs is checked, but of no use here.
   NodeParameters config;
   if (!options.config.empty()) {
@@ -88,7 +49,7 @@ NodeParameters configOf(const Options& options) {
   return config;
 }
 
-std::vector<std::size_t> orderOf(const Options& options, std::size_t images) {
+std::vector<std::size_t> orderOf(const LocalizeOptions& options, std::size_t images) {
   std::optional<Kidnapping> kidnapping;
   if (options.kidnap_at) kidnapping = Kidnapping{*options.kidnap_at, *options.kidnap_to};
   try {
@@ -155,7 +116,7 @@ std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index
   return std::nullopt;
 }
 
-void run(const Options& options) {
+void run(const LocalizeOptions& options) {
   const NodeParameters config = configOf(options);
   requireNoInput("--output", options.output, {options.map, options.bag, options.config});
   PartialFile output(options.output);  // fails now, not after the run
@@ -198,9 +159,5 @@ void run(const Options& options) {
 }  // namespace visual_localization::apps
 
 int main(int argc, char** argv) {
-  using namespace visual_localization::apps;
-  CLI::App app("Localises the images of a recorded round against a map and writes the track as CSV.", "localize");
-  Options options;
-  declareOptions(app, options);
-  return runProgram(app, argc, argv, [&options] { run(options); });
+  return visual_localization::apps::runProgram(argc, argv, visual_localization::apps::run);
 }

@@ -7,63 +7,32 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
-#include <optional>
+#include <stdexcept>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
 #include "apps/app_support.h"
-#include "apps/progress_bar.h"
-#include "apps/trajectory_plot.h"
+#include "apps/command_line.h"
+#include "apps/map_plot.h"
 #include "base/files.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/image_conversion.h"
 
-namespace visual_localization {
+namespace visual_localization::apps {
 namespace {
-
-struct Options {
-  std::vector<std::string> bags;
-  std::string image_topic = "/stereo/left/image_raw";
-  std::string fix_topic = "/gps/fix";
-  std::string output;
-  std::string config;
-  std::string plot;
-  std::optional<double> min_spacing_m;
-  std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
-  std::optional<std::string> sift_backend;
-};
-
-void declareOptions(CLI::App& app, Options& options) {
-  app.add_option("--bag", options.bags, "a recorded round; repeat it for more rounds in one map")
-      ->required()
-      ->take_all()
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  app.add_option("--image-topic", options.image_topic, "raw or compressed images; \"/compressed\" is found by itself")
-      ->capture_default_str();
-  app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix")->capture_default_str();
-  app.add_option("--output", options.output, "the map file to write")->required();
-  app.add_option("--config", options.config, "YAML file of parameters");
-  app.add_option("--min-spacing", options.min_spacing_m, "metres between kept images; overrides the configuration");
-  app.add_option("--threads", options.threads, "for extraction; the map does not depend on it")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1024}))
-      ->capture_default_str();
-  app.add_option("--sift-backend", options.sift_backend, "native or opencv; overrides the configuration");
-  app.add_option("--plot", options.plot, "draw fixes and cleaned path into this SVG file");
-}
 
 void overrideWith(MapBuilderConfig& config, const char* option, const char* parameter, const ParameterValue& value) {
   try {
     assignParameters(config, {{parameter, value}});
   } catch (const ParameterError& error) {
-    throw apps::UsageError(std::string(option) + ": " + error.what());
+    throw UsageError(std::string(option) + ": " + error.what());
   }
 }
 
-MapBuilderConfig readConfig(const Options& options) {
+MapBuilderConfig readConfig(const MapBuilderOptions& options) {
   MapBuilderConfig config;
   if (!options.config.empty()) {
     const ParameterValues values = parameters::readYaml(options.config);
@@ -79,24 +48,24 @@ MapBuilderConfig readConfig(const Options& options) {
 }
 
 /// Bags of the same name in different folders get different session names.
-std::string sessionName(const std::string& bag, const std::vector<apps::PlottedRound>& rounds) {
+std::string sessionName(const std::string& bag, const std::vector<PlottedSession>& sessions) {
   const std::string stem = std::filesystem::path(bag).stem().string();
   std::string name = stem;
   for (std::size_t n = 2;; ++n) {
     bool taken = false;
-    for (const apps::PlottedRound& round : rounds) taken = taken || round.name == name;
+    for (const PlottedSession& session : sessions) taken = taken || session.name == name;
     if (!taken) return name;
     name = stem + "_" + std::to_string(n);
   }
 }
 
-/// The map would be twice as large and show nothing more, while every place seemed to be seen by two sessions.
+/// The map would be twice as large and show nothing more, while two sessions seemed to see every position.
 void requireDifferent(const std::vector<std::string>& bags) {
   for (std::size_t i = 0; i < bags.size(); ++i) {
     for (std::size_t earlier = 0; earlier < i; ++earlier) {
       std::error_code none;
       if (std::filesystem::equivalent(bags[i], bags[earlier], none)) {
-        throw apps::UsageError("--bag " + bags[i] + " is the same file as --bag " + bags[earlier]);
+        throw UsageError("--bag " + bags[i] + " is the same file as --bag " + bags[earlier]);
       }
     }
   }
@@ -115,7 +84,7 @@ cv::Mat decode(const BagImage& image, const std::string& where, bool& warned) {
 
 void addImages(MapBuilder& builder, const BagReader& bag, const std::string& topic) {
   const BagImages images = bag.images(topic);
-  apps::ProgressBar bar("extracting features");
+  ProgressBar bar("extracting features");
   bool warned = false;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const BagImage image = images.read(i);
@@ -126,33 +95,33 @@ void addImages(MapBuilder& builder, const BagReader& bag, const std::string& top
   }
 }
 
-void addRound(MapBuilder& builder, const std::string& path, const Options& options,
-              std::vector<apps::PlottedRound>& rounds) {
+void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOptions& options,
+                std::vector<PlottedSession>& sessions) {
   const BagReader bag(path);
-  apps::PlottedRound round{sessionName(path, rounds), bag.fixes(options.fix_topic), {}, {}};
+  PlottedSession session{sessionName(path, sessions), bag.fixes(options.fix_topic), {}, {}};
   try {
-    builder.beginSession(round.name, round.fixes);
+    builder.beginSession(session.name, session.fixes);
   } catch (const std::exception& error) {
     throw BagError(path + ": " + options.fix_topic + ": " + error.what());
   }
-  round.cleaned = builder.report().sessions.back();
-  rounds.push_back(std::move(round));
+  session.cleaned = builder.report().sessions.back();
+  sessions.push_back(std::move(session));
   addImages(builder, bag, options.image_topic);
 }
 
-void printFixes(const apps::PlottedRound& round) {
+void printFixes(const PlottedSession& session) {
   constexpr std::array<FixVerdict, 5> verdicts{FixVerdict::kKept, FixVerdict::kNoFix, FixVerdict::kDisordered,
                                                FixVerdict::kSpike, FixVerdict::kMultipath};
-  std::cout << round.name << ": " << round.fixes.size() << " fixes:";
+  std::cout << session.name << ": " << session.fixes.size() << " fixes:";
   for (const FixVerdict verdict : verdicts) {
-    const auto count = std::count(round.cleaned.verdicts.begin(), round.cleaned.verdicts.end(), verdict);
+    const auto count = std::count(session.cleaned.verdicts.begin(), session.cleaned.verdicts.end(), verdict);
     std::cout << (verdict == FixVerdict::kKept ? " " : ", ") << count << ' ' << toString(verdict);
   }
-  std::cout << "; " << round.cleaned.gaps_closed << " gaps closed, the longest " << round.cleaned.longest_gap_s
-            << " s; path " << round.cleaned.trajectory.length() << " m\n";
+  std::cout << "; " << session.cleaned.gaps_closed << " gaps closed, the longest " << session.cleaned.longest_gap_s
+            << " s; path " << session.cleaned.trajectory.length() << " m\n";
 }
 
-/// What one round brought, and whether its images had to be bent into shape.
+/// What one session brought, and whether its images were distorted to fit.
 void printImages(const SessionImages& session, cv::Size in_map) {
   std::cout << session.name << ": " << session.kept << " images";
   if (session.kept != 0) std::cout << " of " << session.recorded.width << 'x' << session.recorded.height << " px";
@@ -161,7 +130,7 @@ void printImages(const SessionImages& session, cv::Size in_map) {
     const double stretch = stretchOf(session.recorded, in_map);
     constexpr double kHarmless = 0.02;
     if (std::abs(stretch - 1.0) > kHarmless) {
-      std::cout << "; that distorts them (width by " << std::setprecision(2) << stretch << std::setprecision(1)
+      std::cout << "; this distorts them (width times " << std::setprecision(2) << stretch << std::setprecision(1)
                 << "): only the same camera will recognise them";
     }
   }
@@ -174,12 +143,12 @@ void printSessionImages(const std::vector<SessionImages>& sessions) {
   for (const SessionImages& session : sessions) printImages(session, first->recorded);
 }
 
-void printReport(const MapBuildReport& report, const std::vector<apps::PlottedRound>& rounds) {
+void printReport(const MapBuildReport& report, const std::vector<PlottedSession>& sessions) {
   std::cout << std::fixed << std::setprecision(1);
-  for (const apps::PlottedRound& round : rounds) printFixes(round);
-  if (rounds.size() > 1) printSessionImages(report.session_images);
+  for (const PlottedSession& session : sessions) printFixes(session);
+  if (sessions.size() > 1) printSessionImages(report.session_images);
   std::cout << "images: " << report.images_kept << " kept, " << report.images_without_position << " without position, "
-            << report.images_too_close << " too close, " << report.images_disordered << " disordered, "
+            << report.images_too_close << " too close, " << report.images_disordered << " out of order, "
             << report.images_unusable << " unusable\n";
   const double dropped = report.features_extracted == 0 ? 0.0
                                                         : 100.0 - 100.0 * static_cast<double>(report.features_kept) /
@@ -196,7 +165,7 @@ std::size_t fixesKept(const MapBuildReport& report) {
   return kept;
 }
 
-void printSummary(const Options& options, const MapBuildReport& report, double seconds) {
+void printSummary(const MapBuilderOptions& options, const MapBuildReport& report, double seconds) {
   std::size_t fixes = 0;
   std::size_t gaps = 0;
   for (const CleanedTrajectory& session : report.sessions) {
@@ -206,48 +175,56 @@ void printSummary(const Options& options, const MapBuildReport& report, double s
   std::cout << options.output << ": " << report.images_kept << " images, " << fixesKept(report) << " of " << fixes
             << " fixes, " << gaps << " gaps closed, features " << report.features_extracted << " -> "
             << report.features_kept << ", "
-            << apps::humanSize(static_cast<double>(std::filesystem::file_size(options.output))) << ", " << seconds
-            << " s\n";
+            << humanSize(static_cast<double>(std::filesystem::file_size(options.output))) << ", " << seconds << " s\n";
 }
 
 /// Throws FileError when `path` cannot be created or replaced.
 void requireWritable(const std::string& path) { const PartialFile attempt(path); }
 
-void buildMap(const Options& options) {
-  const auto start = std::chrono::steady_clock::now();
-  // Fails before the work when the results could not be written after it.
-  const MapBuilderConfig config = readConfig(options);
+/// Refuses what could only fail after the work.
+void requireOutputs(const MapBuilderOptions& options) {
   std::vector<std::string> inputs = options.bags;
   inputs.push_back(options.config);
   requireDifferent(options.bags);
-  apps::requireNoInput("--output", options.output, inputs);
+  requireNoInput("--output", options.output, inputs);
   inputs.push_back(options.output);
-  if (!options.plot.empty()) apps::requireNoInput("--plot", options.plot, inputs);
+  if (!options.plot.empty()) requireNoInput("--plot", options.plot, inputs);
   requireWritable(options.output);
   if (!options.plot.empty()) requireWritable(options.plot);
+}
+
+/// The map is written whatever becomes of its plot.
+void draw(const MapBuilderOptions& options, const std::vector<PlottedSession>& sessions, const LocalFrame& frame) {
+  try {
+    drawMapPlot(options.plot, sessions, frame);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(error.what() + ("; the map is written without a plot: " + options.output));
+  }
+}
+
+void buildMap(const MapBuilderOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const MapBuilderConfig config = readConfig(options);
+  requireOutputs(options);
   MapBuilder builder(config, {options.threads, options.output});
-  std::vector<apps::PlottedRound> rounds;
-  for (const std::string& bag : options.bags) addRound(builder, bag, options, rounds);
+  std::vector<PlottedSession> sessions;
+  for (const std::string& bag : options.bags) addSession(builder, bag, options, sessions);
   {
-    apps::ProgressBar bar("pruning features");
+    ProgressBar bar("pruning features");
     builder.save(options.output, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
   }
-  for (std::size_t r = 0; r < rounds.size(); ++r) {
-    rounds[r].images_m = builder.report().session_images[r].positions_m;
-  }
-  if (!options.plot.empty()) writeFile(options.plot, apps::plotTrajectories(rounds, builder.frame()));
-  printReport(builder.report(), rounds);
+  printReport(builder.report(), sessions);
   printSummary(options, builder.report(),
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  for (std::size_t s = 0; s < sessions.size(); ++s) {
+    sessions[s].images_m = builder.report().session_images[s].positions_m;
+  }
+  if (!options.plot.empty()) draw(options, sessions, builder.frame());
 }
 
 }  // namespace
-}  // namespace visual_localization
+}  // namespace visual_localization::apps
 
 int main(int argc, char** argv) {
-  CLI::App app("Builds a map from recorded rounds: images and DGPS fixes in, training images with positions out.",
-               "map_builder");
-  visual_localization::Options options;
-  visual_localization::declareOptions(app, options);
-  return visual_localization::apps::runProgram(app, argc, argv, [&options] { visual_localization::buildMap(options); });
+  return visual_localization::apps::runProgram(argc, argv, visual_localization::apps::buildMap);
 }

@@ -9,14 +9,15 @@
 
 namespace visual_localization::apps {
 
-/// What is known about a map beside what is in it.
+/// What was found out about a map.
 struct MapFindings {
   SurveyConfig config;
   MapSurvey survey;
-  std::optional<AmbiguousPlaces> ambiguity;  ///< only if it was looked for
+  std::optional<AmbiguousPlaces> ambiguity;  ///< only if it was checked
 };
 
-/// One line an image. `weak` is 1 for few features, `ambiguous` 1 for a place that has a twin; empty: not looked for.
+/// One line per image. `weak` is 1 for few features, `ambiguous` 1 for an image that looks like one far away and empty
+/// when that was not checked.
 std::string toCsv(const TrainingMap& map, const MapFindings& findings);
 
 /// The path of each session, weak stretches and gaps as lines, the images as points; WGS84.

@@ -44,7 +44,7 @@ std::string timeOf(std::int64_t stamp_ns, const char* format) {
   return text.data();
 }
 
-/// The end of a round on the same day needs no date.
+/// The end of a session on the same day needs no date.
 std::string spanOf(const SessionSurvey& session) {
   const char* const date = "%Y-%m-%d";
   const bool same_day = timeOf(session.first_ns, date) == timeOf(session.last_ns, date);
@@ -66,7 +66,7 @@ std::string percent(double part, double whole) {
   return text.str();
 }
 
-std::string placeOf(const TrainingMap& map, std::size_t image) {
+std::string positionText(const TrainingMap& map, std::size_t image) {
   // To a tenth, and without the sign of zero.
   const Eigen::Vector2d tenths = (10.0 * map.position_m(image)).array().round() / 10.0 + 0.0;
   std::ostringstream text;
@@ -77,7 +77,7 @@ std::string placeOf(const TrainingMap& map, std::size_t image) {
 /// Whether the localizer will have all of it in memory unless told otherwise.
 std::string whereItsFeaturesAre(double file_bytes) {
   return file_bytes <= static_cast<double>(MapLoading().cache_bytes)
-             ? "features are read at the start"
+             ? "features are read at start"
              : "features are read when needed (map_cache_mb: " + std::to_string(kDefaultMapCache_mb) + ")";
 }
 
@@ -88,11 +88,11 @@ void printFile(std::ostream& out, const std::string& path, const TrainingMap& ma
       << packageVersionOf(path) << '\n'
       << key("size") << humanSize(bytes) << " on disk, " << whereItsFeaturesAre(bytes) << '\n'
       << key("datum") << std::setprecision(9) << header.datum.latitude_deg << " deg, " << header.datum.longitude_deg
-      << " deg, " << header.datum.altitude_m << " m; positions below are (east, north) of it in metres\n"
+      << " deg, " << header.datum.altitude_m << " m; positions below are metres (east, north) from it\n"
       << key("images") << map.size() << " of " << header.image_size.width << 'x' << header.image_size.height << " px\n"
       << key("sift") << std::setprecision(6) << header.sift.octave_layers << " layers, contrast "
       << header.sift.contrast_threshold << ", edge " << header.sift.edge_threshold << ", sigma " << header.sift.sigma_px
-      << " px, at most " << (header.sift.max_features == 0 ? "all" : std::to_string(header.sift.max_features))
+      << " px, " << (header.sift.max_features == 0 ? "all" : "at most " + std::to_string(header.sift.max_features))
       << " features\n";
 }
 
@@ -134,8 +134,8 @@ void printCoverage(std::ostream& out, const TrainingMap& map, const MapSurvey& s
       << key("coverage") << metres(area.range().x()) << " from west to east (" << metres(area.min_m.x(), 1) << " to "
       << metres(area.max_m.x(), 1) << "), " << metres(area.range().y()) << " from south to north ("
       << metres(area.min_m.y(), 1) << " to " << metres(area.max_m.y(), 1) << ")\n"
-      << key("") << "route " << metres(survey.route_m) << ", each direction by itself; " << metres(survey.driven_m)
-      << " driven\n"
+      << key("") << "route " << metres(survey.route_m) << ", each direction counted separately; "
+      << metres(survey.driven_m) << " driven\n"
       << key("") << metres(survey.shared_m) << " of the route (" << percent(survey.shared_m, survey.route_m)
       << ") seen by more than one session\n"
       << key("") << std::fixed << std::setprecision(0) << static_cast<double>(survey.cells) * cell_m2 << " m2 in "
@@ -151,14 +151,14 @@ void printDensity(std::ostream& out, const TrainingMap& map, const MapFindings& 
   }
   if (survey.route_m > 0.0) {
     out << std::fixed << std::setprecision(1) << static_cast<double>(map.size()) / survey.route_m
-        << " images a metre of route; ";
+        << " images per metre of route; ";
   }
-  out << "from image to image " << metres(survey.median_step_m, 2) << " in the median, 95 % up to "
+  out << "step between images: median " << metres(survey.median_step_m, 2) << ", 95th percentile "
       << metres(survey.long_step_m, 2) << '\n'
       << key("") << survey.gaps << " gaps of more than " << metres(findings.config.gap_m) << "; the longest steps:\n";
   for (const Step& step : survey.longest_steps) {
-    out << key("") << std::setw(8) << metres(step.length_m, 1) << "  from " << placeOf(map, step.from) << " to "
-        << placeOf(map, step.to) << ", " << nameOf(map, step.session)
+    out << key("") << std::setw(8) << metres(step.length_m, 1) << "  from " << positionText(map, step.from) << " to "
+        << positionText(map, step.to) << ", " << nameOf(map, step.session)
         << (step.length_m > findings.config.gap_m ? "  GAP" : "") << '\n';
   }
 }
@@ -171,11 +171,11 @@ void printStretches(std::ostream& out, const TrainingMap& map, std::vector<Stret
   const std::size_t shown = std::min(stretches.size(), kMostStretches);
   for (std::size_t s = 0; s < shown; ++s) {
     const Stretch& stretch = stretches[s];
-    out << key("") << std::setw(8) << metres(stretch.length_m, 1) << "  from " << placeOf(map, stretch.first) << " to "
-        << placeOf(map, stretch.last) << ", " << nameOf(map, stretch.session) << ", " << stretch.images
+    out << key("") << std::setw(8) << metres(stretch.length_m, 1) << "  from " << positionText(map, stretch.first)
+        << " to " << positionText(map, stretch.last) << ", " << nameOf(map, stretch.session) << ", " << stretch.images
         << (stretch.images == 1 ? " image" : " images") << more(stretch) << '\n';
   }
-  if (shown < stretches.size()) out << key("") << "and " << stretches.size() - shown << " shorter ones\n";
+  if (shown < stretches.size()) out << key("") << "and " << stretches.size() - shown << " shorter stretches\n";
 }
 
 void printHeadings(std::ostream& out, const TrainingMap& map, const MapSurvey& survey) {
@@ -189,7 +189,7 @@ void printHeadings(std::ostream& out, const TrainingMap& map, const MapSurvey& s
         << (bar > 0 ? "  " : "") << std::string(bar, '#') << '\n';
   }
   out << key("") << metres(survey.one_way_m) << " of " << metres(survey.driven_m) << " ("
-      << percent(survey.one_way_m, survey.driven_m) << ") driven in one direction only: not recognised the other way\n";
+      << percent(survey.one_way_m, survey.driven_m) << ") driven in one direction only: not recognised in the other\n";
   const bool all = survey.one_way_m >= survey.driven_m;
   if (!all) printStretches(out, map, survey.one_way, [](const Stretch&) { return std::string(); });
 }
@@ -201,40 +201,40 @@ void printWeak(std::ostream& out, const TrainingMap& map, const MapFindings& fin
       << findings.config.few_features << " features (--few-features), in " << survey.weak.size()
       << (survey.weak.size() == 1 ? " stretch\n" : " stretches\n");
   printStretches(out, map, survey.weak, [&](const Stretch& stretch) {
-    std::string text = ", down to " + std::to_string(stretch.least_features) + " features";
+    std::string text = ", min " + std::to_string(stretch.least_features) + " features";
     if (survey.sessions.size() < 2) return text;
-    if (stretch.seen_elsewhere == stretch.images) return text + "; another session sees more there";
-    if (stretch.seen_elsewhere == 0) return text + "; NO other session sees more there";
-    return text + "; another session sees more at " + std::to_string(stretch.seen_elsewhere) + " of them";
+    if (stretch.seen_elsewhere == stretch.images) return text + "; another session has enough there";
+    if (stretch.seen_elsewhere == 0) return text + "; NO other session has enough there";
+    return text + "; another session has enough at " + std::to_string(stretch.seen_elsewhere) + " of them";
   });
 }
 
 void printAmbiguity(std::ostream& out, const TrainingMap& map, const AmbiguousPlaces& found) {
   const AmbiguityConfig config;
   out << '\n'
-      << key("ambiguous") << found.images.size() << " of " << found.asked << " images look at least "
-      << percent(config.nearly_as_good, 1.0) << " as much like one more than " << metres(config.far_m)
-      << " away as like their neighbours\n";
+      << key("ambiguous") << found.images.size() << " of " << found.asked << " images are at least "
+      << percent(config.nearly_as_good, 1.0) << " as similar to one more than " << metres(config.far_m)
+      << " away as to their neighbours\n";
   if (found.stride > 1) {
-    out << key("") << "of this large map one image in " << found.stride << " was compared, with one in " << found.stride
+    out << key("") << "large map: one image in " << found.stride << " was compared with one in " << found.stride
         << '\n';
   }
   if (found.unjudged > 0) {
     out << key("") << found.unjudged << (found.unjudged == 1 ? " image has" : " images have") << " no neighbour within "
         << metres(config.near_m) << " and cannot be judged\n";
   }
-  if (found.unasked > 0) out << key("") << found.unasked << " images were left out: their features are too many\n";
-  out << key("") << found.global_only << " by global features alone (features: global)\n";
+  if (found.unasked > 0) out << key("") << found.unasked << " images were left out: too many features\n";
+  out << key("") << found.global_only << " are ambiguous by global features alone (features: global)\n";
   printStretches(out, map, found.stretches, [&](const Stretch& stretch) {
     const auto first = std::find_if(found.images.begin(), found.images.end(), [&](const AmbiguousImage& image) {
       return image.image >= stretch.first && map.pose(image.image).session == stretch.session;
     });
     std::ostringstream text;
     text << std::fixed << std::setprecision(2);
-    // After a gap a stretch begins with images that were not asked about; there may be none but those.
+    // After a gap a stretch begins with images that were not compared; it may hold no others.
     if (first == found.images.end() || first->image > stretch.last) return text.str();
-    text << "; like " << placeOf(map, first->twin) << ", similarity " << first->similarity << " against "
-         << first->near_similarity;
+    text << "; similarity " << first->similarity << " to " << positionText(map, first->twin) << ", "
+         << first->near_similarity << " to the neighbours";
     return text.str();
   });
 }
@@ -252,7 +252,7 @@ void printMapReport(std::ostream& out, const std::string& path, const TrainingMa
   if (findings.ambiguity) {
     printAmbiguity(out, map, *findings.ambiguity);
   } else {
-    out << '\n' << key("ambiguous") << "not looked for (--ambiguity)\n";
+    out << '\n' << key("ambiguous") << "not checked (--ambiguity)\n";
   }
 }
 

@@ -12,10 +12,10 @@
 
 namespace visual_localization {
 
-/// When two places look alike, and how much work may go into finding them.
+/// When two images look alike although they are far apart, and how much work may go into finding them.
 struct AmbiguityConfig {
-  double near_m = 5.0;                       ///< an image not farther away shows the same place
-  double far_m = 20.0;                       ///< one farther away shows another place
+  double near_m = 5.0;                       ///< an image not farther away shows the same scene
+  double far_m = 20.0;                       ///< one farther away shows another scene
   double nearly_as_good = 0.7;               ///< similarity of the far one, as a share of the best near one's
   double least_similarity = 0.08;            ///< of the far one by SIFT; a weaker one would confirm no position
   double global_nearly_as_good = 0.985;      ///< the share for global features
@@ -26,10 +26,10 @@ struct AmbiguityConfig {
   SimilarityConfig similarity;
 };
 
-/// An image that looks nearly as much like another place as like its own.
+/// An image that looks nearly as much like one far away as like its neighbours.
 struct AmbiguousImage {
   std::size_t image = 0;
-  std::size_t twin = 0;        ///< the image of the other place
+  std::size_t twin = 0;        ///< the image far away
   double similarity = 0.0;     ///< to the twin, by SIFT
   double near_similarity = 0;  ///< to the best near image, by SIFT
 };

@@ -1,4 +1,4 @@
-"""`evaluate` as a user meets it, on the first seconds of the rounds that ship."""
+"""`evaluate` as a user meets it, on the first seconds of the recordings that ship."""
 import csv
 import os
 import re
@@ -177,12 +177,13 @@ class EvaluateTest(ProgramTest):
         for arguments, word in ((('--shard', '3/2'), 'I from 1 to N'), (('--shard', '0/2'), 'I from 1 to N'),
                                 (('--shard', '1/2x'), 'I from 1 to N'), (('--shard', ''), 'I from 1 to N'),
                                 (('--shard', '9' * 30 + '/' + '9' * 30), 'I from 1 to N'),
-                                (('--threads', '0'), '[1, 1024]'), (('--threads', '-1'), '[1, 1024]'),
-                                (('--threads', '9' * 30), '[1, 1024]'), (('--threads', 'all'), '[1, 1024]'),
-                                (('--merge', self.folder / 'absent'), 'absent'),
-                                (('--shard', '1/2', '--merge', self.whole), '--merge'), (('--nonsense',), 'nonsense')):
+                                (('--shard', '2'), 'I from 1 to N'), (('--shard', '-1/2'), 'I from 1 to N'),
+                                (('--threads', '0'), '1024'), (('--threads', '-1'), '1024'),
+                                (('--threads', '9' * 30), '1024'), (('--threads', 'all'), '1024'),
+                                (('--merge', self.folder / 'absent'), 'absent'), (('--nonsense',), 'nonsense')):
             with self.subTest(arguments=arguments):
-                self.assert_refused(self.evaluate(*arguments), 2, word)
+                self.assert_refused(self.evaluate(*arguments), 2, *map(str, arguments), word)
+        self.assert_refused(self.evaluate('--shard', '1/2', '--merge', self.whole), 2, '--shard', '--merge')
         self.assert_refused(run('evaluate', '--config', self.config), 2, '--output')
         self.assert_refused(run('evaluate', '--config', self.config, '--output='), 2, '--output')
 

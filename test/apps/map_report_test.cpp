@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// What is said of 20 images with these ambiguous places.
+/// What is said of 20 images with these findings.
 std::string reportOf(const AmbiguousPlaces& places) {
   const test::TemporaryFolder folder;
   const TrainingMap map(test::exampleHeader(), test::exampleImages(20));
@@ -45,14 +45,14 @@ TEST(MapReport, SaysOfWhichShareOfALargeMapItSpeaks) {
   AmbiguousPlaces places;
   EXPECT_THAT(reportOf(places), Not(HasSubstr("large map")));
   places.stride = 3;
-  EXPECT_THAT(reportOf(places), HasSubstr("of this large map one image in 3 was compared, with one in 3\n"));
+  EXPECT_THAT(reportOf(places), HasSubstr("large map: one image in 3 was compared with one in 3\n"));
 }
 
 TEST(MapReport, NamesTheTwinOfAStretch) {
   AmbiguousPlaces places;
   places.images = {{4, 1, 0.5, 0.25}};
   places.stretches = {stretch(3, 6)};
-  EXPECT_THAT(reportOf(places), HasSubstr("4 images; like (49.8, 3.0), similarity 0.50 against 0.25\n"));
+  EXPECT_THAT(reportOf(places), HasSubstr("4 images; similarity 0.50 to (49.8, 3.0), 0.25 to the neighbours\n"));
 }
 
 TEST(MapReport, AStretchThatWasNotComparedHasNoTwin) {

@@ -12,7 +12,7 @@ from program_runner import PROGRAMS, ProgramTest, run
 
 MAP, DRIVE, CONFIG = (Path(argument) for argument in sys.argv[2:5])
 HEADER = ('stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,'
-          'extract_ms,match_ms,update_ms').split(',')
+          'extract_ms,match_ms,update_ms,swept').split(',')
 TIMES = ('extract_ms', 'match_ms', 'update_ms')
 
 
@@ -53,7 +53,7 @@ class ProgramsTest(ProgramTest):
         self.assertEqual(first, positions(self.localize('--seed', 5)))
         self.assertNotEqual(first, positions(self.localize('--seed', 6)))
 
-    def test_start_index_wraps_around_the_round(self):
+    def test_start_index_wraps_around_the_drive(self):
         rows = self.localize('--start-index', 400, '--config', CONFIG)
         stamps = [float(row['stamp']) for row in rows]
         self.assertEqual(len(stamps), 403)
@@ -63,9 +63,18 @@ class ProgramsTest(ProgramTest):
         output = self.folder / 'track.csv'
         good = ('--map', MAP, '--bag', DRIVE, '--output', output)
         for extra, word in ((('--tracker', 'crystal_ball'), 'dpso'), (('--particles', '-3'), '[2, 100000]'),
-                            (('--start-index', 403), '0 to 402'), (('--kidnap-at', 3), '--kidnap-to'),
+                            (('--start-index', 403), '0 to 402'), (('--start-index', -1), "--start-index: '-1'"), (('--kidnap-at', 3), '--kidnap-to'),
                             (('--nonsense', 1), '--nonsense')):
             self.assert_refused(run('localize', *good, *extra), 2, word)
+        for extra, words in ((('--threads', '0'), ('--threads', '0 not in range', '1024')),
+                             (('--threads', 'all'), ('--threads', 'all not in range', '1024')),
+                             (('--min-spacing', '-1'), ('--min-spacing', '-1', '[0, 1000]')),
+                             (('--sift-backend', 'cuda'), ('--sift-backend', 'cuda', 'native')),
+                             (('--plot', 'plot.txt'), ('--plot', 'plot.txt', '.png, .svg or .pdf')),
+                             (('--plot', 'png'), ('--plot', "'png'", '.png, .svg or .pdf'))):
+            with self.subTest(extra=extra):
+                self.assert_refused(run('map_builder', '--bag', DRIVE, '--output', output, *extra), 2, *words)
+        self.assert_refused(run('map_info', MAP, '--few-features', '-1'), 2, '--few-features', '-1', '1000000')
         self.assert_refused(run('localize', '--map', MAP), 2, '--bag')
         self.assert_refused(run('map_info'), 2)
         self.assert_refused(run('map_builder'), 2)
@@ -91,7 +100,7 @@ class ProgramsTest(ProgramTest):
         bag.write_bytes(DRIVE.read_bytes())
         for result in (run('localize', '--map', copy, '--bag', DRIVE, '--output', copy),
                        run('map_builder', '--bag', bag, '--output', bag),
-                       run('map_builder', '--bag', bag, '--output', self.folder / 'new', '--plot', self.folder / 'new'),
+                       run('map_builder', '--bag', bag, '--output', self.folder / 'new.svg', '--plot', self.folder / 'new.svg'),
                        run('map_info', copy, '--export-csv', self.folder / '.' / 'copy.map')):
             self.assert_refused(result, 2, 'would overwrite')
         self.assertEqual(copy.read_bytes(), MAP.read_bytes())

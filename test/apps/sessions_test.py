@@ -1,4 +1,4 @@
-"""Several rounds in one map, as a user meets them: map_builder, its plot, and what map_info tells."""
+"""Several sessions in one map, as a user meets them: map_builder, its plot, and what map_info tells."""
 import csv
 import json
 import os
@@ -10,18 +10,30 @@ import unittest
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-from program_runner import ProgramTest, run
+from program_runner import PROGRAMS, ProgramTest, run
 
 SUNNY, CLOUDY = (Path(argument) for argument in sys.argv[2:4])
 SVG = '{http://www.w3.org/2000/svg}'
 
 
+def texts_of(plot: Path) -> list:
+    """The texts of a plot: matplotlib draws letters as shapes and notes what they say in a comment."""
+    parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
+    return [comment.text.strip() for comment in ElementTree.parse(plot, parser).getroot().iter(ElementTree.Comment)]
+
+
+def marks_of(plot: Path, name: str) -> list:
+    """How many marks each group has whose name begins like this."""
+    groups = ElementTree.parse(plot).getroot().iter(SVG + 'g')
+    return [len(list(group.iter(SVG + 'use'))) for group in groups if group.get('id', '').startswith(name)]
+
+
 class SessionsTest(ProgramTest):
-    """A map of a sunny and a cloudy round."""
+    """A map of a sunny and a cloudy session."""
 
     def build(self, *bags, **options) -> str:
         """Makes `self.map` and `self.plot`; what the builder says."""
-        self.map, self.plot = self.folder / 'both.map', self.folder / 'both.svg'
+        self.map, self.plot = self.folder / 'both.map', self.folder / options.get('plot', 'both.svg')
         arguments = [word for bag in bags for word in ('--bag', bag)]
         result = run('map_builder', *arguments, '--output', self.map, '--plot', self.plot, '--min-spacing',
                      options.get('spacing', 1.2))
@@ -34,7 +46,7 @@ class SessionsTest(ProgramTest):
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stdout
 
-    def test_two_rounds_become_sessions(self):
+    def test_two_recordings_become_sessions(self):
         said = self.build(SUNNY, CLOUDY)
         kept = [int(number) for number in re.findall(r'^campus_\w+: (\d+) images of 320x240 px$', said, re.M)]
         self.assertEqual(len(kept), 2, said)
@@ -78,23 +90,58 @@ class SessionsTest(ProgramTest):
 
     def test_the_plot_names_each_reason_with_its_count(self):
         said = self.build(SUNNY, CLOUDY)
-        root = ElementTree.parse(self.plot).getroot()
-        texts = [text.text for text in root.iter(SVG + 'text')]
+        texts = texts_of(self.plot)
         for name in ('campus_sunny_1', 'campus_cloudy_1'):
-            self.assertIn(name, texts)
+            self.assertEqual(texts.count(name), 2)
             fixes = re.search(rf'^{name}: (\d+) fixes: (\d+) kept, (\d+) no fix, (\d+) out of order, (\d+) spike, '
                               r'(\d+) multipath', said, re.M).groups()
             for count, meaning in zip(fixes, (' fixes', ' kept', ' no fix', ' out of order', ' spike', ' multipath')):
                 self.assertTrue(any(text.startswith(count + meaning) for text in texts), (count + meaning, texts))
-        self.assertIn('all rounds, cleaned paths', texts)
+        self.assertIn('all sessions, cleaned paths', texts)
         self.assertEqual(texts.count('N'), 3)
         self.assertEqual(texts.count('20 m'), 3)
         self.assertNotIn('nan', self.plot.read_text(encoding='utf-8'))
-        shapes = [path.get('d') for path in root.iter(SVG + 'path') if path.get('fill') == '#e69f00']
-        drawn = sum(shape.count('M') for shape in shapes) - 2  # the legends' own
-        self.assertEqual(drawn, sum(int(number) for number in re.findall(r'(\d+) multipath', said)))
+        for reason, count in (('spike', r'(\d+) spike'), ('multipath', r'(\d+) multipath'), ('kept', r'(\d+) kept, ')):
+            self.assertEqual(marks_of(self.plot, reason + '_'), [int(n) for n in re.findall(count, said)][:2])
+        self.assertEqual(marks_of(self.plot, 'images_'),
+                         [int(n) for n in re.findall(r'^campus_\w+: (\d+) images', said, re.M)])
+        self.assertEqual(sorted(path.name for path in self.folder.iterdir()), ['both.map', 'both.svg'])
 
-    def test_a_round_given_twice_is_refused(self):
+    def test_the_ending_of_the_plot_decides_its_format(self):
+        for ending, begin in (('.png', b'\x89PNG'), ('.pdf', b'%PDF'), ('.SVG', b'<?xml')):
+            with self.subTest(ending=ending):
+                self.build(SUNNY, spacing=10, plot='plot' + ending)
+                self.assertEqual(self.plot.read_bytes()[:len(begin)], begin)
+
+    def test_a_plot_that_fails_is_one_line_and_leaves_the_map_and_the_old_plot(self):
+        output, plot, copy = self.folder / 'a.map', self.folder / 'plot.png', self.folder / 'bin'
+        plot.write_text('the old one', encoding='utf-8')
+        copy.mkdir()
+        program, script = Path(shutil.copy(PROGRAMS / 'map_builder', copy)), copy / 'plot_map.py'
+        for content, reason in (('', 'is missing'),
+                                ('#!/absent/python3\n', 'is Python 3 installed?'),
+                                ('#!/bin/sh\necho one >&2\necho "plot_map: no ink" >&2\nexit 1\n',
+                                 'failed: plot_map: no ink'),
+                                ('#!/bin/sh\nexit 3\n', 'failed: without a message')):
+            with self.subTest(reason=reason):
+                if content:
+                    script.write_text(content, encoding='utf-8')
+                    script.chmod(0o755)
+                output.unlink(missing_ok=True)
+                self.assert_refused(run(program, '--bag', SUNNY, '--min-spacing', 10, '--output', output,
+                                        '--plot', plot), 1, 'plot_map.py', reason, 'the map is written', str(output))
+                self.assertEqual(run('map_info', output, '--check').returncode, 0)
+                self.assertEqual(plot.read_text(encoding='utf-8'), 'the old one')
+                self.assertEqual(sorted(path.name for path in self.folder.iterdir()), ['a.map', 'bin', 'plot.png'])
+
+    def test_without_matplotlib_the_plot_says_what_to_install(self):
+        (self.folder / 'matplotlib.py').write_text('raise ImportError("No module named matplotlib")', encoding='utf-8')
+        result = run('map_builder', '--bag', SUNNY, '--min-spacing', 10, '--output', self.folder / 'a.map',
+                     '--plot', self.folder / 'plot.png', env={**os.environ, 'PYTHONPATH': str(self.folder)})
+        self.assert_refused(result, 1, 'matplotlib', 'install python3-matplotlib', 'the map is written')
+        self.assertIn('images: ', result.stdout)
+
+    def test_a_recording_given_twice_is_refused(self):
         output = self.folder / 'twice.map'
         result = run('map_builder', '--bag', SUNNY, '--bag', SUNNY.parent / '.' / SUNNY.name, '--output', output)
         self.assert_refused(result, 2, 'is the same file')
@@ -106,7 +153,7 @@ class SessionsTest(ProgramTest):
         self.build(SUNNY, copy, spacing=10)
         self.assertIn('campus_sunny_1_2', self.info())
 
-    def test_a_round_without_fixes_is_named(self):
+    def test_a_recording_without_fixes_is_named(self):
         broken = self.folder / 'broken.bag'
         broken.write_bytes(CLOUDY.read_bytes().replace(b'/gps/fix', b'/gps/nix'))
         result = run('map_builder', '--bag', SUNNY, '--bag', broken, '--output', self.folder / 'out.map',
@@ -114,12 +161,12 @@ class SessionsTest(ProgramTest):
         self.assert_refused(result, 1, 'broken.bag', '/gps/fix')
         self.assertFalse((self.folder / 'out.map').exists())
 
-    def test_whatever_a_round_is_called_it_stays_in_its_line(self):
+    def test_whatever_a_session_is_called_it_stays_in_its_line(self):
         copy = self.folder / ('x\n\x1b[31mcheck: ok' + 'y' * 200 + '.bag')
         shutil.copy(CLOUDY, copy)
         self.build(SUNNY, spacing=10)
         lines = len(self.info().splitlines())
-        self.assertNotIn('all rounds', self.plot.read_text(encoding='utf-8'))
+        self.assertNotIn('all sessions, cleaned paths', texts_of(self.plot))
         self.build(SUNNY, copy, spacing=10)
         shown = self.info()
         self.assertNotIn('\x1b', shown)
@@ -132,7 +179,7 @@ class SessionsTest(ProgramTest):
         copy = self.folder / ('x' + '\u00e4' * 60 + '.bag')
         shutil.copy(CLOUDY, copy)
         self.build(SUNNY, copy, spacing=10)
-        texts = [text.text for text in ElementTree.parse(self.plot).getroot().iter(SVG + 'text')]
+        texts = texts_of(self.plot)
         self.assertEqual(len([text for text in texts if re.fullmatch('\\.\\.\\.\u00e4+', text)]), 2, texts)
         self.assertRegex(self.info(), r'1  x\u00e4+ +\d+ images')
 
@@ -144,7 +191,7 @@ class SessionsTest(ProgramTest):
         alone = int(re.search(r'(\d+) images have no neighbour within 5 m and cannot be judged', shown).group(1))
         self.assertEqual(ambiguous, 0)
         self.assertEqual(judged + alone, images)
-        self.assertGreater(alone, 30)  # two are near where the round begins and ends
+        self.assertGreater(alone, 30)  # two are near where the session begins and ends
 
     def test_a_map_is_described_in_a_moment(self):
         self.build(SUNNY, CLOUDY)

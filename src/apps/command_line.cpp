@@ -1,0 +1,211 @@
+#include "apps/command_line.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <filesystem>
+#include <iostream>
+#include <new>
+#include <system_error>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+
+#include "apps/app_support.h"
+#include "base/files.h"
+#include "base/text.h"
+
+namespace visual_localization::apps {
+namespace {
+
+constexpr int kSuccess = 0;
+constexpr int kFailedRun = 1;
+constexpr int kBadUsage = 2;
+
+constexpr std::size_t kMostThreads = 1024;
+
+/// "I/N" as part I of N; nothing for anything else.
+std::optional<Shard> shardOf(const std::string& text) {
+  Shard shard;
+  const char* const end = text.data() + text.size();
+  const auto index = std::from_chars(text.data(), end, shard.index);
+  if (index.ec != std::errc() || index.ptr == end || *index.ptr != '/') return std::nullopt;
+  const auto count = std::from_chars(index.ptr + 1, end, shard.count);
+  const bool possible = shard.index >= 1 && shard.index <= shard.count;
+  return count.ec == std::errc() && count.ptr == end && possible ? std::optional<Shard>(shard) : std::nullopt;
+}
+
+/// Whether a path ends as a picture that plot_map.py can write.
+bool isPicture(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".png" || ending == ".svg" || ending == ".pdf";
+}
+
+/// Refuses a value, with the requirement, unless the predicate holds.
+CLI::Validator must(bool (*allowed)(const std::string&), const std::string& requirement) {
+  const auto check = [allowed, requirement](const std::string& value) {
+    return allowed(value) ? std::string() : "'" + oneLine(value) + "' is not allowed: must " + requirement;
+  };
+  return CLI::Validator(check, "");
+}
+
+/// CLI11 reads -1 as a huge index.
+bool isNotNegative(const std::string& text) { return text.rfind('-', 0) != 0; }
+
+void declareOptions(CLI::App& app, MapBuilderOptions& options) {
+  app.add_option("--bag", options.bags, "Recording; repeat it for more sessions in one map")
+      ->required()
+      ->take_all()
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--image-topic", options.image_topic, "Raw or compressed images; finds \"/compressed\" itself")
+      ->capture_default_str();
+  app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix")->capture_default_str();
+  app.add_option("--output", options.output, "Map file to write")->required();
+  app.add_option("--config", options.config, "Parameters, YAML (see config/map_builder.yaml)");
+  app.add_option("--min-spacing", options.min_spacing_m,
+                 "Metres between training images of a session (parameter 'map/min_spacing')");
+  app.add_option("--threads", options.threads, "Threads for extraction; the map does not depend on it")
+      ->check(CLI::Range(std::size_t{1}, kMostThreads))
+      ->capture_default_str();
+  app.add_option("--sift-backend", options.sift_backend, "'native' or 'opencv' (parameter 'map/sift_backend')");
+  app.add_option("--plot", options.plot,
+                 "Draw fixes and cleaned path of each session into this PNG, SVG or PDF, by the ending")
+      ->check(must(isPicture, "end in .png, .svg or .pdf"));
+}
+
+void declareOptions(CLI::App& app, MapInfoOptions& options) {
+  app.add_option("map", options.map, "Map file")->required();
+  app.add_flag("--check", options.check, "Verify every checksum and the structure of the file");
+  app.add_flag("--ambiguity", options.ambiguity,
+               "Find training images that look like others far away; takes seconds, at most about a minute");
+  app.add_option("--few-features", options.few_features, "An image with fewer SIFT features is weak")
+      ->check(CLI::Range(std::size_t{0}, std::size_t{1'000'000}))
+      ->capture_default_str();
+  app.add_option("--export-geojson", options.geojson, "Write paths, weak stretches and images as GeoJSON (WGS84)");
+  app.add_option("--export-csv", options.csv, "Write one line per image");
+}
+
+void declareOptions(CLI::App& app, LocalizeOptions& options) {
+  app.add_option("--map", options.map, "Map file")->required();
+  app.add_option("--bag", options.bag, "Recording of the drive")->required();
+  app.add_option("--output", options.output, "Track to write, CSV")->required();
+  app.add_option("--config", options.config, "Parameters, YAML (see config/localizer.yaml)");
+  app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
+  app.add_option("--features", options.features, "Features (parameter 'features')");
+  app.add_option("--particles", options.particles, "Number of particles of the tracker");
+  app.add_option("--seed", options.seed, "Seed of the random generator (parameter 'seed')");
+  app.add_option("--map-cache-mb", options.map_cache_mb,
+                 "Features of a larger map are read when needed (parameter 'map_cache_mb')");
+  app.add_option("--start-index", options.start_index, "First image; the drive is a closed loop, indices wrap")
+      ->check(must(isNotNegative, "not be negative"))
+      ->capture_default_str();
+  auto* at = app.add_option("--kidnap-at", options.kidnap_at, "After this number of images jump ...")
+                 ->check(must(isNotNegative, "not be negative"));
+  auto* to = app.add_option("--kidnap-to", options.kidnap_to, "... to this image of the drive")
+                 ->check(must(isNotNegative, "not be negative"));
+  at->needs(to);
+  to->needs(at);
+  app.add_option("--image-topic", options.image_topic, "Raw or compressed images; finds \"/compressed\" itself")
+      ->capture_default_str();
+  app.add_option("--truth-topic", options.truth_topic, "NavSatFix with true positions: prints the error");
+}
+
+void declareOptions(CLI::App& app, EvaluateOptions& options) {
+  app.add_option("--config", options.config, "Experiment, YAML (see config/evaluation)")->required();
+  app.add_option("--rounds", options.rounds, "Folder of the bags; default: the one of the YAML file");
+  app.add_option("--output", options.output, "Folder for results, report and figures; work found there is not repeated")
+      ->required()
+      ->check(must([](const std::string& path) { return !path.empty(); }, "name a folder"));
+  app.add_option("--threads", options.threads, "Threads to use")
+      ->check(CLI::Range(std::size_t{1}, kMostThreads))
+      ->capture_default_str();
+  const auto set_shard = [&options](const std::string& text) { options.shard = shardOf(text); };
+  auto* shard =
+      app.add_option_function<std::string>("--shard", set_shard,
+                                           "I/N: run only part I of N of the pairs, without a report")
+          ->check(must([](const std::string& text) { return shardOf(text).has_value(); }, "be I/N with I from 1 to N"));
+  app.add_option("--merge", options.merge, "Report the results of shards in these folders, run nothing")
+      ->check(CLI::ExistingDirectory)
+      ->excludes(shard);
+  app.add_flag("--no-report", options.no_report, "Write only the tables");
+}
+
+int fail(const CLI::App& app, std::string reason, int code) {
+  std::replace(reason.begin(), reason.end(), '\n', ' ');
+  std::cout.flush();
+  std::cerr << app.get_name() << ": " << reason << std::endl;
+  return code;
+}
+
+/// roslaunch appends "__name:=..." and "__log:=..." to every command line.
+std::vector<const char*> withoutRosNames(int argc, char** argv) {
+  std::vector<const char*> arguments(argv, argv + argc);
+  const auto is_ros_name = [](const char* argument) {
+    const std::string text = argument;
+    return text.rfind("__", 0) == 0 && text.find(":=") != std::string::npos;
+  };
+  arguments.erase(std::remove_if(arguments.begin(), arguments.end(), is_ros_name), arguments.end());
+  return arguments;
+}
+
+template <class Options>
+int runBody(const CLI::App& app, void (*body)(const Options&), const Options& options) {
+  try {
+    body(options);
+    std::cout.flush();
+    return std::cout ? kSuccess : fail(app, "standard output cannot be written", kFailedRun);
+  } catch (const UsageError& error) {
+    return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
+  } catch (const std::bad_alloc&) {
+    return fail(app, "out of memory", kFailedRun);
+  } catch (const std::exception& error) {
+    return fail(app, error.what(), kFailedRun);
+  }
+}
+
+template <class Options>
+int run(CLI::App& app, int argc, char** argv, void (*body)(const Options&)) {
+  Options options;
+  declareOptions(app, options);
+  app.set_version_flag("--version", app.get_name() + " " + VISUAL_LOCALIZATION_VERSION);
+  try {
+    const auto arguments = withoutRosNames(argc, argv);
+    app.parse(static_cast<int>(arguments.size()), arguments.data());
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
+  }
+  removePartialFilesOnSignals();
+  return runBody(app, body, options);
+}
+
+}  // namespace
+
+std::size_t allCores() { return std::max(1U, std::thread::hardware_concurrency()); }
+
+int runProgram(int argc, char** argv, void (*body)(const MapBuilderOptions& options)) {
+  CLI::App app("Builds a map from recordings: images and DGPS fixes in, training images with positions out.",
+               "map_builder");
+  return run(app, argc, argv, body);
+}
+
+int runProgram(int argc, char** argv, void (*body)(const MapInfoOptions& options)) {
+  CLI::App app("Shows what a map covers and where it is weak, checks it and exports it.", "map_info");
+  return run(app, argc, argv, body);
+}
+
+int runProgram(int argc, char** argv, void (*body)(const LocalizeOptions& options)) {
+  CLI::App app("Localises a recorded drive against a map and writes the track as CSV.", "localize");
+  return run(app, argc, argv, body);
+}
+
+int runProgram(int argc, char** argv, void (*body)(const EvaluateOptions& options)) {
+  CLI::App app("Runs an experiment of the papers on recordings; writes tables, a report and figures.", "evaluate");
+  return run(app, argc, argv, body);
+}
+
+}  // namespace visual_localization::apps

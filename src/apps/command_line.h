@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evaluation/evaluator.h"
+#include "survey/map_survey.h"
+
+/// The command lines of the programs. CLI11, which takes seconds to compile, is included by command_line.cpp alone.
+namespace visual_localization::apps {
+
+/// All processor cores, at least 1.
+std::size_t allCores();
+
+struct MapBuilderOptions {
+  std::vector<std::string> bags;
+  std::string image_topic = "/stereo/left/image_raw";
+  std::string fix_topic = "/gps/fix";
+  std::string output;
+  std::string config;
+  std::string plot;
+  std::optional<double> min_spacing_m;
+  std::size_t threads = allCores();
+  std::optional<std::string> sift_backend;
+};
+
+struct MapInfoOptions {
+  std::string map;
+  bool check = false;
+  bool ambiguity = false;
+  std::size_t few_features = SurveyConfig().few_features;
+  std::string geojson;
+  std::string csv;
+};
+
+struct LocalizeOptions {
+  std::string map;
+  std::string bag;
+  std::string output;
+  std::string config;
+  std::string tracker;
+  std::string features;
+  std::string image_topic = "/stereo/left/image_raw";
+  std::string truth_topic;
+  std::optional<std::int64_t> particles;
+  std::optional<std::int64_t> seed;
+  std::optional<std::int64_t> map_cache_mb;
+  std::size_t start_index = 0;
+  std::optional<std::size_t> kidnap_at;
+  std::optional<std::size_t> kidnap_to;
+};
+
+struct EvaluateOptions {
+  std::string config;
+  std::string rounds;
+  std::string output;
+  std::optional<Shard> shard;
+  std::vector<std::string> merge;
+  std::size_t threads = allCores();
+  bool no_report = false;
+};
+
+/// The main function of a program: reads its command line, runs `body` and returns the exit code: 0, 1 after a failed
+/// run, 2 for bad usage. Whatever goes wrong becomes one line on standard error. Unfinished output disappears, also
+/// when the program is interrupted.
+int runProgram(int argc, char** argv, void (*body)(const MapBuilderOptions& options));
+int runProgram(int argc, char** argv, void (*body)(const MapInfoOptions& options));
+int runProgram(int argc, char** argv, void (*body)(const LocalizeOptions& options));
+int runProgram(int argc, char** argv, void (*body)(const EvaluateOptions& options));
+
+}  // namespace visual_localization::apps
