@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/app_support.h"
+#include "base/statistics.h"
 #include "base/text.h"
 #include "visual_localization/map/map_file.h"
 
@@ -103,9 +104,10 @@ void printFeatures(std::ostream& out, const TrainingMap& map) {
     counts.push_back(map.featureCount(i));
     total += map.featureCount(i);
   }
-  std::sort(counts.begin(), counts.end());
-  out << key("features") << total << ", per image min " << counts.front() << ", median " << counts[counts.size() / 2]
-      << ", max " << counts.back() << '\n';
+  const std::size_t least = *std::min_element(counts.begin(), counts.end());
+  const std::size_t most = *std::max_element(counts.begin(), counts.end());
+  out << key("features") << total << ", per image min " << least << ", median " << upperMedian(counts) << ", max "
+      << most << '\n';
 }
 
 void printSessions(std::ostream& out, const TrainingMap& map, const MapSurvey& survey) {
