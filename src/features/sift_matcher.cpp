@@ -86,6 +86,15 @@ void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_ang
   forEachSymmetric(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
 }
 
+void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b,
+             std::vector<FeatureMatch>& matches) {
+  if (config.isSymmetric()) {
+    matchSymmetric(a, b, config.max_angle_ratio, matches);
+  } else {
+    matchOneWay(a, b, config.max_angle_ratio, matches);
+  }
+}
+
 double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vector<FeatureMatch>& matches) {
   static thread_local std::vector<float> scales;
   scales.clear();

@@ -20,19 +20,13 @@ void SimilarityConfig::declare(ParameterVisitor& visitor) {
 }
 
 SiftSimilarity::SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config)
-    : max_angle_ratio_(match.max_angle_ratio),
-      symmetric_(match.mode == "symmetric"),
-      recognised_(config.sift_recognised) {}
+    : match_(match), recognised_(config.sift_recognised) {}
 
 Score SiftSimilarity::compare(const SiftFeatures& current, const SiftFeatures& training) const {
   if (current.size() < 2 || training.size() < 2) return {};
   static thread_local std::vector<FeatureMatch> matches;
-  if (symmetric_) {
-    matchSymmetric(current, training, max_angle_ratio_, matches);
-  } else {
-    matchOneWay(current, training, max_angle_ratio_, matches);
-  }
-  const std::size_t possible = symmetric_ ? std::min(current.size(), training.size()) : current.size();
+  matchBy(match_, current, training, matches);
+  const std::size_t possible = match_.isSymmetric() ? std::min(current.size(), training.size()) : current.size();
   return scoreOf(static_cast<double>(matches.size()) / static_cast<double>(possible), matches.size(),
                  medianScale(current, training, matches));
 }

@@ -40,11 +40,6 @@ cv::Point shifted(const SiftKeypoint& keypoint, double scale, double offset_x_px
   return {cvRound(x_px * (1 << kShiftBits)), cvRound(y_px * (1 << kShiftBits))};
 }
 
-std::vector<FeatureMatch> matchesBetween(const SiftFeatures& a, const SiftFeatures& b, const MatchConfig& match) {
-  return match.mode == "symmetric" ? matchSymmetric(a, b, match.max_angle_ratio)
-                                   : matchOneWay(a, b, match.max_angle_ratio);
-}
-
 }  // namespace
 
 cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
@@ -57,8 +52,10 @@ cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const Trainin
 
   cv::Mat canvas;
   cv::hconcat(inColour(grey, half), previewOf(map.preview(training), half), canvas);
+  std::vector<FeatureMatch> matches;
+  matchBy(match, sift, *training_sift, matches);
   std::size_t line = 0;
-  for (const FeatureMatch& pair : matchesBetween(sift, *training_sift, match)) {
+  for (const FeatureMatch& pair : matches) {
     const cv::Scalar& colour = kLineColours[line++ % kLineColours.size()];
     const cv::Point from = shifted(sift.keypoints()[pair.a], scale, 0.0);
     const cv::Point to = shifted(training_sift->keypoints()[pair.b], scale, half.width);

@@ -15,6 +15,7 @@ struct MatchConfig {
   std::string mode = "symmetric";  ///< "symmetric" (journal) or "one_way" (conference, hybrid)
 
   void declare(ParameterVisitor& visitor);
+  bool isSymmetric() const { return mode == "symmetric"; }
 };
 
 /// Feature `a` of the first image matches feature `b` of the second.
@@ -36,6 +37,9 @@ void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_
                  std::vector<FeatureMatch>& matches);
 void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
                     std::vector<FeatureMatch>& matches);
+/// By the mode and the ratio of `config`.
+void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b,
+             std::vector<FeatureMatch>& matches);
 
 /// Median size of the matched features of `a` as a share of their partners' in `b`: how much larger the same things
 /// look, and so how much nearer they are, seen from a. 1 without matches of sizes above 0.

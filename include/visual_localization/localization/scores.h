@@ -30,8 +30,7 @@ class SiftSimilarity {
   Score scoreOf(double similarity, std::size_t matches, double scale) const;
 
  private:
-  double max_angle_ratio_;
-  bool symmetric_;
+  MatchConfig match_;
   double recognised_;
 };
 
