@@ -1,28 +1,23 @@
 #!/usr/bin/env bash
-# Builds a map from one sample round and localises the other one against it: real nodelet, real roscore, rosbag play.
+# Builds a map from one sample session and localises the other sample drive against it: nodelet, roscore, rosbag play.
 set -euo pipefail
 repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo
+# shellcheck source=scripts/build_progress.sh
+source "$repo/scripts/build_progress.sh"
 readonly image_topic=/stereo/left/image_raw
 
 usage() {
   cat <<'USAGE'
 Usage: demo.sh [--output DIR] [--rate FACTOR] [--map-bag BAG] [--bag BAG] [--tracker NAME] [--features NAME]
-  --output DIR     folder for map, track and plot (default: build/demo in the repository)
-  --rate FACTOR    play so many times faster than recorded (default: 6)
-  --map-bag BAG    round to build the map from (default: the sunny sample)
-  --bag BAG        round to localise (default: the cloudy sample)
+  --output DIR     folder for map, track, plot and logs (default: build/demo in the repository)
+  --rate FACTOR    speed of playing over speed of recording (default: 6)
+  --map-bag BAG    session to build the map from (default: the sunny sample)
+  --bag BAG        drive to localise (default: the cloudy sample)
   --tracker NAME   dpso (default), pf_gaussian, pf_linear
   --features NAME  sift (default), global, hybrid
-Exit code 0 when the round was localised.
+Exit code 0 when the drive was localised and every image of its bag is accounted for.
 USAGE
-}
-
-step() { printf '\n== %s\n' "$*"; }
-
-fail() {
-  echo "demo: $*" >&2
-  exit 1
 }
 
 # Ends one process of ours and waits for it; harder when it does not listen.
@@ -64,10 +59,9 @@ wait_for() {
 build() {
   step "Build (Release)"
   cmake -S "$repo" -B "$build" -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3 \
-    -DBUILD_TESTING=OFF -DCATKIN_ENABLE_TESTING=OFF >"$output/configure.log" 2>&1 \
-    || { tail -n 20 "$output/configure.log" >&2; fail "CMake failed: $output/configure.log"; }
-  cmake --build "$build" --parallel "$(nproc)" >"$output/build.log" 2>&1 \
-    || { grep -E -m 5 'error|Error' "$output/build.log" >&2 || true; fail "the build failed: $output/build.log"; }
+    -DBUILD_TESTING=OFF -DCATKIN_ENABLE_TESTING=OFF >>"$log" 2>&1 || { show_errors "$log"; fail "CMake failed: $log"; }
+  with_progress build "$log" cmake --build "$build" --parallel "$(nproc)" \
+    || { show_errors "$log"; fail "the build failed: $log"; }
   echo "built in ${build#"$PWD"/}"
 }
 
@@ -103,7 +97,7 @@ localize() {
   step "Localise $(basename "$bag") at $rate times its speed"
   start_master
   start_localizer
-  rm -f "$output/ready" "$output/track.csv"
+  rm -f "$output/ready" "$output/track.csv" "$output/track.json"
   python3 "$repo/scripts/record_track.py" --bag "$bag" --output "$output/track.csv" --ready "$output/ready" &
   local recorder=$!
   started+=("$recorder")
@@ -137,10 +131,15 @@ main() {
   mkdir -p "$output"
   output=$(cd "$output" && pwd)
   local build=$repo/build/demo_release programs=$repo/build/demo_release/devel/lib/visual_localization
+  local log=$output/build.log
 
+  echo "Installs what is missing, builds in ${build#"$PWD"/}, builds a map from $(basename "$map_bag")"
+  echo "and localises $(basename "$bag") against it. To install and build takes 5 to 15 minutes on two cores and"
+  echo "3 GB of disk the first time. Log: ${log#"$PWD"/}"
   # Another python3 may stand first on the PATH; ROS needs the system's.
   export PATH=/usr/bin:$PATH MPLBACKEND=Agg
-  "$repo/scripts/install_dependencies.sh"
+  : >"$log"
+  "$repo/scripts/install_dependencies.sh" --log "$log"
   build
   set +u
   # shellcheck disable=SC1091

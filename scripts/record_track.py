@@ -1,21 +1,24 @@
 #!/usr/bin/python3
 """Records what a running localizer says about the images of a bag, beside the bag's exact positions.
 
-Subscribes to <localizer>/pose, /fix and /status, creates the --ready file as soon as the localizer has its map and all
-three topics are connected, and writes one row an image when every image of the bag has been answered or when the
-answers stop. Play the bag yourself, after the --ready file is there.
+Subscribes to <localizer>/pose, /fix and /status and to /diagnostics, creates the --ready file as soon as the localizer
+has its map and all topics are connected, and writes when every image of the bag is accounted for or when nothing
+happens any more: one row for each answered image, and beside the track, as JSON, what became of all images of the bag.
+Play the bag yourself, after the --ready file is there.
 """
 import argparse
 import bisect
 import csv
+import json
 import math
 import sys
 import time
 from pathlib import Path
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional, Tuple
 
 import rosbag
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import NavSatFix
@@ -23,11 +26,10 @@ from sensor_msgs.msg import NavSatFix
 try:
     from visual_localization.msg import LocalizationStatus
 except ImportError:
-    sys.exit('record_track: source the devel/setup.bash of the workspace first: no messages of visual_localization')
+    sys.exit('record_track: source the setup.bash of the workspace first: no messages of visual_localization')
 
 COLUMNS = ['stamp', 'east_m', 'north_m', 'yaw_rad', 'latitude_deg', 'longitude_deg', 'state', 'similarity', 'features',
-           'comparisons', 'extract_ms', 'match_ms', 'update_ms', 'true_latitude_deg', 'true_longitude_deg', 'error_m',
-           'images_dropped', 'images_refused']
+           'comparisons', 'extract_ms', 'match_ms', 'update_ms', 'true_latitude_deg', 'true_longitude_deg', 'error_m']
 FEATURES = {LocalizationStatus.SIFT: 'SIFT', LocalizationStatus.GLOBAL: 'GLOBAL'}
 SAME_STAMP_S = 0.05  # a truth this near to an image belongs to it
 
@@ -61,6 +63,32 @@ class Truth:
         return min(near, key=lambda row: abs(row[0] - stamp))[1:]
 
 
+class Counts(NamedTuple):
+    """What became of the images that the localizer received, since some moment."""
+    received: int
+    processed: int
+    dropped: int
+    late: int
+    refused: int
+
+    def since(self, before: 'Counts') -> 'Counts':
+        """What came after `before`."""
+        return Counts(*(now - then for now, then in zip(self, before)))
+
+    def settled(self) -> int:
+        """Images that have come to an end."""
+        return self.processed + self.dropped + self.late + self.refused
+
+
+def read_counts(message: DiagnosticArray, localizer: str) -> Optional[Counts]:
+    """The counts in the localizer's own diagnostics; None in a message about something else."""
+    for status in message.status:
+        if status.name.lstrip('/') == f'{localizer.lstrip("/")}: images':
+            values = {item.key: item.value for item in status.values}
+            return Counts(*(int(values[name.capitalize()]) for name in Counts._fields))
+    return None
+
+
 class Recorder:
     """Collects the localizer's messages by the stamp of the image they belong to."""
 
@@ -68,12 +96,16 @@ class Recorder:
         self.poses: Dict[rospy.Time, PoseWithCovarianceStamped] = {}
         self.fixes: Dict[rospy.Time, NavSatFix] = {}
         self.statuses: Dict[rospy.Time, LocalizationStatus] = {}
-        self.last_answer_s: Optional[float] = None
+        self.last_change_s: Optional[float] = None
+        self._localizer = localizer
         self._has_map = False
+        self._before: Optional[Counts] = None
+        self._now: Optional[Counts] = None
         self._subscribers = [
             self._subscribe(f'{localizer}/pose', PoseWithCovarianceStamped, self.poses),
             self._subscribe(f'{localizer}/fix', NavSatFix, self.fixes),
-            rospy.Subscriber(f'{localizer}/status', LocalizationStatus, self._on_status)]
+            rospy.Subscriber(f'{localizer}/status', LocalizationStatus, self._on_status),
+            rospy.Subscriber('/diagnostics', DiagnosticArray, self._on_diagnostics)]
         rospy.Subscriber(f'{localizer}/map_path', PathMessage, self._on_map)
 
     @staticmethod
@@ -87,21 +119,32 @@ class Recorder:
         if message.best_image < 0 or message.header.stamp.is_zero():  # no answer to an image: no map, or none came
             return
         self.statuses[message.header.stamp] = message
-        self.last_answer_s = time.monotonic()
+        self.last_change_s = time.monotonic()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        counts = read_counts(message, self._localizer)
+        if counts and counts != self._now:
+            self._now = counts
+            self.last_change_s = time.monotonic()
 
     def is_ready(self) -> bool:
         """Whether the localizer has a map and nothing it says would be missed."""
-        return self._has_map and all(subscriber.get_num_connections() > 0 for subscriber in self._subscribers)
+        return (self._has_map and self._now is not None
+                and all(subscriber.get_num_connections() > 0 for subscriber in self._subscribers))
+
+    def start(self) -> None:
+        """Counts from now on."""
+        self._before = self._now
+        self.last_change_s = None
 
     def last_status(self) -> Optional[LocalizationStatus]:
         """The status of the newest image."""
         statuses = dict(self.statuses)
         return statuses[max(statuses)] if statuses else None
 
-    def answered(self) -> int:
-        """Images that the localizer has dealt with, in one way or the other."""
-        status = self.last_status()
-        return status.images_processed + status.images_dropped + status.images_refused if status else 0
+    def counts(self) -> Counts:
+        """What the localizer has counted since start()."""
+        return self._now.since(self._before)
 
 
 def count_messages(bag: Path, topic: str) -> int:
@@ -124,16 +167,16 @@ def show_progress(recorder: Recorder, expected: int) -> None:
     """One line that renews itself; nothing when nobody looks."""
     status = recorder.last_status()
     if sys.stderr.isatty() and status:
-        print(f'\r  {recorder.answered():4d} of {expected} images  {status.state_name:<12}', end='', file=sys.stderr,
-              flush=True)
+        print(f'\r  {recorder.counts().settled():4d} of {expected} images  {status.state_name:<12}', end='',
+              file=sys.stderr, flush=True)
 
 
 def collect(recorder: Recorder, expected: int, start_deadline_s: float, silence_s: float) -> None:
-    """Returns when every image has been answered, or when no answer has come for a while."""
+    """Returns when every image has come to an end in the localizer, or when nothing has happened for a while."""
     begin = time.monotonic()
-    while not rospy.is_shutdown() and recorder.answered() < expected:
+    while not rospy.is_shutdown() and recorder.counts().settled() < expected:
         show_progress(recorder, expected)
-        limit = begin + start_deadline_s if recorder.last_answer_s is None else recorder.last_answer_s + silence_s
+        limit = begin + start_deadline_s if recorder.last_change_s is None else recorder.last_change_s + silence_s
         if time.monotonic() > limit:
             break
         time.sleep(0.1)
@@ -148,8 +191,7 @@ def row(stamp: rospy.Time, recorder: Recorder, truth: Truth) -> Dict[str, object
     status, pose, fix = recorder.statuses[stamp], recorder.poses.get(stamp), recorder.fixes.get(stamp)
     result = {'stamp': f'{stamp.to_sec():.9f}', 'state': status.state_name, 'similarity': status.best_similarity,
               'features': FEATURES.get(status.features, status.features), 'comparisons': status.comparisons,
-              'extract_ms': status.extract_ms, 'match_ms': status.match_ms, 'update_ms': status.update_ms,
-              'images_dropped': status.images_dropped, 'images_refused': status.images_refused}
+              'extract_ms': status.extract_ms, 'match_ms': status.match_ms, 'update_ms': status.update_ms}
     exact = truth.at(stamp.to_sec())
     if exact:
         result['true_latitude_deg'], result['true_longitude_deg'] = exact
@@ -174,17 +216,23 @@ def write_track(path: Path, rows: List[Dict[str, object]]) -> None:
     partial.replace(path)
 
 
+def write_counts(path: Path, in_bag: int, counts: Counts, answered: int) -> None:
+    """Writes what became of the images of the bag."""
+    path.write_text(json.dumps({'in_bag': in_bag, 'answered': answered, **counts._asdict()}) + '\n', encoding='utf-8')
+
+
 def parse_arguments() -> argparse.Namespace:
     """Command line without what roslaunch adds."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--bag', type=Path, required=True, help='the bag that will be played')
-    parser.add_argument('--output', type=Path, required=True, help='CSV to write')
+    parser.add_argument('--output', type=Path, required=True,
+                        help='CSV to write; the counts go into the same name with .json')
     parser.add_argument('--ready', type=Path, help='file to create when the bag may be played')
     parser.add_argument('--localizer', default='/localizer', help='name of the node (default: %(default)s)')
     parser.add_argument('--image-topic', default='/stereo/left/image_raw/compressed', help='in the bag')
     parser.add_argument('--truth-topic', default='/ground_truth/fix', help='in the bag')
     parser.add_argument('--deadline', type=float, default=60.0, help='seconds to wait for localizer and first image')
-    parser.add_argument('--silence', type=float, default=15.0, help='seconds without an answer that end the recording')
+    parser.add_argument('--silence', type=float, default=15.0, help='seconds without a change that end the recording')
     return parser.parse_args(rospy.myargv()[1:])
 
 
@@ -199,12 +247,15 @@ def main() -> int:
     rospy.init_node('record_track', anonymous=True, disable_signals=True)
     recorder = Recorder(args.localizer)
     if not wait_until_ready(recorder, args.deadline):
-        print(f'record_track: {args.localizer} had no map within {args.deadline:.0f} s', file=sys.stderr)
+        print(f'record_track: {args.localizer} had no map, or no diagnostics, within {args.deadline:.0f} s',
+              file=sys.stderr)
         return 1
+    recorder.start()
     if args.ready:
         args.ready.touch()
     collect(recorder, expected, args.deadline, args.silence)
     write_track(args.output, [row(stamp, recorder, truth) for stamp in sorted(recorder.statuses)])
+    write_counts(args.output.with_suffix('.json'), expected, recorder.counts(), len(recorder.statuses))
     if not recorder.statuses:
         print(f'record_track: {args.localizer} answered none of the {expected} images', file=sys.stderr)
         return 1

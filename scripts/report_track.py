@@ -1,11 +1,13 @@
 #!/usr/bin/python3
 """Judges and plots a track that record_track.py wrote.
 
-Prints error, cost and states, and draws track, error and state over time as PNG and SVG. Exit code 1 when the robot was
-not localised: no pose, never tracking, or a median error above --max-median-error.
+Prints what became of the images, error, cost and states, and draws track, error and state over time as PNG and SVG.
+Exit code 1 when the robot was not localised: no pose, never tracking, or a median error above --max-median-error; and
+when the counts of images do not add up.
 """
 import argparse
 import csv
+import json
 import math
 import sys
 from pathlib import Path
@@ -33,8 +35,6 @@ class Track:
         self.comparisons = self._column(rows, 'comparisons')
         self.milliseconds = sum(self._column(rows, name) for name in ('extract_ms', 'match_ms', 'update_ms'))
         self.states = np.array([row['state'] for row in rows])
-        self.dropped = int(np.nanmax(self._column(rows, 'images_dropped')))
-        self.refused = int(np.nanmax(self._column(rows, 'images_refused')))
         self.true_east, self.true_north = self._truth(rows)
 
     @staticmethod
@@ -58,6 +58,37 @@ class Track:
         return self.east[tie] + east, self.north[tie] + north
 
 
+class Counts:
+    """What became of the images of the bag."""
+
+    def __init__(self, path: Path):
+        try:
+            values = json.loads(path.read_text(encoding='utf-8'))
+        except (OSError, ValueError) as error:
+            raise SystemExit(f'report_track: no counts of images in {path}: {error}') from error
+        self.in_bag, self.answered = values['in_bag'], values['answered']
+        self.received, self.processed = values['received'], values['processed']
+        self.dropped, self.late, self.refused = values['dropped'], values['late'], values['refused']
+        self.never_received = self.in_bag - self.received
+
+    def line(self) -> str:
+        """For people."""
+        return (f'images           {self.in_bag} in the bag: {self.answered} answered, {self.dropped} dropped for a '
+                f'newer one, {self.late} late, {self.refused} refused, {self.never_received} never received')
+
+    def contradiction(self) -> Optional[str]:
+        """Why the counts do not add up, in words; None when they do."""
+        if self.never_received < 0:
+            return (f'the node received {self.received} images, more than the {self.in_bag} of the bag: something else '
+                    f'publishes on its topic')
+        if self.answered != self.processed:
+            return f'the node answered {self.processed} images, but {self.answered} answers were recorded'
+        ends = self.answered + self.dropped + self.late + self.refused
+        if ends != self.received:
+            return f'the node received {self.received} images, but {ends} are answered, dropped, late or refused'
+        return None
+
+
 def read_csv(path: Path) -> List[Dict[str, str]]:
     """Rows of a CSV file by column name."""
     with open(path, newline='', encoding='utf-8') as file:
@@ -78,8 +109,7 @@ def summary(track: Track) -> List[str]:
     """What came out, in lines for people."""
     judged = track.error[np.isfinite(track.error)]
     poses = int(np.isfinite(track.east).sum())
-    lines = [f'images           {track.count} answered, {poses} with a pose, {track.dropped} dropped, '
-             f'{track.refused} refused']
+    lines = [f'poses            {poses} of {track.count} answers']
     if judged.size:
         lines.append(f'error            mean {judged.mean():.2f} m, median {np.median(judged):.2f} m, '
                      f'within 5 m {100 * np.mean(judged < 5):.1f} %')
@@ -157,6 +187,7 @@ def parse_arguments() -> argparse.Namespace:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('track', type=Path, help='CSV that record_track.py wrote')
+    parser.add_argument('--counts', type=Path, help='JSON that record_track.py wrote (default: beside the track)')
     parser.add_argument('--map-csv', type=Path, help='what map_info --export-csv wrote')
     parser.add_argument('--plot', type=Path, help='path of the plots without suffix (default: beside the track)')
     parser.add_argument('--max-median-error', type=float, default=10.0, help='metres (default: %(default)s)')
@@ -171,12 +202,16 @@ def main() -> int:
         print(f'report_track: {args.track} holds no image', file=sys.stderr)
         return 1
     track = Track(rows)
-    print('\n'.join(summary(track)))
+    counts = Counts(args.counts or args.track.with_suffix('.json'))
+    print('\n'.join([counts.line()] + summary(track)))
     paths = plot(track, read_map(args.map_csv), args.plot or args.track.with_suffix(''))
     print('plot             ' + ' and '.join(str(path) for path in paths))
-    if track.dropped:
-        print(f'report_track: {track.dropped} images came too fast and were dropped; play the bag slower',
-              file=sys.stderr)
+    if counts.dropped or counts.never_received:
+        print('report_track: images came faster than this machine takes them; play the bag slower', file=sys.stderr)
+    contradiction = counts.contradiction()
+    if contradiction:
+        print(f'report_track: the counts do not add up: {contradiction}', file=sys.stderr)
+        return 1
     reason = failure(track, args.max_median_error)
     if reason:
         print(f'report_track: not localised: {reason}', file=sys.stderr)

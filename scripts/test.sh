@@ -3,6 +3,8 @@
 set -euo pipefail
 repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo
+# shellcheck source=scripts/build_progress.sh
+source "$repo/scripts/build_progress.sh"
 
 usage() {
   cat <<'USAGE'
@@ -10,11 +12,10 @@ Usage: test.sh [--preset NAME] [--tests REGEX] [--no-lint]
   --preset NAME  test (default), release, debug, asan, tsan, coverage, or core-only (without ROS)
   --tests REGEX  run only the tests whose name matches
   --no-lint      leave out formatting, import directions and the checks of the scripts
-Builds in build/NAME. Exit code 0 when everything passed; tests that were skipped are listed as such.
+Builds in build/NAME; the output of the build is in build/NAME.log. Exit code 0 when everything passed; tests that were
+skipped are listed as such. A rostest without a report is an error.
 USAGE
 }
-
-step() { printf '\n== %s\n' "$*"; }
 
 check_style() {
   step "Style"
@@ -28,44 +29,25 @@ check_style() {
   echo "scripts: clean"
 }
 
+# Builds a target, or everything.
+make_target() {
+  with_progress "build${1:+ $1}" "$log" cmake --build "$build" --parallel "$(nproc)" ${1:+--target "$1"} \
+    || { show_errors "$log"; fail "the build failed: $log"; }
+}
+
 build() {
   step "Build ($preset)"
   cd "$repo"
-  cmake --preset "$preset" >"$build.configure.log" 2>&1 || { cat "$build.configure.log"; exit 1; }
-  cmake --build "$build" --parallel "$(nproc)"
+  local version
+  version=$(cmake --version | sed -n 's/^cmake version //p')
+  [[ $(printf '%s\n' 3.25 "$version" | sort --version-sort | head -n 1) == 3.25 ]] \
+    || fail "the presets need CMake 3.25, this is $version: configure by hand, as scripts/test_releases.sh does"
+  cmake --preset "$preset" >>"$log" 2>&1 || { show_errors "$log"; fail "CMake failed: $log"; }
+  make_target ''
   # catkin keeps the programs of its rostests out of `all`.
   local targets
   targets=$(cmake --build "$build" --target help)
-  if grep -qx '\.\.\. tests' <<<"$targets"; then
-    cmake --build "$build" --target tests --parallel "$(nproc)"
-  fi
-}
-
-# Prints how many single tests ran, from the reports of ctest and of rostest.
-print_counts() {
-  python3 - "$build" <<'PYTHON'
-import sys, xml.etree.ElementTree as xml
-from pathlib import Path
-
-def is_skipped(case):
-    return case.find('skipped') is not None or case.get('status') == 'notrun' or case.get('result') == 'skipped'
-
-def is_failed(case):
-    return case.find('failure') is not None or case.find('error') is not None
-
-def show(title, paths):
-    cases = [case for path in paths for case in xml.parse(path).iter('testcase')]
-    skipped, failed = [sum(map(test, cases)) for test in (is_skipped, is_failed)]
-    print(f'{title}: {len(cases)} tests, {len(cases) - failed - skipped} passed, {failed} failed, {skipped} skipped')
-    return [case for case in cases if is_skipped(case)]
-
-build = Path(sys.argv[1])
-show('ctest', [build / 'ctest.xml'])
-reports = sorted(build.glob('test_results/**/rosunit-*.xml'))
-if reports:
-    for case in show('inside the rostests', reports):
-        print(f'  skipped: {case.get("classname")}.{case.get("name")}')
-PYTHON
+  if grep -qx '\.\.\. tests' <<<"$targets"; then make_target tests; fi
 }
 
 run_tests() {
@@ -75,7 +57,6 @@ run_tests() {
   # Nothing of the caller's own ROS may reach the tests: rostest brings its own master.
   unset ROS_MASTER_URI ROS_HOSTNAME ROS_NAMESPACE
   export ROS_IP=127.0.0.1 ROS_HOME=$build/ros_home QT_QPA_PLATFORM=offscreen MPLBACKEND=Agg
-  rm -rf "$build/test_results"
   if [[ -f $build/devel/setup.bash ]]; then
     set +u
     # shellcheck disable=SC1091
@@ -83,8 +64,9 @@ run_tests() {
     set -u
   fi
   cd "$repo"
+  scripts/count_tests.py "$build" --clear
   ctest "${arguments[@]}" --no-tests=error || result=$?
-  print_counts
+  scripts/count_tests.py "$build" || result=1
   return "$result"
 }
 
@@ -100,12 +82,15 @@ main() {
     esac
     shift
   done
-  local build=$repo/build/$preset
+  local build=$repo/build/$preset log=$repo/build/$preset.log
 
+  echo "Installs what is missing, builds in build/$preset and runs the tests. To install and build takes 5 to 15"
+  echo "minutes on two cores and 3 GB of disk the first time. Log: build/$preset.log"
   # Another python3 may stand first on the PATH; ROS needs the system's.
   export PATH=/usr/bin:$PATH
   mkdir -p "$repo/build"
-  local packages=()
+  : >"$log"
+  local packages=(--log "$log")
   if [[ $lint == true ]]; then packages+=(--with-lint); fi
   if [[ $preset == core-only ]]; then packages+=(--core-only); fi
   "$repo/scripts/install_dependencies.sh" "${packages[@]}"

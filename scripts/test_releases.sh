@@ -1,0 +1,144 @@
+#!/usr/bin/env bash
+# Installs, builds and tests the checkout's HEAD in a bare tree of each Debian release. By hand and as root.
+set -euo pipefail
+repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+readonly repo
+# shellcheck source=scripts/build_progress.sh
+source "$repo/scripts/build_progress.sh"
+readonly releases=(bullseye bookworm trixie)
+# Where the checkout and its build are in a tree; test.sh builds in the same folder.
+readonly source_dir=/root/visual_localization build_dir=/root/visual_localization/build/test
+
+usage() {
+  cat <<'USAGE'
+Usage: test_releases.sh [--release NAME]... [--directory DIR] [--mirror URL] [--jobs N] [--keep] [--reuse]
+  --release NAME   bullseye, bookworm or trixie; may be repeated (default: all three)
+  --directory DIR  for the trees and their logs (default: build/releases)
+  --mirror URL     Debian mirror (default: that of this machine's apt)
+  --jobs N         parallel jobs (default: number of processors)
+  --keep           leave the trees when they have passed; those that failed are always left
+  --reuse          use the trees that were left, with HEAD copied and built anew
+Makes a bare tree with debootstrap, copies HEAD into it, and there runs scripts/install_dependencies.sh, the build with
+warnings as errors, and all tests. For Debian 11 it first builds CLI11 and Highway from the source packages of
+Debian 12. Needs debootstrap and 5 GB of disk a release. Prints one line of result a release; exit code 0 when all
+passed.
+USAGE
+}
+
+# The mirror of Debian itself that apt uses here.
+mirror_of_host() {
+  apt-get indextargets --format "\$(REPO_URI)" 'Created-By: Packages' 'Label: Debian' | head -n 1
+}
+
+# Runs commands in the tree. What they mount and start ends with them.
+in_tree() {
+  # shellcheck disable=SC2016
+  unshare --mount --pid --fork --kill-child bash -euc '
+    mount -t proc proc "$1/proc"
+    mount -t devpts devpts "$1/dev/pts"
+    mount -t tmpfs tmpfs "$1/dev/shm"
+    exec chroot "$1" env --ignore-environment HOME=/root LANG=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin \
+      DEBIAN_FRONTEND=noninteractive QT_QPA_PLATFORM=offscreen MPLBACKEND=Agg ${http_proxy:+http_proxy="$http_proxy"} \
+      bash -euo pipefail -c "$2"' in_tree "$tree" "$1"
+}
+
+# Chained by &&: where the steps are called, set -e is without effect. policy-rc.d keeps services from starting.
+make_tree() {
+  rm -rf --one-file-system "$tree" \
+    && debootstrap --variant=minbase --include=ca-certificates "$release" "$tree" "$mirror" \
+    && cp /etc/hosts /etc/resolv.conf "$tree/etc/" \
+    && install -m 755 /dev/stdin "$tree/usr/sbin/policy-rc.d" <<<$'#!/bin/sh\nexit 101'
+}
+
+copy_checkout() {
+  rm -rf "$tree$source_dir" \
+    && mkdir -p "$tree$source_dir" \
+    && git -C "$repo" archive HEAD | tar --extract --directory "$tree$source_dir"
+}
+
+# Debian 11 has no package of CLI11 and Highway.
+install_sources() {
+  echo "deb-src $mirror bookworm main" >"$tree/etc/apt/sources.list.d/bookworm-source.list" && in_tree "apt-get update
+    apt-get install --yes --no-install-recommends cmake g++ make dpkg-dev
+    mkdir -p /root/sources
+    cd /root/sources
+    apt-get source cli11 highway
+    $source_dir/scripts/install_from_source.sh cli11-*/ highway-*/"
+}
+
+install_packages() {
+  in_tree "apt-get update && $source_dir/scripts/install_dependencies.sh"
+}
+
+configure() {
+  in_tree "cmake -S $source_dir -B $build_dir -DCMAKE_BUILD_TYPE=RelWithDebInfo -DVISUAL_LOCALIZATION_WERROR=ON \
+    -DPYTHON_EXECUTABLE=/usr/bin/python3"
+}
+
+# catkin keeps the programs of its tests out of `all`.
+build() {
+  in_tree "cmake --build $build_dir --parallel $jobs
+    targets=\$(cmake --build $build_dir --target help)
+    if grep -qx '\.\.\. tests' <<<\"\$targets\"; then cmake --build $build_dir --target tests --parallel $jobs; fi"
+}
+
+run_tests() {
+  in_tree "cd $build_dir && ctest --output-on-failure --no-tests=error --parallel $jobs"
+}
+
+# Runs one step after the other; the log holds everything. Prints the result.
+test_release() {
+  local step steps=(make_tree copy_checkout) tree=$directory/$release log=$directory/$release.log
+  if [[ $release == bullseye ]]; then steps+=(install_sources); fi
+  if [[ $reuse == true && -d $tree ]]; then steps=(copy_checkout); fi
+  steps+=(install_packages configure build run_tests)
+  : >"$log"
+  for step in "${steps[@]}"; do
+    if ! with_progress "$release ${step//_/ }" "$log" "$step"; then
+      results+=("$release: FAILED in ${step//_/ }; log $log, tree $tree")
+      return 1
+    fi
+  done
+  local summary not_run
+  summary=$(grep -E 'tests passed, .* tests failed out of' "$log" | tail -n 1)
+  not_run=$(grep -cE '\*\*\*(Skipped|Not Run)' "$log") || true
+  results+=("$release: $summary, $not_run skipped; log $log")
+  if [[ $keep == false ]]; then rm -rf --one-file-system "$tree"; fi
+}
+
+main() {
+  local directory=$repo/build/releases mirror='' jobs keep=false reuse=false chosen=() release results=() result=0
+  jobs=$(nproc)
+  while (($#)); do
+    case $1 in
+      --release)
+        if [[ " ${releases[*]} " != *" ${2:-} "* ]]; then usage >&2; exit 2; fi
+        chosen+=("$2")
+        shift
+        ;;
+      --directory) directory=${2:?--directory needs a folder}; shift ;;
+      --mirror) mirror=${2:?--mirror needs a URL}; shift ;;
+      --jobs) jobs=${2:?--jobs needs a number}; shift ;;
+      --keep) keep=true ;;
+      --reuse) reuse=true ;;
+      -h | --help) usage; exit 0 ;;
+      *) usage >&2; exit 2 ;;
+    esac
+    shift
+  done
+  ((${#chosen[@]})) || chosen=("${releases[@]}")
+  ((EUID == 0)) || fail "only root can make a tree"
+  command -v debootstrap >/dev/null || fail "debootstrap is missing: apt-get install debootstrap"
+  if [[ -z $mirror ]]; then mirror=$(mirror_of_host); fi
+  [[ -n $mirror ]] || fail "apt tells no Debian mirror here: name one with --mirror"
+  mkdir -p "$directory"
+  touch "$directory/CATKIN_IGNORE"
+  directory=$(cd "$directory" && pwd)
+
+  echo "Tests $(git -C "$repo" log -1 --format='%h %s') on ${chosen[*]}. Logs: $directory/*.log"
+  for release in "${chosen[@]}"; do test_release || result=1; done
+  printf '%s\n' "${results[@]}"
+  return "$result"
+}
+
+main "$@"
