@@ -4,6 +4,7 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/imgproc.hpp>
 
+#include "features/global_histograms.h"
 #include "visual_localization/features/global_features.h"
 
 namespace visual_localization::benchmarks {

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Parameters while the node runs: by the tools of dynamic_reconfigure, without losing the track."""
+import json
 import os
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import unittest
 import roslib.packages
 import rospy
 import rostest
+import yaml
 from dynamic_reconfigure.client import Client
 from rosgraph_msgs.msg import Log
 
@@ -24,6 +26,14 @@ def run(*command):
     """What a command line tool prints."""
     return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True,
                           timeout=60, check=True).stdout
+
+
+def make_plain(path):
+    """The dump of dynparam without Python objects, which Debian 11's dynparam writes but does not read."""
+    with open(path, encoding='utf-8') as dump:
+        values = yaml.unsafe_load(dump)
+    with open(path, 'w', encoding='utf-8') as dump:
+        yaml.safe_dump(json.loads(json.dumps(values)), dump)
 
 
 def values_of(config):
@@ -109,6 +119,7 @@ class ReconfigureTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, 'dump.yaml')
             run(*DYNPARAM, 'dump', 'localizer', path)
+            make_plain(path)
             before = self.values()
             self.client.update_configuration({'tracker': 'pf_linear', 'dpso/particles': 80, 'prune': False,
                                               'state/max_step': 12.5})
