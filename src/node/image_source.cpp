@@ -6,6 +6,7 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
+#include "base/text.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/image_conversion.h"
 
@@ -24,9 +25,8 @@ std::set<std::string> knownTransports(const image_transport::ImageTransport& ima
 
 void requireKnown(const std::string& transport, const std::set<std::string>& known) {
   if (known.count(transport) != 0) return;
-  std::string all;
-  for (const auto& name : known) all += (all.empty() ? "" : ", ") + name;
-  throw ParameterError("parameter 'image_transport' = '" + transport + "' is not allowed: installed are " + all);
+  throw ParameterError("parameter 'image_transport' = '" + transport + "' is not allowed: installed are " +
+                       joined(known));
 }
 
 template <class MessagePtr>

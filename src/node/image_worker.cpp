@@ -16,7 +16,7 @@ StampMonitor::Verdict StampMonitor::judge(std::int64_t stamp_ns) {
     late_ns_.reset();
     return Verdict::kInOrder;
   }
-  lag_s_ = static_cast<double>(*newest_ns_ - stamp_ns) * 1e-9;
+  lag_s_ = secondsBetween(stamp_ns, *newest_ns_);
   if (!late_ns_ || stamp_ns < *late_ns_) {
     late_ns_ = stamp_ns;
     return Verdict::kLate;

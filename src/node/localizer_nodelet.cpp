@@ -6,6 +6,7 @@
 #include <nodelet/exception.h>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "base/text.h"
 #include "node/parameter_server.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
@@ -152,10 +153,9 @@ void LocalizerNodelet::configure(const NodeParameters& parameters, const Paramet
   localizer_->configure(parameters.localizer);
   diagnostics_->setImageTimeout(parameters.node.image_timeout_s);
   publisher_->setTransformTolerance(parameters.node.transform_tolerance_s);
-  std::string all;
-  for (const auto& [name, value] : changed)
-    all += (all.empty() ? "" : ", ") + name + " = " + parameters::toString(value);
-  NODELET_INFO_STREAM("Parameters changed: " << all);
+  std::vector<std::string> settings;
+  for (const auto& [name, value] : changed) settings.push_back(name + " = " + parameters::toString(value));
+  NODELET_INFO_STREAM("Parameters changed: " << joined(settings));
 }
 
 void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {

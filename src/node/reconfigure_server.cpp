@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/text.h"
 #include "node/parameter_server.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -32,13 +33,13 @@ std::string groupOf(const std::string& name) {
 
 /// A Python dictionary, which the tools evaluate; options are plain words.
 std::string enumOf(const std::vector<std::string>& options) {
-  std::string all;
+  std::vector<std::string> entries;
   for (const std::string& option : options) {
-    all += (all.empty() ? "" : ", ") + std::string("{'name': '") + option + "', 'type': 'str', 'value': '" + option +
-           "', 'description': '', 'srcline': 0, 'srcfile': '', 'cconsttype': 'const char * const', "
-           "'ctype': 'std::string'}";
+    entries.push_back("{'name': '" + option + "', 'type': 'str', 'value': '" + option +
+                      "', 'description': '', 'srcline': 0, 'srcfile': '', 'cconsttype': 'const char * const', "
+                      "'ctype': 'std::string'}");
   }
-  return "{'enum': [" + all + "], 'enum_description': ''}";
+  return "{'enum': [" + joined(entries) + "], 'enum_description': ''}";
 }
 
 /// Leaves out what is read at the start only.

@@ -10,6 +10,8 @@
 #include <cv_bridge/cv_bridge.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "base/text.h"
+
 namespace visual_localization {
 namespace {
 
@@ -41,9 +43,9 @@ const Encoding& encodingOf(const std::string& name) {
   const auto* found =
       std::find_if(kEncodings.begin(), kEncodings.end(), [&name](const Encoding& known) { return name == known.name; });
   if (found != kEncodings.end()) return *found;
-  std::string all;
-  for (const Encoding& known : kEncodings) all += (all.empty() ? "" : ", ") + std::string(known.name);
-  throw ImageError("image encoding " + printable(name) + " is not supported; supported are " + all);
+  std::vector<std::string> names;
+  for (const Encoding& known : kEncodings) names.emplace_back(known.name);
+  throw ImageError("image encoding " + printable(name) + " is not supported; supported are " + joined(names));
 }
 
 void requireSize(std::uint64_t width, std::uint64_t height) {
