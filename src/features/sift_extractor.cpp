@@ -40,18 +40,6 @@ class OpenCvSiftExtractor : public SiftExtractor {
 
 }  // namespace
 
-bool isExtractable(const cv::Mat& grey) {
-  return grey.type() == CV_8UC1 && grey.rows >= kSmallestImageSide_px && grey.cols >= kSmallestImageSide_px;
-}
-
-void requireExtractable(const cv::Mat& grey) {
-  if (isExtractable(grey)) return;
-  if (grey.type() != CV_8UC1) throw std::invalid_argument("image must be 8-bit with one channel");
-  const std::string side = std::to_string(kSmallestImageSide_px);
-  throw std::invalid_argument("image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
-                              " pixels, must be at least " + side + "x" + side);
-}
-
 void SiftConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"sift/octave_layers", "1", "scale samples per octave"}, octave_layers, 1, 10);
   visitor.real({"sift/contrast_threshold", "1", "weakest accepted extremum, as a share of full intensity"},

@@ -3,9 +3,22 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace visual_localization {
+
+bool isExtractable(const cv::Mat& grey) {
+  return grey.type() == CV_8UC1 && grey.rows >= kSmallestImageSide_px && grey.cols >= kSmallestImageSide_px;
+}
+
+void requireExtractable(const cv::Mat& grey) {
+  if (isExtractable(grey)) return;
+  if (grey.type() != CV_8UC1) throw std::invalid_argument("image must be 8-bit with one channel");
+  const std::string side = std::to_string(kSmallestImageSide_px);
+  throw std::invalid_argument("image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
+                              " pixels, must be at least " + side + "x" + side);
+}
 
 SiftFeatures::SiftFeatures(std::vector<SiftKeypoint> keypoints, std::vector<std::uint8_t> descriptors) {
   swapIn(keypoints, descriptors);

@@ -1,7 +1,9 @@
 #include "visual_localization/features/sift_matcher.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include "base/statistics.h"
 #include "features/nearest_descriptors.h"
@@ -50,6 +52,14 @@ void forEachSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_a
   const AngleRatioTest& test = ratioTest(max_angle_ratio);
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (matchesBack(i, nearest, test)) use(FeatureMatch{i, nearest.of_a[i].index});
+  }
+}
+
+void offer(TwoNearest& nearest, float cosine, std::size_t candidate) {
+  if (cosine > nearest.best) {
+    nearest = {cosine, nearest.best, static_cast<std::uint32_t>(candidate)};
+  } else if (cosine > nearest.second) {
+    nearest.second = cosine;
   }
 }
 
@@ -128,5 +138,37 @@ void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, dou
   for (const FeatureMatch& match : matches) seen.push_back(match.a);
   features.subset(seen, kept);
 }
+
+void findNearestPlain(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+  nearest.of_a.assign(a.size(), TwoNearest());
+  nearest.of_b.assign(b.size(), TwoNearest());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::int32_t product =
+          std::inner_product(a.descriptor(i), a.descriptor(i) + SiftFeatures::kDescriptorSize, b.descriptor(j), 0);
+      const float cosine = static_cast<float>(product) * a.inverseNorm(i) * b.inverseNorm(j);
+      offer(nearest.of_a[i], cosine, j);
+      offer(nearest.of_b[j], cosine, i);
+    }
+  }
+}
+
+AngleRatioTest::AngleRatioTest(double max_angle_ratio) : max_angle_ratio_(max_angle_ratio) {
+  for (std::size_t i = 0; i <= kCells; ++i) {
+    bounds_[i] = std::cos(max_angle_ratio * std::acos(static_cast<double>(i) / kCells));
+  }
+}
+
+bool AngleRatioTest::exactly(float best, float second) const {
+  const double nearest = std::acos(std::min(1.0, static_cast<double>(best)));
+  const double next = std::acos(std::min(1.0, static_cast<double>(second)));
+  return nearest < max_angle_ratio_ * next;
+}
+
+#ifndef VISUAL_LOCALIZATION_HIGHWAY
+void findNearest(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+  findNearestPlain(a, b, nearest);
+}
+#endif
 
 }  // namespace visual_localization

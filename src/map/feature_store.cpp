@@ -9,12 +9,6 @@
 namespace visual_localization {
 namespace {
 
-/// A pointer that owns nothing, for what lives as long as the store: no count that threads would contend for.
-template <class T>
-std::shared_ptr<const T> unowned(const T& value) {
-  return {std::shared_ptr<const T>(), &value};
-}
-
 constexpr const char* kOfOneImage = " WHERE image = ?";
 
 std::size_t bytesOf(const SiftFeatures& features) {
@@ -35,12 +29,6 @@ MemoryFeatureStore::MemoryFeatureStore(std::vector<TrainingImage>&& images) {
     global_.push_back(image.global);
     previews_.push_back(std::move(image.preview_jpeg));
   }
-}
-
-std::shared_ptr<const SiftFeatures> MemoryFeatureStore::sift(std::size_t image) const { return unowned(sift_[image]); }
-
-std::shared_ptr<const GlobalFeatures> MemoryFeatureStore::global(std::size_t image) const {
-  return unowned(global_[image]);
 }
 
 FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path,

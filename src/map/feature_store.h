@@ -41,12 +41,18 @@ class MemoryFeatureStore final : public FeatureStore {
   /// Takes what the images looked like; of `images` only the poses are left.
   explicit MemoryFeatureStore(std::vector<TrainingImage>&& images);
 
-  std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
-  std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
+  std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override { return unowned(sift_[image]); }
+  std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override { return unowned(global_[image]); }
   std::vector<std::uint8_t> preview(std::size_t image) const override { return previews_[image]; }
   std::size_t globalsKept() const override { return std::numeric_limits<std::size_t>::max(); }
 
  private:
+  /// A pointer that owns nothing, for what lives as long as the store: no count that threads would contend for.
+  template <class T>
+  static std::shared_ptr<const T> unowned(const T& value) {
+    return {std::shared_ptr<const T>(), &value};
+  }
+
   std::vector<SiftFeatures> sift_;
   std::vector<GlobalFeatures> global_;
   std::vector<std::vector<std::uint8_t>> previews_;

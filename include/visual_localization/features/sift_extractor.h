@@ -30,14 +30,6 @@ constexpr const char* kOpenCvSift = "opencv";
 /// Those of this build.
 const std::vector<std::string>& siftBackends();
 
-/// Width and height of the smallest image that features are extracted from.
-constexpr int kSmallestImageSide_px = 16;
-
-/// Whether the image is 8-bit with one channel and large enough.
-bool isExtractable(const cv::Mat& grey);
-/// Throws std::invalid_argument, naming what is wrong, unless it is.
-void requireExtractable(const cv::Mat& grey);
-
 /// Image in, SIFT features out. Not thread-safe: one extractor a thread.
 class SiftExtractor {
  public:

@@ -4,7 +4,17 @@
 #include <cstdint>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
 namespace visual_localization {
+
+/// Width and height of the smallest image that features are extracted from.
+constexpr int kSmallestImageSide_px = 16;
+
+/// Whether the image is 8-bit with one channel and large enough.
+bool isExtractable(const cv::Mat& grey);
+/// Throws std::invalid_argument, naming what is wrong, unless it is.
+void requireExtractable(const cv::Mat& grey);
 
 /// Where a SIFT feature was found.
 struct SiftKeypoint {

@@ -9,7 +9,6 @@
 #include <opencv2/core.hpp>
 
 #include "visual_localization/localization/estimate.h"
-#include "visual_localization/localization/feature_choice.h"
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"

@@ -5,7 +5,6 @@
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
-#include "visual_localization/localization/feature_choice.h"
 #include "visual_localization/localization/score.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker_config.h"

@@ -33,4 +33,14 @@ struct SimilarityConfig {
   void declare(ParameterVisitor& visitor);
 };
 
+/// Thresholds of the hybrid choice (Weiss et al., section IV.B).
+struct HybridConfig {
+  double sift_below_m = 7.0;    ///< d_SIFT: after SIFT, global features are next when both sigmas are below
+  double global_above_m = 5.5;  ///< d_global: after global features, SIFT is next when one sigma is above
+  bool sift_in_doubt = true;    ///< SIFT also as long as the image looks more like another place
+  int sift_every = 10;          ///< SIFT at least so often, and then until an image confirms the position; 0: never
+
+  void declare(ParameterVisitor& visitor);
+};
+
 }  // namespace visual_localization
