@@ -1,20 +1,21 @@
 #include "visual_localization/bag/bag_reader.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <map>
 #include <memory>
 #include <new>
+#include <set>
+#include <string_view>
 #include <utility>
 
-#include <rosbag/view.h>
+#include <ros/serialization.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <sys/stat.h>
 
-#include "bag/bag_validator.h"
+#include "bag/bag_file.h"
 #include "base/text.h"
 #include "visual_localization/ros/image_conversion.h"
 
@@ -28,16 +29,10 @@ auto withBag(const std::string& path, Read read) {
     return read();
   } catch (const BagError&) {
     throw;
-  } catch (const UnsupportedBag& error) {
+  } catch (const bag::UnsupportedBag& error) {
     throw BagError(path + ": " + oneLine(error.what()));
-  } catch (const DamagedBag& error) {
+  } catch (const bag::DamagedBag& error) {
     throw BagError(path + ": bag is damaged or cut off: " + oneLine(error.what()));
-  } catch (const rosbag::BagUnindexedException&) {
-    throw BagError(path + ": bag is not indexed, as after an interrupted recording; `rosbag reindex` may repair it");
-  } catch (const rosbag::BagIOException& error) {
-    throw BagError(path + ": bag is damaged or cut off: " + oneLine(error.what()));
-  } catch (const rosbag::BagFormatException& error) {
-    throw BagError(path + ": not a readable bag: " + oneLine(error.what()));
   } catch (const std::bad_alloc&) {
     throw BagError(path + ": bag is damaged: it asks for more memory than there is");
   } catch (const std::exception& error) {
@@ -53,24 +48,21 @@ void requireFile(const std::string& path) {
   if (status.st_size == 0) throw BagError(path + ": is empty");
 }
 
-/// Topics by type, as far as the bag's connections tell.
-using Topics = std::map<std::string, std::vector<const rosbag::ConnectionInfo*>>;
+/// The connections of each topic of one message type.
+using Topics = std::map<std::string, std::set<std::uint32_t>>;
 
 template <class Message>
-Topics topicsOf(const rosbag::Bag& bag) {
+Topics topicsOf(const bag::BagFile& file) {
   Topics topics;
-  rosbag::View view(bag);
-  for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
-    if (connection->datatype == ros::message_traits::datatype<Message>()) {
-      topics[connection->topic].push_back(connection);
-    }
+  for (const auto& [id, connection] : file.connections()) {
+    if (connection.type == ros::message_traits::datatype<Message>()) topics[connection.topic].insert(id);
   }
   return topics;
 }
 
 /// For error messages, the first few: "/a (sensor_msgs/Image), /b (sensor_msgs/CompressedImage)".
 template <class... Messages>
-std::string listTopics(const rosbag::Bag& bag) {
+std::string listTopics(const bag::BagFile& file) {
   constexpr std::size_t kLongestList = 1000;
   std::string list;
   const auto append = [&list](const Topics& topics, const std::string& type) {
@@ -79,32 +71,27 @@ std::string listTopics(const rosbag::Bag& bag) {
       list += (list.empty() ? "" : ", ") + oneLine(entry.first) + " (" + type + ")";
     }
   };
-  (append(topicsOf<Messages>(bag), ros::message_traits::datatype<Messages>()), ...);
+  (append(topicsOf<Messages>(file), ros::message_traits::datatype<Messages>()), ...);
   return list.empty() ? "none" : list;
 }
 
 /// All messages of one topic and type. A definition that is not ours is refused rather than misread.
 template <class Message>
-std::vector<rosbag::MessageInstance> messagesOf(const rosbag::Bag& bag, const std::string& topic) {
-  const Topics topics = topicsOf<Message>(bag);
-  for (const rosbag::ConnectionInfo* connection : topics.at(topic)) {
-    if (connection->md5sum == ros::message_traits::md5sum<Message>()) continue;
+std::vector<bag::Message> messagesOf(const bag::BagFile& file, const std::string& topic) {
+  const std::set<std::uint32_t> connections = topicsOf<Message>(file).at(topic);
+  for (const std::uint32_t id : connections) {
+    const std::string& md5sum = file.connections().at(id).md5sum;
+    if (md5sum == ros::message_traits::md5sum<Message>()) continue;
     throw std::runtime_error("topic '" + topic + "' has another definition of " +
-                             ros::message_traits::datatype<Message>() + " (md5 " + connection->md5sum + ")");
+                             ros::message_traits::datatype<Message>() + " (md5 " + md5sum + ")");
   }
-  rosbag::View view(bag, [&topic](const rosbag::ConnectionInfo* connection) {
-    return connection->topic == topic && connection->datatype == ros::message_traits::datatype<Message>();
-  });
-  std::vector<rosbag::MessageInstance> messages;
-  messages.reserve(view.size());
-  for (const rosbag::MessageInstance& message : view) messages.push_back(message);
-  return messages;
+  return file.messages(connections);
 }
 
 /// Steps over a serialized message without allocating what its lengths claim.
 class Cursor {
  public:
-  explicit Cursor(const std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
+  explicit Cursor(std::string_view bytes) : bytes_(bytes) {}
 
   Cursor& skip(std::uint64_t count) {
     if (count > bytes_.size() - at_) throw ImageError("message is broken: it is shorter than its lengths claim");
@@ -115,56 +102,49 @@ class Cursor {
   Cursor& skipArray() {
     const std::size_t from = at_;
     skip(4);
-    std::uint64_t length = 0;
-    for (std::size_t i = 4; i > 0; --i) length = length * 256 + bytes_[from + i - 1];
-    return skip(length);
+    return skip(bag::numberAt(bytes_, from, 4));
   }
 
  private:
-  const std::vector<std::uint8_t>& bytes_;
+  std::string_view bytes_;
   std::size_t at_ = 0;
 };
 
-Cursor skipHeader(const std::vector<std::uint8_t>& bytes) { return Cursor(bytes).skip(12).skipArray(); }
+Cursor skipHeader(std::string_view bytes) { return Cursor(bytes).skip(12).skipArray(); }
 
-void requireLengths(const std::vector<std::uint8_t>& bytes, const sensor_msgs::Image*) {
+void requireLengths(std::string_view bytes, const sensor_msgs::Image*) {
   skipHeader(bytes).skip(8).skipArray().skip(5).skipArray();
 }
 
-void requireLengths(const std::vector<std::uint8_t>& bytes, const sensor_msgs::CompressedImage*) {
+void requireLengths(std::string_view bytes, const sensor_msgs::CompressedImage*) {
   skipHeader(bytes).skipArray().skipArray();
 }
 
-void requireLengths(const std::vector<std::uint8_t>& bytes, const sensor_msgs::NavSatFix*) {
-  skipHeader(bytes).skip(3 + 12 * 8 + 1);
-}
+void requireLengths(std::string_view bytes, const sensor_msgs::NavSatFix*) { skipHeader(bytes).skip(3 + 12 * 8 + 1); }
 
 /// Throws ImageError when the lengths inside the message do not fit.
 template <class Message>
-std::shared_ptr<const Message> deserialize(const rosbag::MessageInstance& instance) {
-  std::vector<std::uint8_t> bytes(instance.size());
-  ros::serialization::OStream out(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-  instance.write(out);
+std::shared_ptr<const Message> deserialize(std::string bytes) {
   requireLengths(bytes, static_cast<const Message*>(nullptr));
   auto message = std::make_shared<Message>();
-  ros::serialization::IStream in(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::IStream in(reinterpret_cast<std::uint8_t*>(bytes.data()),
+                                 static_cast<std::uint32_t>(bytes.size()));
   ros::serialization::deserialize(in, *message);
   return message;
 }
 
-std::int64_t nanoseconds(const ros::Time& time) { return std::int64_t{time.sec} * 1'000'000'000 + time.nsec; }
-
-std::int64_t stampOf(const std_msgs::Header& header, const rosbag::MessageInstance& instance) {
-  return nanoseconds(header.stamp.isZero() ? instance.getTime() : header.stamp);
+std::int64_t stampOf(const std_msgs::Header& header, const bag::Message& message) {
+  if (header.stamp.isZero()) return message.stamp_ns;
+  return std::int64_t{header.stamp.sec} * 1'000'000'000 + header.stamp.nsec;
 }
 
 template <class Message>
-BagImage readImage(const rosbag::MessageInstance& instance) {
+BagImage readImage(std::string bytes, const bag::Message& from) {
   try {
-    const auto message = deserialize<Message>(instance);
-    return {stampOf(message->header, instance), [message] { return toGrey(*message); }};
+    const auto message = deserialize<Message>(std::move(bytes));
+    return {stampOf(message->header, from), [message] { return toGrey(*message); }};
   } catch (const ImageError& error) {
-    return {nanoseconds(instance.getTime()), [error]() -> cv::Mat { throw error; }};
+    return {from.stamp_ns, [error]() -> cv::Mat { throw error; }};
   }
 }
 
@@ -176,52 +156,65 @@ Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
 
 }  // namespace
 
+struct BagImages::Content {
+  std::string path;
+  std::shared_ptr<bag::BagFile> file;
+  std::string topic;
+  bool is_compressed = false;
+  std::vector<bag::Message> messages;
+};
+
+std::size_t BagImages::size() const { return content_->messages.size(); }
+
+const std::string& BagImages::topic() const { return content_->topic; }
+
 BagImage BagImages::read(std::size_t i) const {
-  return withBag(path_, [&] {
-    const rosbag::MessageInstance& instance = messages_.at(i);
-    return compressed_ ? readImage<sensor_msgs::CompressedImage>(instance) : readImage<sensor_msgs::Image>(instance);
+  return withBag(content_->path, [&] {
+    const bag::Message& message = content_->messages.at(i);
+    std::string bytes = content_->file->read(message);
+    return content_->is_compressed ? readImage<sensor_msgs::CompressedImage>(std::move(bytes), message)
+                                   : readImage<sensor_msgs::Image>(std::move(bytes), message);
   });
 }
 
 BagReader::BagReader(const std::string& path) : path_(path) {
   requireFile(path);
-  withBag(path, [&] {
-    validateBag(path);
-    bag_.open(path, rosbag::bagmode::Read);
-  });
+  file_ = withBag(path, [&] { return std::make_shared<bag::BagFile>(path); });
 }
 
 BagImages BagReader::images(const std::string& topic) const {
   return withBag(path_, [&] {
-    BagImages images;
-    images.path_ = path_;
-    images.topic_ = topic;
-    if (topicsOf<sensor_msgs::Image>(bag_).count(topic) != 0) {
-      images.messages_ = messagesOf<sensor_msgs::Image>(bag_, topic);
-      return images;
+    auto content = std::make_shared<BagImages::Content>();
+    content->path = path_;
+    content->file = file_;
+    content->topic = topic;
+    if (topicsOf<sensor_msgs::Image>(*file_).count(topic) != 0) {
+      content->messages = messagesOf<sensor_msgs::Image>(*file_, topic);
+      return BagImages(content);
     }
-    const Topics compressed = topicsOf<sensor_msgs::CompressedImage>(bag_);
-    if (compressed.count(topic) == 0) images.topic_ = topic + "/compressed";
-    if (compressed.count(images.topic_) == 0) {
-      throw BagError(path_ + ": no image topic '" + topic + "' or '" + images.topic_ + "'; image topics in this bag: " +
-                     listTopics<sensor_msgs::Image, sensor_msgs::CompressedImage>(bag_));
+    const Topics compressed = topicsOf<sensor_msgs::CompressedImage>(*file_);
+    if (compressed.count(topic) == 0) content->topic = topic + "/compressed";
+    if (compressed.count(content->topic) == 0) {
+      throw BagError(
+          path_ + ": no image topic '" + topic + "' or '" + content->topic +
+          "'; image topics in this bag: " + listTopics<sensor_msgs::Image, sensor_msgs::CompressedImage>(*file_));
     }
-    images.compressed_ = true;
-    images.messages_ = messagesOf<sensor_msgs::CompressedImage>(bag_, images.topic_);
-    return images;
+    content->is_compressed = true;
+    content->messages = messagesOf<sensor_msgs::CompressedImage>(*file_, content->topic);
+    return BagImages(content);
   });
 }
 
 std::vector<Fix> BagReader::fixes(const std::string& topic) const {
   return withBag(path_, [&] {
-    if (topicsOf<sensor_msgs::NavSatFix>(bag_).count(topic) == 0) {
+    if (topicsOf<sensor_msgs::NavSatFix>(*file_).count(topic) == 0) {
       throw BagError(path_ + ": no fix topic '" + topic +
-                     "'; fix topics in this bag: " + listTopics<sensor_msgs::NavSatFix>(bag_));
+                     "'; fix topics in this bag: " + listTopics<sensor_msgs::NavSatFix>(*file_));
     }
     std::vector<Fix> fixes;
-    for (const rosbag::MessageInstance& instance : messagesOf<sensor_msgs::NavSatFix>(bag_, topic)) {
-      const auto message = deserialize<sensor_msgs::NavSatFix>(instance);
-      fixes.push_back(toFix(*message, stampOf(message->header, instance)));
+    for (const bag::Message& message : messagesOf<sensor_msgs::NavSatFix>(*file_, topic)) {
+      const auto fix = deserialize<sensor_msgs::NavSatFix>(file_->read(message));
+      fixes.push_back(toFix(*fix, stampOf(fix->header, message)));
     }
     return fixes;
   });

@@ -1,5 +1,3 @@
-#include "bag/bag_record.h"
-
 #include <cerrno>
 #include <cstring>
 
@@ -7,7 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "bag/bag_validator.h"
+#include "bag/bag_file.h"
 
 namespace visual_localization::bag {
 namespace {

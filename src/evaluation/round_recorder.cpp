@@ -9,7 +9,6 @@
 
 #include "base/time.h"
 #include "visual_localization/features/front_end.h"
-#include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
 namespace {
@@ -17,15 +16,17 @@ namespace {
 using Truth = std::function<std::optional<GeodeticPoint>(std::int64_t stamp_ns)>;
 
 /// True positions at any time. The topic that maps are made from is no better than a map: it is cleaned like one.
-Truth truthOf(const BagReader& bag, const RoundSpec& round, const TrajectoryCleanerConfig& config) {
-  const std::vector<Fix> fixes = bag.fixes(round.truth_topic);
+Truth truthOf(const BagReader& bag, const RoundSpec& recording, const TrajectoryCleanerConfig& config) {
+  const std::vector<Fix> fixes = bag.fixes(recording.truth_topic);
   const auto first =
       std::find_if(fixes.begin(), fixes.end(), [](const Fix& fix) { return fix.has_fix && isValid(fix.position); });
-  if (first == fixes.end()) throw BagError(bag.path() + ": topic " + round.truth_topic + " holds no believable fix");
+  if (first == fixes.end())
+    throw BagError(bag.path() + ": topic " + recording.truth_topic + " holds no believable fix");
   const GeodeticPoint datum{first->position.latitude_deg, first->position.longitude_deg, 0.0};
   const LocalFrame frame(datum);
-  Trajectory trajectory = round.truth_topic == round.fix_topic ? cleanTrajectory(fixes, frame, config).trajectory
-                                                               : trueTrajectory(bag, round.truth_topic, frame);
+  Trajectory trajectory = recording.truth_topic == recording.fix_topic
+                              ? cleanTrajectory(fixes, frame, config).trajectory
+                              : trueTrajectory(bag, recording.truth_topic, frame);
   return [frame, trajectory = std::move(trajectory)](std::int64_t stamp_ns) -> std::optional<GeodeticPoint> {
     const std::optional<TrajectoryPoint> point = trajectory.at(stamp_ns);
     if (!point) return std::nullopt;
@@ -33,7 +34,7 @@ Truth truthOf(const BagReader& bag, const RoundSpec& round, const TrajectoryClea
   };
 }
 
-/// The images of a round with their stamps, but those that cannot be decoded.
+/// The images of a recording with their stamps, without those that cannot be used.
 void forEachImage(const BagReader& bag, const std::string& topic,
                   const std::function<void(std::int64_t stamp_ns, const cv::Mat& grey)>& use) {
   const BagImages images = bag.images(topic);
@@ -99,36 +100,36 @@ Trajectory trueTrajectory(const BagReader& bag, const std::string& topic, const 
   return Trajectory(std::move(points));
 }
 
-std::shared_ptr<const TrainingMap> recordMap(const std::string& path, const RoundSpec& round,
+std::shared_ptr<const TrainingMap> recordMap(const std::string& path, const RoundSpec& recording,
                                              const MapBuilderConfig& config) {
   const BagReader bag(path);
   MapBuilder builder(config);
-  const std::vector<Fix> fixes = bag.fixes(round.fix_topic);
+  const std::vector<Fix> fixes = bag.fixes(recording.fix_topic);
   try {
-    builder.beginSession(round.name, fixes);
-    forEachImage(bag, round.image_topic, [&builder](std::int64_t stamp_ns, const cv::Mat& grey) {
+    builder.beginSession(recording.name, fixes);
+    forEachImage(bag, recording.image_topic, [&builder](std::int64_t stamp_ns, const cv::Mat& grey) {
       if (builder.wants(stamp_ns)) builder.addImage(stamp_ns, grey);
     });
     return builder.build();
   } catch (const BagError&) {
     throw;
   } catch (const std::runtime_error& error) {
-    throw BagError(path + ": " + round.fix_topic + ": " + error.what());
+    throw BagError(path + ": " + recording.fix_topic + ": " + error.what());
   }
 }
 
-std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpec& round, const MapBuilderConfig& map,
-                                         const LocalizerConfig& front_end) {
+std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpec& recording,
+                                         const MapBuilderConfig& map, const LocalizerConfig& front_end) {
   const BagReader bag(path);
-  const Truth truth = truthOf(bag, round, map.trajectory);
+  const Truth truth = truthOf(bag, recording, map.trajectory);
   DriveRecorder recorder(map.sift, front_end);
-  forEachImage(bag, round.image_topic,
+  forEachImage(bag, recording.image_topic,
                [&](std::int64_t stamp_ns, const cv::Mat& grey) { recorder.add(stamp_ns, grey, truth(stamp_ns)); });
   auto drive = std::make_shared<Drive>(recorder.finish());
-  if (drive->images.empty()) throw BagError(path + ": topic " + round.image_topic + " holds no usable image");
+  if (drive->images.empty()) throw BagError(path + ": topic " + recording.image_topic + " holds no usable image");
   const bool judged = std::any_of(drive->images.begin(), drive->images.end(),
                                   [](const DriveImage& image) { return image.truth.has_value(); });
-  if (!judged) throw BagError(path + ": no image has a true position on " + round.truth_topic);
+  if (!judged) throw BagError(path + ": no image has a true position on " + recording.truth_topic);
   return drive;
 }
 

@@ -14,13 +14,14 @@ namespace visual_localization {
 /// The believable fixes of a topic as true positions over time. Throws BagError when there is none.
 Trajectory trueTrajectory(const BagReader& bag, const std::string& topic, const LocalFrame& frame);
 
-/// Makes a map of a round as map_builder does. `bag`: path. Throws BagError when the bag does not give a map.
-std::shared_ptr<const TrainingMap> recordMap(const std::string& bag, const RoundSpec& round,
+/// Makes a map of a recording as map_builder does. `bag`: path. Throws BagError when the bag does not give a map.
+std::shared_ptr<const TrainingMap> recordMap(const std::string& bag, const RoundSpec& recording,
                                              const MapBuilderConfig& config);
 
-/// Sees a round as the localizer would: extracts and prunes image by image, and measures what that costs. Images that
-/// cannot be used are left out. Throws BagError when there is none left or none has a true position.
-std::shared_ptr<const Drive> recordDrive(const std::string& bag, const RoundSpec& round, const MapBuilderConfig& map,
-                                         const LocalizerConfig& front_end);
+/// Makes a drive of a recording: extracts and prunes its features image by image as the localizer does, and measures
+/// what that costs. Images that cannot be used are left out. Throws BagError when there is none left or none has a true
+/// position.
+std::shared_ptr<const Drive> recordDrive(const std::string& bag, const RoundSpec& recording,
+                                         const MapBuilderConfig& map, const LocalizerConfig& front_end);
 
 }  // namespace visual_localization

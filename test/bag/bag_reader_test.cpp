@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <rosbag/bag.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/NavSatFix.h>
@@ -81,7 +82,7 @@ class BagReaderTest : public testing::Test {
   }
 
   test::TemporaryFolder folder_;
-  std::string path_ = folder_ / "round.bag";
+  std::string path_ = folder_ / "recording.bag";
 };
 
 TEST_F(BagReaderTest, FindsCompressedImagesByTheirBaseName) {
@@ -99,6 +100,11 @@ TEST_F(BagReaderTest, UsesTheTimeOfRecordingWithoutStamp) {
   const BagReader bag(path_);
   EXPECT_EQ(bag.images("/camera").read(1).stamp_ns, 2'250'000'000);
   EXPECT_EQ(bag.fixes("/gps").back().stamp_ns, 2'500'000'000);
+}
+
+TEST_F(BagReaderTest, ImagesKeepTheirBagOpen) {
+  const BagImages images = BagReader(path_).images("/camera");
+  EXPECT_EQ(images.read(2).decode().size(), cv::Size(48, 32));
 }
 
 TEST_F(BagReaderTest, PrefersRawImages) {
@@ -165,7 +171,7 @@ TEST_F(BagReaderTest, AnImageWhoseLengthLiesIsUnusable) {
   EXPECT_THROW(bag.images("/camera").read(0).decode(), ImageError);
 }
 
-TEST_F(BagReaderTest, RoundsOfTheDataFolderCanBeRead) {
+TEST_F(BagReaderTest, RecordingsOfTheDataFolderCanBeRead) {
   const char* folder = std::getenv("VISUAL_LOCALIZATION_DATA");
   if (folder == nullptr) GTEST_SKIP() << "VISUAL_LOCALIZATION_DATA is not set";
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {

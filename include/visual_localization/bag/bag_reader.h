@@ -3,17 +3,22 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
-#include <rosbag/bag.h>
-#include <rosbag/message_instance.h>
 
 #include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/ros/image_error.h"
 
 namespace visual_localization {
+
+namespace bag {
+class BagFile;
+}
 
 /// A bag that cannot be read. The text is one line and begins with the path.
 class BagError : public std::runtime_error {
@@ -27,25 +32,26 @@ struct BagImage {
   std::function<cv::Mat()> decode;  ///< 8-bit grey image; throws ImageError when the message is unusable
 };
 
-/// The images of one topic in the order of recording; each is read from the bag only when asked for. Must not
-/// outlive its BagReader.
+/// The images of one topic in the order of recording; each is read from the bag only when asked for. Keeps the bag
+/// open, which it shares with its BagReader: use both in one thread.
 class BagImages {
  public:
-  std::size_t size() const { return messages_.size(); }
+  std::size_t size() const;
   /// The topic that was found.
-  const std::string& topic() const { return topic_; }
-  /// Throws BagError when the bag is damaged at this place.
+  const std::string& topic() const;
+  /// Throws BagError when the bag is damaged there.
   BagImage read(std::size_t i) const;
 
  private:
   friend class BagReader;
-  std::string path_;
-  std::string topic_;
-  bool compressed_ = false;
-  std::vector<rosbag::MessageInstance> messages_;
+  struct Content;
+  explicit BagImages(std::shared_ptr<const Content> content) : content_(std::move(content)) {}
+
+  std::shared_ptr<const Content> content_;
 };
 
-/// Reads images and fixes from a bag that may come from anyone: a damaged one gives a BagError.
+/// Reads images and fixes from a bag that may come from anyone: a damaged one gives a BagError. Damage within a
+/// compressed chunk shows when its first message is read, all other on opening.
 class BagReader {
  public:
   /// Throws BagError when there is no readable, indexed bag at `path`.
@@ -63,7 +69,7 @@ class BagReader {
 
  private:
   std::string path_;
-  rosbag::Bag bag_;
+  std::shared_ptr<bag::BagFile> file_;
 };
 
 }  // namespace visual_localization

@@ -1,18 +1,12 @@
 #pragma once
 
-#include <stdexcept>
-
 #include <opencv2/core.hpp>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
-namespace visual_localization {
+#include "visual_localization/ros/image_error.h"
 
-/// An image message that cannot be used. The text is the reason, in one line.
-class ImageError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
+namespace visual_localization {
 
 /// Largest width and height that is taken for an image.
 constexpr int kMaxImageSide_px = 16384;

@@ -1,4 +1,4 @@
-// Recorded rounds from end to end: the two that ship, and more when VISUAL_LOCALIZATION_DATA names a folder.
+// Positions of whole recordings: the two that ship, and more when VISUAL_LOCALIZATION_DATA names a folder.
 
 #include <algorithm>
 #include <cstdlib>
@@ -34,23 +34,23 @@ void expectCleanTrajectory(const fs::path& path) {
   EXPECT_LT(errors_m[static_cast<std::size_t>(0.99 * count)], 3.0);
 }
 
-TEST(Rounds, FixesOfTheSampleBecomeTheTruePath) {
+TEST(Recordings, FixesOfTheSampleBecomeTheTruePath) {
   for (const char* name : {"campus_sunny_1.bag", "campus_cloudy_1.bag"}) {
     expectCleanTrajectory(fs::path(TEST_DATA_DIR) / "rounds" / name);
   }
 }
 
-TEST(Rounds, FixesOfEveryCampusRoundBecomeTheTruePath) {
+TEST(Recordings, FixesOfEveryCampusRecordingBecomeTheTruePath) {
   const char* folder = std::getenv("VISUAL_LOCALIZATION_DATA");
   if (folder == nullptr) GTEST_SKIP() << "VISUAL_LOCALIZATION_DATA is not set";
-  int rounds = 0;
+  int recordings = 0;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     if (name.rfind("campus_a_", 0) != 0) continue;
     expectCleanTrajectory(entry.path());
-    ++rounds;
+    ++recordings;
   }
-  EXPECT_GT(rounds, 0);
+  EXPECT_GT(recordings, 0);
 }
 
 }  // namespace

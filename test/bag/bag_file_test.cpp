@@ -1,8 +1,9 @@
-#include "bag/bag_validator.h"
+#include "bag/bag_file.h"
 
 #include <csignal>
 #include <functional>
 #include <random>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,13 +23,16 @@
 namespace visual_localization {
 namespace {
 
+using bag::BagFile;
+using bag::DamagedBag;
+using bag::UnsupportedBag;
 using rosbag::compression::CompressionType;
 using testing::HasSubstr;
 
 const CompressionType kCompressions[] = {rosbag::compression::Uncompressed, rosbag::compression::BZ2,
                                          rosbag::compression::LZ4};
 
-class BagValidatorTest : public testing::Test {
+class BagFileTest : public testing::Test {
  protected:
   /// Twelve images and fixes in several chunks.
   std::string writeBag(CompressionType compression) {
@@ -61,17 +65,22 @@ class BagValidatorTest : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-/// What a program does with a bag.
+/// `action`; a bag or an image may be refused.
+template <class Action>
+void allowRefusal(Action action) {
+  try {
+    action();
+  } catch (const BagError&) {
+  } catch (const ImageError&) {
+  }
+}
+
+/// What programs do with a bag, and they go on where a program would not.
 void readAll(const std::string& path) {
   const BagReader bag(path);
-  bag.fixes("/gps/fix");
+  allowRefusal([&] { bag.fixes("/gps/fix"); });
   const BagImages images = bag.images("/camera");
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    try {
-      images.read(i).decode();
-    } catch (const ImageError&) {
-    }
-  }
+  for (std::size_t i = 0; i < images.size(); ++i) allowRefusal([&] { images.read(i).decode(); });
 }
 
 /// The signal that ended a process that read the bag; 0 when it came to an end by itself.
@@ -83,10 +92,7 @@ int signalWhileReading(const std::string& path) {
     ::setrlimit(RLIMIT_AS, &memory);
 #endif
     ::alarm(20);
-    try {
-      readAll(path);
-    } catch (const BagError&) {
-    }
+    allowRefusal([&] { readAll(path); });
     ::_exit(0);
   }
   int status = 0;
@@ -123,22 +129,35 @@ std::string mutated(std::string bytes, std::mt19937& random) {
   return bytes;
 }
 
-TEST_F(BagValidatorTest, AcceptsEveryCompression) {
+/// Why a bag cannot be read from its beginning to its end.
+std::string refusal(const std::string& path) {
+  try {
+    BagFile bag(path);
+    std::set<std::uint32_t> all;
+    for (const auto& [id, connection] : bag.connections()) all.insert(id);
+    for (const bag::Message& message : bag.messages(all)) bag.read(message);
+  } catch (const DamagedBag& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST_F(BagFileTest, AcceptsEveryCompression) {
   for (const CompressionType compression : kCompressions) {
     const std::string path = writeBag(compression);
-    EXPECT_NO_THROW(validateBag(path));
+    EXPECT_EQ(refusal(path), "accepted");
     EXPECT_EQ(BagReader(path).fixes("/gps/fix").size(), 12u);
   }
 }
 
-TEST_F(BagValidatorTest, EveryCutIsRefused) {
+TEST_F(BagFileTest, EveryCutIsRefused) {
   const std::string bytes = test::readAll(writeBag(rosbag::compression::Uncompressed));
   for (std::size_t size = 14; size < bytes.size(); size += 37) {
-    EXPECT_THROW(validateBag(writeBytes(bytes.substr(0, size))), DamagedBag) << size;
+    EXPECT_THROW(BagFile(writeBytes(bytes.substr(0, size))), DamagedBag) << size;
   }
 }
 
-TEST_F(BagValidatorTest, TheReaderNamesThePath) {
+TEST_F(BagFileTest, TheReaderNamesThePath) {
   std::string bytes = test::readAll(writeBag(rosbag::compression::Uncompressed));
   bytes[13] = '\xFF';  // the length of the first header
   const std::string path = writeBytes(bytes);
@@ -175,7 +194,7 @@ auto repeat(const std::string& pattern, std::size_t after, std::size_t count) {
   };
 }
 
-TEST_F(BagValidatorTest, NamesEveryKindOfDamage) {
+TEST_F(BagFileTest, NamesEveryKindOfDamage) {
   const std::string good = test::readAll(writeBag(rosbag::compression::Uncompressed));
   const std::string four("\x01\0\0\0", 4);
   const std::string huge = "\xFF\xFF\xFF\xFF";
@@ -236,53 +255,129 @@ std::string record(const std::vector<std::string>& fields, const std::string& da
   return number(header.size(), 4) + header + number(data.size(), 4) + data;
 }
 
-/// A bag of nothing but one chunk and, if given, an index.
+/// An index of connection 0 with messages at these offsets.
+std::string indexOf(const std::vector<std::size_t>& offsets) {
+  std::string entries;
+  for (const std::size_t offset : offsets) entries += number(0, 8) + number(offset, 4);
+  return record({"op=\x04", "ver=" + number(1, 4), "conn=" + number(0, 4), "count=" + number(offsets.size(), 4)},
+                entries);
+}
+
+/// A bag of fixes in one chunk with an index.
 std::string oneChunk(const std::string& compression, std::size_t size, const std::string& packed,
-                     const std::string& index = "") {
+                     const std::string& index = indexOf({0})) {
+  using Traits = sensor_msgs::NavSatFix;
   const auto header = [](std::size_t index_at) {
-    return "#ROSBAG V2.0\n" + record({"op=\x03", "index_pos=" + number(index_at, 8), "conn_count=" + number(0, 4),
-                                      "chunk_count=" + number(0, 4)},
+    return "#ROSBAG V2.0\n" + record({"op=\x03", "index_pos=" + number(index_at, 8), "conn_count=" + number(1, 4),
+                                      "chunk_count=" + number(1, 4)},
                                      "");
   };
+  const std::size_t chunk_at = header(0).size();
   const std::string body = record({"op=\x05", "compression=" + compression, "size=" + number(size, 4)}, packed) + index;
-  return header(header(0).size() + body.size()) + body;
-}
-
-std::string refusal(const std::string& path) {
-  try {
-    validateBag(path);
-  } catch (const DamagedBag& error) {
-    return error.what();
+  std::string description;
+  for (const std::string& field :
+       {std::string("topic=/gps/fix"), std::string("type=") + ros::message_traits::datatype<Traits>(),
+        std::string("md5sum=") + ros::message_traits::md5sum<Traits>(), std::string("message_definition=")}) {
+    description += number(field.size(), 4) + field;
   }
-  return "accepted";
+  const std::string summary =
+      record({"op=\x07", "conn=" + number(0, 4), "topic=/gps/fix"}, description) +
+      record({"op=\x06", "ver=" + number(1, 4), "chunk_pos=" + number(chunk_at, 8), "start_time=" + number(0, 8),
+              "end_time=" + number(0, 8), "count=" + number(1, 4)},
+             number(0, 4) + number(1, 4));
+  return header(chunk_at + body.size()) + body + summary;
 }
 
-TEST_F(BagValidatorTest, AMessageIndexedTwiceIsRefused) {
-  const std::string message = record({"op=\x02", "conn=" + number(0, 4), "time=" + number(0, 8)}, "");
-  const auto bag = [&message](std::size_t second) {
-    const std::string entries = number(0, 8) + number(0, 4) + number(0, 8) + number(second, 4);
-    const std::string index =
-        record({"op=\x04", "ver=" + number(1, 4), "conn=" + number(0, 4), "count=" + number(2, 4)}, entries);
-    return oneChunk("none", 2 * message.size(), message + message, index);
+std::string packedLz4(std::string content, int block_size) {
+  std::string packed(content.size() + 1000, '\0');
+  auto size = static_cast<unsigned int>(packed.size());
+  EXPECT_EQ(roslz4_buffToBuffCompress(content.data(), static_cast<unsigned int>(content.size()), packed.data(), &size,
+                                      block_size),
+            ROSLZ4_OK);
+  return packed.substr(0, size);
+}
+
+/// A bag whose chunk holds `content`, and one in which the chunk is compressed.
+std::vector<std::string> plainAndPacked(const std::string& content, const std::string& index) {
+  constexpr int kBlocksOf64Kib = 4;
+  return {oneChunk("none", content.size(), content, index),
+          oneChunk("lz4", content.size(), packedLz4(content, kBlocksOf64Kib), index)};
+}
+
+std::string messageOf(std::uint64_t connection, const std::string& data) {
+  return record({"op=\x02", "conn=" + number(connection, 4), "time=" + number(0, 8)}, data);
+}
+
+TEST_F(BagFileTest, AMessageIndexedTwiceIsRefused) {
+  const std::string message = messageOf(0, "");
+  for (const std::string& bag : plainAndPacked(message + message, indexOf({0, message.size()}))) {
+    EXPECT_EQ(refusal(writeBytes(bag)), "accepted");
+  }
+  for (const std::string& bag : plainAndPacked(message + message, indexOf({0, 0}))) {
+    EXPECT_EQ(refusal(writeBytes(bag)), "an index points to a message twice");
+  }
+}
+
+TEST_F(BagFileTest, AnIndexLongerThanItsChunkIsRefused) {
+  const std::string message = messageOf(0, "");
+  for (const std::string& bag : plainAndPacked(message, indexOf(std::vector<std::size_t>(1000)))) {
+    EXPECT_EQ(refusal(writeBytes(bag)), "the indices of a chunk have more entries than it has messages");
+  }
+}
+
+TEST_F(BagFileTest, DamageWithinAChunkIsRefused) {
+  const std::string message = messageOf(0, "data");
+  std::string long_data = message;
+  long_data[message.size() - 5] = '\x7F';  // the length of the data
+  std::string long_header = message;
+  long_header[3] = '\x7F';
+  struct {
+    const char* text;
+    std::string content;
+    std::size_t offset;
+  } const damages[] = {
+      {"a record's data at byte", long_data, 0},
+      {"a record's header at byte", long_header, 0},
+      {"ends within a record's header", message + "no", 0},
+      {"an index points beside its messages", message, 1},
+      {"an index points beside its messages", message, message.size()},
+      {"an index points beside its messages", message, 0xFFFFFFFF},
+      {"an index points beside its messages", messageOf(1, "data"), 0},
+      {"something else than messages", indexOf({0}), 0},
   };
-  EXPECT_EQ(refusal(writeBytes(bag(message.size()))), "accepted");
-  EXPECT_EQ(refusal(writeBytes(bag(0))), "an index points to a message twice");
+  for (const auto& damage : damages) {
+    for (const std::string& bag : plainAndPacked(damage.content, indexOf({damage.offset}))) {
+      const std::string path = writeBytes(bag);
+      EXPECT_THAT(refusal(path), HasSubstr(damage.text));
+      EXPECT_EQ(signalWhileReading(path), 0) << damage.text;
+    }
+  }
 }
 
-TEST_F(BagValidatorTest, WhatCannotBeUnpackedIsRefused) {
+TEST_F(BagFileTest, ReadsWhatWasWritten) {
+  for (const std::string& bytes :
+       plainAndPacked(messageOf(0, "one") + messageOf(0, "two"), indexOf({messageOf(0, "one").size(), 0}))) {
+    BagFile bag(writeBytes(bytes));
+    const std::vector<bag::Message> messages = bag.messages({0});
+    ASSERT_EQ(messages.size(), 2U);
+    EXPECT_EQ(bag.read(messages[0]), "two");  // of the same time: in the order of the index
+    EXPECT_EQ(bag.read(messages[1]), "one");
+    EXPECT_TRUE(bag.messages({1}).empty());
+  }
+}
+
+TEST_F(BagFileTest, WhatCannotBeUnpackedIsRefused) {
   EXPECT_THAT(refusal(writeBytes(oneChunk("bz2", 100, "no such thing"))), HasSubstr("cannot be unpacked"));
   EXPECT_THAT(refusal(writeBytes(oneChunk("lz4", 100, "no such thing"))), HasSubstr("too long"));
   EXPECT_THAT(refusal(writeBytes(oneChunk("lz4", 100, std::string(20, '\0')))), HasSubstr("unknown block size"));
   EXPECT_THAT(refusal(writeBytes(oneChunk("lz4", 100, "short"))), HasSubstr("cut off"));
 }
 
-TEST_F(BagValidatorTest, ALz4BlockLargerThanItsFrameAllowsIsRefused) {
-  std::string content(100'000, 'x');
-  std::string packed(content.size(), '\0');
-  auto size = static_cast<unsigned int>(packed.size());
+TEST_F(BagFileTest, ALz4BlockLargerThanItsFrameAllowsIsRefused) {
+  const std::string content(100'000, 'x');
   constexpr int kBlocksOf64Kib = 4;
-  ASSERT_EQ(roslz4_buffToBuffCompress(content.data(), 100'000, packed.data(), &size, kBlocksOf64Kib), ROSLZ4_OK);
-  EXPECT_EQ(refusal(writeBytes(oneChunk("lz4", content.size(), packed.substr(0, size)))),
+  const std::string packed = packedLz4(content, kBlocksOf64Kib);
+  EXPECT_EQ(refusal(writeBytes(oneChunk("lz4", content.size(), packed))),
             "a record's header at byte 4 claims 2021161080 bytes of 99996");  // unpacked, but not made of records
   constexpr std::size_t kBlock = 900'000;                                     // would be copied into a buffer of 64 KiB
   const std::string frame = packed.substr(0, 7) + number(kBlock, 4) + std::string(kBlock, 'x') + number(0, 8);
@@ -291,14 +386,14 @@ TEST_F(BagValidatorTest, ALz4BlockLargerThanItsFrameAllowsIsRefused) {
   EXPECT_EQ(refusal(path), "a block of a compressed chunk is too long");
 }
 
-TEST_F(BagValidatorTest, OtherVersionsAndFilesAreRefused) {
+TEST_F(BagFileTest, OtherVersionsAndFilesAreRefused) {
   std::string bytes = test::readAll(writeBag(rosbag::compression::Uncompressed));
   bytes[9] = '1';
-  EXPECT_THROW(validateBag(writeBytes(bytes)), UnsupportedBag);
-  EXPECT_THROW(validateBag(writeBytes("no bag at all")), UnsupportedBag);
+  EXPECT_THROW(BagFile(writeBytes(bytes)), UnsupportedBag);
+  EXPECT_THROW(BagFile(writeBytes("no bag at all")), UnsupportedBag);
 }
 
-TEST_F(BagValidatorTest, NoMutationKillsTheReader) {
+TEST_F(BagFileTest, NoMutationKillsTheReader) {
   std::mt19937 random(3);
   for (const CompressionType compression : kCompressions) {
     const std::string bytes = test::readAll(writeBag(compression));

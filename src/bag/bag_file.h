@@ -1,0 +1,175 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace visual_localization::bag {
+
+/// A bag whose records do not fit together. One line, without the path.
+class DamagedBag : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A bag that may be whole, but is none that can be read. One line, without the path.
+class UnsupportedBag : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What a record is (http://wiki.ros.org/Bags/Format/2.0).
+enum class Op : std::uint8_t {
+  kMessage = 2,
+  kBagHeader = 3,
+  kIndex = 4,
+  kChunk = 5,
+  kChunkInfo = 6,
+  kConnection = 7,
+};
+
+/// The fields of a record's header by name.
+using Fields = std::map<std::string, std::string>;
+
+/// The bytes that records lie in.
+class Bytes {
+ public:
+  Bytes() = default;
+  Bytes(const Bytes&) = delete;
+  Bytes& operator=(const Bytes&) = delete;
+  virtual ~Bytes() = default;
+  virtual std::uint64_t size() const = 0;
+  /// Copies `count` bytes from `offset`; they lie within size(). Throws DamagedBag when they cannot be read.
+  virtual void read(std::uint64_t offset, std::size_t count, char* to) const = 0;
+};
+
+/// Those of a file. Not mapped: a file that shrinks or a disk that fails must not end the program.
+class FileBytes : public Bytes {
+ public:
+  /// Throws DamagedBag when the file cannot be opened.
+  explicit FileBytes(const std::string& path);
+  ~FileBytes() override;
+  FileBytes(const FileBytes&) = delete;
+  FileBytes& operator=(const FileBytes&) = delete;
+  std::uint64_t size() const override { return size_; }
+  void read(std::uint64_t offset, std::size_t count, char* to) const override;
+
+ private:
+  int file_ = -1;
+  std::uint64_t size_ = 0;
+};
+
+/// Those of an unpacked chunk.
+class MemoryBytes : public Bytes {
+ public:
+  explicit MemoryBytes(std::string content) : content_(std::move(content)) {}
+  std::uint64_t size() const override { return content_.size(); }
+  void read(std::uint64_t offset, std::size_t count, char* to) const override;
+
+ private:
+  std::string content_;
+};
+
+/// From `begin` to before `end`.
+struct Range {
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+
+  std::uint64_t size() const { return end - begin; }
+};
+
+/// One record, without its data.
+struct Record {
+  Op op = Op::kMessage;
+  Fields fields;
+  Range data;  ///< where it lies; behind it the next record begins
+};
+
+/// Reads the record at the beginning of `range`. Throws DamagedBag unless it lies within it with everything in it.
+Record readRecord(const Bytes& bytes, Range range);
+
+/// Throws DamagedBag when there are more than `most` bytes, so that nobody makes us allocate more.
+std::string readRange(const Bytes& bytes, Range range, std::uint64_t most, const char* what);
+
+/// Reads the fields of a header without its length. Throws DamagedBag.
+Fields readFields(std::string_view header);
+
+/// The longest header of a record, and the longest description of a connection, in bytes.
+constexpr std::uint64_t kLongestHeader = 1U << 24U;
+
+/// A number of exactly `size` bytes, little-endian. Throws DamagedBag when the field is missing or has another size.
+std::uint64_t number(const Fields& fields, const std::string& name, std::size_t size);
+
+/// `size` bytes at `offset` as a little-endian number; they must exist.
+std::uint64_t numberAt(std::string_view bytes, std::size_t offset, std::size_t size);
+
+/// Where messages of one kind come from.
+struct Connection {
+  std::string topic;
+  std::string type;
+  std::string md5sum;  ///< of the definition of the type
+};
+
+/// Where a message lies.
+struct Message {
+  std::int64_t stamp_ns = 0;     ///< when it was recorded
+  std::uint64_t chunk = 0;       ///< offset of its chunk's record in the file
+  std::uint32_t offset = 0;      ///< of its record in the unpacked chunk
+  std::uint32_t connection = 0;  ///< key in BagFile::connections
+};
+
+/// A bag (format 2.0) that may come from anyone: every length, offset and number in it is checked before it is used.
+/// rosbag_storage does not check them and reads beyond its buffers when they are wrong. To check them for it takes a
+/// reader like this one, and unpacks every compressed chunk once more.
+///
+/// Opening reads all records, but neither what messages hold nor compressed chunks. A chunk is unpacked and checked
+/// when one of its messages is read, and kept until a message of another chunk is read. Not for several threads at a
+/// time.
+///
+/// Processor time of `map_builder --bag B.bag --min-spacing 100` for 1.0 GB of 40 700 JPEG images and their fixes,
+/// which reads all of them but extracts one image, with rosbag_storage behind a check and with this reader:
+/// uncompressed chunks 1.01 and 0.97 s, lz4 3.1 and 1.7 s, bz2 162 and 107 s. (Medians of five runs, bz2 of three; warm
+/// page cache.)
+class BagFile {
+ public:
+  /// Throws DamagedBag, or UnsupportedBag when the bag has no index, is encrypted or is of another version.
+  explicit BagFile(const std::string& path);
+
+  const std::map<std::uint32_t, Connection>& connections() const { return connections_; }
+  /// The messages of these connections in the order of recording.
+  std::vector<Message> messages(const std::set<std::uint32_t>& connections) const;
+  /// A serialized message. Throws DamagedBag when its chunk cannot be unpacked, or does not hold what its index says.
+  std::string read(const Message& message);
+
+ private:
+  struct Chunk {
+    Range data;
+    std::string compression;
+    std::uint64_t size = 0;                     ///< unpacked
+    std::uint64_t index_bytes = 0;              ///< in the file
+    std::vector<std::vector<Message>> indices;  ///< each of one connection
+    bool described = false;                     ///< in the summary; otherwise its messages do not count
+  };
+
+  void readChunks(Range range);
+  static void requireChunk(const Chunk& chunk);
+  void readIndex(const Record& record, std::uint64_t chunk_at, Chunk& chunk) const;
+  void readSummary(const Record& header, Range range);
+  void readChunkInfo(const Record& info);
+  static void checkMessages(const Bytes& bytes, Range range, const Chunk& chunk);
+
+  FileBytes file_;
+  std::map<std::uint32_t, Connection> connections_;
+  std::map<std::uint64_t, Chunk> chunks_;  ///< by their offsets in the file
+  std::unique_ptr<MemoryBytes> unpacked_;  ///< the chunk at unpacked_at_
+  std::uint64_t unpacked_at_ = 0;
+};
+
+}  // namespace visual_localization::bag
