@@ -70,6 +70,7 @@ class Counts(NamedTuple):
     dropped: int
     late: int
     refused: int
+    without_map: int
 
     def since(self, before: 'Counts') -> 'Counts':
         """What came after `before`."""
@@ -77,7 +78,7 @@ class Counts(NamedTuple):
 
     def settled(self) -> int:
         """Images that have come to an end."""
-        return self.processed + self.dropped + self.late + self.refused
+        return self.processed + self.dropped + self.late + self.refused + self.without_map
 
 
 def read_counts(message: DiagnosticArray, localizer: str) -> Optional[Counts]:
@@ -85,7 +86,7 @@ def read_counts(message: DiagnosticArray, localizer: str) -> Optional[Counts]:
     for status in message.status:
         if status.name.lstrip('/') == f'{localizer.lstrip("/")}: images':
             values = {item.key: item.value for item in status.values}
-            return Counts(*(int(values[name.capitalize()]) for name in Counts._fields))
+            return Counts(*(int(values[name.capitalize().replace('_', ' ')]) for name in Counts._fields))
     return None
 
 

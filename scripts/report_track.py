@@ -69,12 +69,14 @@ class Counts:
         self.in_bag, self.answered = values['in_bag'], values['answered']
         self.received, self.processed = values['received'], values['processed']
         self.dropped, self.late, self.refused = values['dropped'], values['late'], values['refused']
+        self.without_map = values['without_map']
         self.never_received = self.in_bag - self.received
 
     def line(self) -> str:
         """For people."""
         return (f'images           {self.in_bag} in the bag: {self.answered} answered, {self.dropped} dropped for a '
-                f'newer one, {self.late} late, {self.refused} refused, {self.never_received} never received')
+                f'newer one, {self.late} late, {self.refused} refused, {self.without_map} before there was a map, '
+                f'{self.never_received} never received')
 
     def contradiction(self) -> Optional[str]:
         """Why the counts do not add up, in words; None when they do."""
@@ -83,9 +85,10 @@ class Counts:
                     f'publishes on its topic')
         if self.answered != self.processed:
             return f'the node answered {self.processed} images, but {self.answered} answers were recorded'
-        ends = self.answered + self.dropped + self.late + self.refused
+        ends = self.answered + self.dropped + self.late + self.refused + self.without_map
         if ends != self.received:
-            return f'the node received {self.received} images, but {ends} are answered, dropped, late or refused'
+            return (f'the node received {self.received} images, but {ends} are answered, dropped, late, refused or came '
+                    f'before there was a map')
         return None
 
 

@@ -29,7 +29,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   image_->set(stamp_ns, grey);
   repeats_.add(stamp_ns, image_->isRepeated());
-  if (isRepetition(stamp_ns)) return lastAgain(stamp_ns);
+  if (isRepetition(stamp_ns)) return lastAgain(stamp_ns, stopwatch.elapsed_ms());
   last_.reset();  // should this image fail, its repetition must not get the answer of the one before
 
   // Similarities to the training images are computed when somebody asks for them, each at most once.
@@ -40,8 +40,8 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
 
-  last_ = estimateOf(stamp_ns, tracked, evidence, state, stopwatch.elapsed_ms());
-  return answer();
+  last_ = estimateOf(stamp_ns, tracked, evidence, state);
+  return answer(stopwatch.elapsed_ms());
 }
 
 /// The same stamp with the same pixels is the same image, come twice.
@@ -51,7 +51,7 @@ bool Localizer::isRepetition(std::int64_t stamp_ns) const {
 }
 
 Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const Evidence& evidence,
-                               LocalizationState state, double elapsed_ms) {
+                               LocalizationState state) {
   Estimate estimate;
   estimate.stamp_ns = stamp_ns;
   estimate.state = state;
@@ -62,19 +62,18 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.comparisons = scores_.comparisons();
   estimate.swept = scores_.swept();
   estimate.image = image_->report();
-  estimate.update_ms = elapsed_ms - estimate.image.extract_ms - estimate.image.match_ms;
   return estimate;
 }
 
-Estimate Localizer::lastAgain(std::int64_t stamp_ns) {
+Estimate Localizer::lastAgain(std::int64_t stamp_ns, double elapsed_ms) {
   last_->stamp_ns = stamp_ns;
   last_->image = image_->report();
-  last_->update_ms = 0.0;
-  return answer();
+  return answer(elapsed_ms);
 }
 
-/// The last estimate. One of a camera that is frozen is in doubt.
-Estimate Localizer::answer() {
+/// The last estimate, after `elapsed_ms` since its image came. One of a camera that is frozen is in doubt.
+Estimate Localizer::answer(double elapsed_ms) {
+  last_->update_ms = elapsed_ms - last_->image.extract_ms - last_->image.match_ms;
   last_->repeats = repeats_.images;
   last_->frozen = isFrozen();
   if (last_->frozen) doubt();

@@ -266,7 +266,7 @@ std::string withoutKeys(const std::string& yaml, const std::vector<std::string>&
 ParameterValues readYaml(const std::string& path) {
   try {
     const std::string text = readFile(path);
-    if (YAML::Load(text).IsNull()) return {};
+    if (!hasMoreThanOneDocument(text) && YAML::Load(text).IsNull()) return {};
     return YamlMap::parse(text, path).parameters();
   } catch (const FileError& error) {
     throw ParameterError(error.what());

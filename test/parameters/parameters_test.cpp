@@ -160,8 +160,10 @@ TEST(Parameters, ARenamedParameterIsRefusedWithItsNewName) {
 }
 
 TEST(Parameters, SeveralDocumentsAreRefused) {
-  const TemporaryYaml yaml("name: a\n---\nname: b\n");
-  EXPECT_THROW(parameters::readYaml(yaml.path()), ParameterError);
+  for (const char* text : {"name: a\n---\nname: b\n", "---\n---\nname: b\n", "# nothing\n---\n~\n---\nname: b\n"}) {
+    const TemporaryYaml yaml(text);
+    EXPECT_THROW(parameters::readYaml(yaml.path()), ParameterError) << text;
+  }
 }
 
 TEST(Parameters, AYamlFileOfAllParametersReadsBackAsTheyAre) {

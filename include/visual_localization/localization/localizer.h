@@ -63,9 +63,9 @@ class Localizer {
 
   bool isRepetition(std::int64_t stamp_ns) const;
   Estimate estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const Evidence& evidence,
-                      LocalizationState state, double elapsed_ms);
-  Estimate lastAgain(std::int64_t stamp_ns);
-  Estimate answer();
+                      LocalizationState state);
+  Estimate lastAgain(std::int64_t stamp_ns, double elapsed_ms);
+  Estimate answer(double elapsed_ms);
   bool isFrozen() const;
   Evidence verify(const TrackerEstimate& tracked);
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
