@@ -63,6 +63,10 @@ class Truth:
         return min(near, key=lambda row: abs(row[0] - stamp))[1:]
 
 
+# In the diagnostics, in the order of Counts.
+COUNT_KEYS = ('Received', 'Processed', 'Dropped', 'Late', 'Refused', 'Without a map')
+
+
 class Counts(NamedTuple):
     """What became of the images that the localizer received, since some moment."""
     received: int
@@ -86,7 +90,7 @@ def read_counts(message: DiagnosticArray, localizer: str) -> Optional[Counts]:
     for status in message.status:
         if status.name.lstrip('/') == f'{localizer.lstrip("/")}: images':
             values = {item.key: item.value for item in status.values}
-            return Counts(*(int(values[name.capitalize().replace('_', ' ')]) for name in Counts._fields))
+            return Counts(*(int(values[key]) for key in COUNT_KEYS))
     return None
 
 
