@@ -6,19 +6,23 @@ import sys
 import threading
 import time
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
 from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import Image
 
-import localizer_fixture as fixture
+sys.path.append(str(Path(__file__).resolve().parents[2] / 'scripts'))
+
+import localizer_fixture as fixture  # noqa: E402
+from record_track import COUNT_KEYS  # noqa: E402, what the demo reads
 from visual_localization.msg import LocalizationStatus, Swarm
 from visual_localization.srv import LoadMap, Relocalize, RelocalizeRequest
 
 DEADLINE_S = 30.0
 NEAR_M = 8.0
-ENDS = ['Processed', 'Dropped', 'Late', 'Refused', 'Without a map']  # of an image, in the diagnostics
+ENDS = list(COUNT_KEYS[1:])  # of an image, in the diagnostics
 TRACKING = LocalizationStatus.TRACKING
 
 
