@@ -31,6 +31,7 @@ struct Options {
   std::size_t features = 100;
   std::uint64_t seed = 1;
   double swarm_range_m = 0.0;
+  int sweep_images = LocalizerConfig().sweep_images;
   bool header = false;
 };
 
@@ -78,6 +79,7 @@ struct Drive {
   std::vector<double> steps_ms;
   double comparisons = 0.0;
   double tracking = 0.0;  ///< share of the images
+  std::size_t first = 0;  ///< images until the first TRACKING, this one included; 0: never
 
   double quantile_ms(double share) {
     std::sort(steps_ms.begin(), steps_ms.end());
@@ -94,17 +96,20 @@ Drive drive(StreetImage& image, Localizer& localizer, std::size_t begin, std::si
     const Estimate estimate = localizer.process(static_cast<std::int64_t>(i) * 1'000'000'000, {});
     result.steps_ms.push_back(stopwatch.elapsed_ms());
     result.comparisons += static_cast<double>(estimate.comparisons) / static_cast<double>(steps);
-    result.tracking += (estimate.state == LocalizationState::kTracking ? 1.0 : 0.0) / static_cast<double>(steps);
+    const bool tracking = estimate.state == LocalizationState::kTracking;
+    result.tracking += (tracking ? 1.0 : 0.0) / static_cast<double>(steps);
+    if (tracking && result.first == 0) result.first = i - begin + 1;
   }
   return result;
 }
 
 /// The swarm's speeds and the reach of its quantum particles are shares of the map's range. For a swarm that moves as
-/// in a map of `range_m` they are scaled; 0: left as they are.
-LocalizerConfig configFor(const TrainingMap& map, double range_m) {
+/// in a map of `swarm_range_m` they are scaled; 0: left as they are.
+LocalizerConfig configFor(const TrainingMap& map, const Options& options) {
   LocalizerConfig config;
-  if (range_m <= 0.0) return config;
-  const double scale = range_m / map.area().range().maxCoeff();
+  config.sweep_images = options.sweep_images;
+  if (options.swarm_range_m <= 0.0) return config;
+  const double scale = options.swarm_range_m / map.area().range().maxCoeff();
   for (double* share : {&config.dpso.v0, &config.dpso.v0_min, &config.dpso.v0_max, &config.dpso.quantum_std}) {
     *share *= scale;
   }
@@ -114,7 +119,7 @@ LocalizerConfig configFor(const TrainingMap& map, double range_m) {
 Drive driveTracked(const StreetMap& streets, const std::shared_ptr<const TrainingMap>& map, const Options& options) {
   const std::size_t begin = map->size() / 2;
   const auto image = std::make_shared<StreetImage>(streets, *map);
-  Localizer localizer(map, configFor(*map, options.swarm_range_m), image);
+  Localizer localizer(map, configFor(*map, options), image);
   localizer.relocalize(around(map->position_m(begin), 5.0));
   return drive(*image, localizer, begin, std::min(options.steps, map->size() - begin));
 }
@@ -140,20 +145,24 @@ void measure(const Options& options) {
   Drive warm = driveTracked(streets, map, options);
 
   const auto image = std::make_shared<StreetImage>(streets, *map);
-  Localizer lost_robot(map, LocalizerConfig(), image);
+  Localizer lost_robot(map, configFor(*map, options), image);
   Drive lost = drive(*image, lost_robot, 2 * map->size(), 30);
   const double lost_mib = resident_mib() - before_mib;
+  Localizer searching_robot(map, configFor(*map, options), image);
+  Drive searching = drive(*image, searching_robot, map->size() / 4, std::min<std::size_t>(400, map->size() / 2));
 
   if (options.header) {
     std::printf(
         "images,file_mib,open_cold_s,open_s,rss_opened_mib,rss_driven_mib,rss_lost_mib,cold_median_ms,cold_95_ms,"
-        "file_median_ms,file_95_ms,warm_median_ms,warm_95_ms,comparisons,tracking,lost_median_ms,lost_95_ms\n");
+        "file_median_ms,file_95_ms,warm_median_ms,warm_95_ms,comparisons,tracking,lost_median_ms,lost_95_ms,"
+        "unknown_start_images,unknown_start_median_ms,unknown_start_95_ms\n");
   }
-  std::printf("%zu,%.1f,%.3f,%.3f,%.0f,%.0f,%.0f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.1f,%.2f,%.3f,%.3f\n", map->size(),
-              static_cast<double>(std::filesystem::file_size(options.map)) / (1 << 20), cold_open_s, open_again_s,
-              opened_mib, driven_mib, lost_mib, cold.quantile_ms(0.5), cold.quantile_ms(0.95),
+  std::printf("%zu,%.1f,%.3f,%.3f,%.0f,%.0f,%.0f,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.1f,%.2f,%.3f,%.3f,%zu,%.3f,%.3f\n",
+              map->size(), static_cast<double>(std::filesystem::file_size(options.map)) / (1 << 20), cold_open_s,
+              open_again_s, opened_mib, driven_mib, lost_mib, cold.quantile_ms(0.5), cold.quantile_ms(0.95),
               from_file.quantile_ms(0.5), from_file.quantile_ms(0.95), warm.quantile_ms(0.5), warm.quantile_ms(0.95),
-              warm.comparisons, warm.tracking, lost.quantile_ms(0.5), lost.quantile_ms(0.95));
+              warm.comparisons, warm.tracking, lost.quantile_ms(0.5), lost.quantile_ms(0.95), searching.first,
+              searching.quantile_ms(0.5), searching.quantile_ms(0.95));
 }
 
 }  // namespace
@@ -169,6 +178,7 @@ int main(int argc, char** argv) {
   app.add_option("--features", options.features, "Of an image, as the map was made with")->capture_default_str();
   app.add_option("--seed", options.seed, "As the map was made with")->capture_default_str();
   app.add_option("--swarm-range", options.swarm_range_m, "The swarm moves as in a map of so many metres");
+  app.add_option("--sweep-images", options.sweep_images, "As the parameter of the localizer")->capture_default_str();
   app.add_flag("--header", options.header, "Print the names of the columns");
   CLI11_PARSE(app, argc, argv);
   try {
