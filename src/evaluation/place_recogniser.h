@@ -72,24 +72,24 @@ class BestSingleImage final : public PlaceRecogniser {
 
 /// Parameters of sequence matching; symbols of Milford and Wyeth (ICRA 2012).
 struct SequenceConfig {
-  int length = 10;                ///< d_s, images
-  int normalisation_radius = 10;  ///< R_window reaches so many training images to each side
-  double min_contrast = 0.05;     ///< smaller standard deviations of similarity are noise, normalised as if so large
-  double min_speed = 0.8;         ///< V_min, training images per image
-  double max_speed = 1.2;         ///< V_max
-  double speed_step = 0.1;        ///< V_step
-  int uniqueness_radius = 10;     ///< training images this close to the best one are no rivals of it
+  int length = 10;
+  int normalisation_radius = 10;
+  double min_contrast = 0.05;
+  double min_speed = 0.8;
+  double max_speed = 1.2;
+  double speed_step = 0.1;
+  int uniqueness_radius = 10;
 
   void declare(ParameterVisitor& visitor);
 };
 
 /// Parameters of the topological filter.
 struct TopologicalBayesConfig {
-  int min_step = -1;     ///< w_l, training images moved per image
-  int max_step = 3;      ///< w_u
-  double reset = 0.001;  ///< probability that the robot is anywhere after an image
-  double delta = 5.0;    ///< likelihood ratio between very similar and very different training images
-  int window = 15;       ///< training images that count as one place, odd
+  int min_step = -1;
+  int max_step = 3;
+  double reset = 0.001;
+  double delta = 5.0;
+  int window = 15;
 
   void declare(ParameterVisitor& visitor);
 };

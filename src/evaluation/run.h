@@ -29,7 +29,7 @@ struct StepRecord {
   bool off_map = false;                                 ///< the true position is farther than kOffMap_m from the map
 };
 
-/// A closer look at one step, for the course of a single run.
+/// A closer look at one step, for the track of a single run.
 struct TraceRecord {
   std::size_t image = 0;
   double diversity_m = 0.0;

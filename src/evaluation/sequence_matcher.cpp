@@ -48,9 +48,9 @@ void SequenceConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"sequence/normalisation_radius", "1",
                    "training images to each side that contrast is normalised over (R_window)"},
                   normalisation_radius, 1, 100000);
-  visitor.real(
-      {"sequence/min_contrast", "1", "smaller standard deviations of similarity are noise: normalised as if so large"},
-      min_contrast, 1e-6, 1.0);
+  visitor.real({"sequence/min_contrast", "1",
+                "smaller standard deviations of similarity are noise: raised to this to normalise"},
+               min_contrast, 1e-6, 1.0);
   visitor.real({"sequence/min_speed", "1", "slowest drive, in training images per image (V_min)"}, min_speed, 0.0,
                100.0);
   visitor.real({"sequence/max_speed", "1", "fastest drive, in training images per image (V_max)"}, max_speed, 0.0,

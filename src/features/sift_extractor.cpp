@@ -47,8 +47,8 @@ void SiftConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"sift/edge_threshold", "1", "largest accepted ratio of principal curvatures"}, edge_threshold, 1.0,
                1000.0);
   visitor.real({"sift/sigma", "px", "blur of the first scale"}, sigma_px, 0.5, 10.0);
-  visitor.integer({"sift/max_features", "1", "keep only the strongest so many features; 0 keeps all"}, max_features, 0,
-                  100000);
+  visitor.integer({"sift/max_features", "1", "keep at most this number of features, the strongest; 0 keeps all"},
+                  max_features, 0, 100000);
 }
 
 const std::vector<std::string>& siftBackends() {

@@ -65,7 +65,7 @@ void addStiffness(const SmoothedPath& grid, double weight, Triplets& matrix) {
 }
 
 /// Pulls every step of the path towards the typical speed, in its present direction: the length of what was driven
-/// through a gap is known even if its course is not. Steps much slower than that belong to a robot that stood.
+/// through a gap is known even if its path is not. Steps much slower than that belong to a robot that stood.
 void addSpeed(const SmoothedPath& path, double speed_mps, double weight, Triplets& matrix,
               Eigen::MatrixX2d& right_side) {
   constexpr double kMoving = 0.5;

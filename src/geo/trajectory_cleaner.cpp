@@ -226,7 +226,7 @@ void TrajectoryCleanerConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"trajectory/smoothing_length", "m", "the cleaned path follows details longer than this"},
                smoothing_length_m, 0.01, 100.0);
   visitor.real(
-      {"trajectory/speed_stiffness", "1", "how firmly the path keeps its speed, against how firmly its course"},
+      {"trajectory/speed_stiffness", "1", "how firmly the path keeps its speed, against how firmly its direction"},
       speed_stiffness, 0.0, 1000.0);
   visitor.real({"trajectory/outlier_distance", "m", "fixes farther from the path lose their influence on it"},
                outlier_distance_m, 0.01, 100.0);

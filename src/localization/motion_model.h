@@ -13,7 +13,7 @@ namespace visual_localization {
 class MotionModel {
  public:
   virtual ~MotionModel() = default;
-  /// Gives a particle at a new place whatever the model needs.
+  /// Gives a particle at a new position whatever the model needs.
   virtual void start(Particle&, Random&) const {}
   /// One image further.
   virtual void move(Particle& particle, const Travel& travel, Random& random) const = 0;

@@ -11,7 +11,8 @@ namespace visual_localization {
 std::string toString(FeatureKind kind) { return kind == FeatureKind::kSift ? "SIFT" : "GLOBAL"; }
 
 void SimilarityConfig::declare(ParameterVisitor& visitor) {
-  visitor.real({"similarity/sift_recognised", "1", "a best match below this share of the features is a bad one"},
+  visitor.real({"similarity/sift_recognised", "1",
+                "a best match below this share of the features is a bad one (journal, section 5)"},
                sift_recognised, 0.0, 1.0);
   visitor.real({"similarity/global_recognised", "1", "a best global similarity below this is a bad one"},
                global_recognised, 0.0, 1.0);
@@ -50,11 +51,10 @@ void HybridConfig::declare(ParameterVisitor& visitor) {
       sift_below_m, 0.0, 10000.0);
   visitor.real({"hybrid/global_above", "m", "after global features, SIFT follows when a sigma is above (d_global)"},
                global_above_m, 0.0, 10000.0);
-  visitor.flag({"hybrid/sift_in_doubt", "", "SIFT also as long as the images look more like another place"},
-               sift_in_doubt);
+  visitor.flag({"hybrid/sift_in_doubt", "", "SIFT also while the images look more like another place"}, sift_in_doubt);
   visitor.integer(
       {"hybrid/sift_every", "1",
-       "SIFT at least for every so many images, and until an image confirms the position; 0: no such check"},
+       "SIFT at least once in this number of images, and until an image confirms the position; 0: no such check"},
       sift_every, 0, 1000000);
 }
 

@@ -79,10 +79,10 @@ void StateConfig::declare(ParameterVisitor& visitor) {
                0.0, 1.0);
   visitor.integer({"state/min_matches", "1", "fewer matched SIFT features are no evidence, whatever their share"},
                   min_matches, 0, 10000);
-  visitor.real(
-      {"state/max_scale", "1",
-       "matched SIFT features that look so many times larger or smaller are seen from too far away to confirm"},
-      max_scale, 1.0, 100.0);
+  visitor.real({"state/max_scale", "1",
+                "a median size ratio of the matched SIFT features above this, or below its inverse, does not confirm a "
+                "position"},
+               max_scale, 1.0, 100.0);
   visitor.real(
       {"state/min_global_similarity", "1", "a weaker best match by global features does not confirm a position"},
       min_global_similarity, 0.0, 1.0);
@@ -103,19 +103,19 @@ void StateConfig::declare(ParameterVisitor& visitor) {
                   motion_length, 2, 1000);
   visitor.real({"state/max_motion_residual", "m", "up to this root mean square distance from it"},
                max_motion_residual_m, 0.0, 10000.0);
-  visitor.integer(
-      {"state/off_map_images", "1", "so many images that confirm nothing, with no TRACKING in between, mean OFF_MAP"},
-      off_map_images, 1, 100000);
+  visitor.integer({"state/off_map_images", "1",
+                   "this number of images that confirm nothing, with no TRACKING in between, means OFF_MAP"},
+                  off_map_images, 1, 100000);
   visitor.integer(
       {"state/min_features", "1", "images with fewer SIFT features are blind and say nothing about OFF_MAP"},
       min_features, 0, 10000);
-  visitor.integer(
-      {"state/frozen_images", "1",
-       "so many repetitions of an image to the last bit end TRACKING; 0: never, for a simulated camera without noise"},
-      frozen_images, 0, 100000);
-  visitor.real({"state/frozen_time", "s",
-                "but only once they span so much time: a stream may repeat each image to reach its rate"},
-               frozen_time_s, 0.0, 3600.0);
+  visitor.integer({"state/frozen_images", "1",
+                   "this number of repetitions of an image to the last bit ends TRACKING; 0: never, for a simulated "
+                   "camera without noise"},
+                  frozen_images, 0, 100000);
+  visitor.real(
+      {"state/frozen_time", "s", "but only once they span this time: a stream may repeat each image to reach its rate"},
+      frozen_time_s, 0.0, 3600.0);
   visitor.atMost("state/images_to_confirm", images_to_confirm, "state/window", window);
   visitor.renamed("state/course_length", "state/motion_length");
   visitor.renamed("state/max_course_residual", "state/max_motion_residual");

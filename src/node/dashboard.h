@@ -9,8 +9,8 @@
 
 namespace visual_localization {
 
-/// The status as a picture for people: the state in colour, the figures that explain it, and their course over the last
-/// images. Thread-safe.
+/// The status as a picture for people: the state in colour, the figures that explain it, and their history over the
+/// last images. Thread-safe.
 class Dashboard {
  public:
   static constexpr std::size_t kShown = 120;  ///< number of images that are remembered

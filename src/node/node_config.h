@@ -12,13 +12,13 @@ namespace visual_localization {
 
 /// Parameters of the ROS node alone.
 struct NodeConfig {
-  std::string map;                         ///< path of the map file; empty: wait for ~load_map
-  int map_cache_mb = kDefaultMapCache_mb;  ///< memory for features; those of a larger map are read when needed
-  std::string map_directory;               ///< only maps below this folder may be opened; empty: all
-  std::string image_transport = "raw";     ///< raw, compressed (decoded here), or another installed transport
-  std::string tf_mode = "none";            ///< none, map_to_odom, map_to_base
-  double transform_tolerance_s = 0.1;      ///< added to the image stamp in the stamp of the transform
-  double image_timeout_s = 5.0;            ///< longer without an image is an error
+  std::string map;
+  int map_cache_mb = kDefaultMapCache_mb;
+  std::string map_directory;
+  std::string image_transport = "raw";
+  std::string tf_mode = "none";
+  double transform_tolerance_s = 0.1;
+  double image_timeout_s = 5.0;
   std::string global_frame_id = "map";
   std::string odom_frame_id = "odom";
   std::string base_frame_id = "base_link";

@@ -14,11 +14,11 @@ namespace visual_localization {
 /// Parameters of Lowe's detector and descriptor. A map stores the ones it was built with, and the live image
 /// is extracted with the same.
 struct SiftConfig {
-  int octave_layers = 3;             ///< scale samples per octave
-  double contrast_threshold = 0.04;  ///< weakest accepted extremum, of full intensity
-  double edge_threshold = 10.0;      ///< largest accepted ratio of principal curvatures
-  double sigma_px = 1.6;             ///< blur of the first scale
-  int max_features = 0;              ///< keep only the strongest so many; 0 = all
+  int octave_layers = 3;
+  double contrast_threshold = 0.04;
+  double edge_threshold = 10.0;
+  double sigma_px = 1.6;
+  int max_features = 0;
 
   void declare(ParameterVisitor& visitor);
 };

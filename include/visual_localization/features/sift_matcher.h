@@ -11,8 +11,8 @@ namespace visual_localization {
 
 /// When two descriptors count as the same thing in the world.
 struct MatchConfig {
-  double max_angle_ratio = 0.6;    ///< delta of Kronfeld et al. (journal), section 4
-  std::string mode = "symmetric";  ///< "symmetric" (journal) or "one_way" (conference, hybrid)
+  double max_angle_ratio = 0.6;
+  std::string mode = "symmetric";
 
   void declare(ParameterVisitor& visitor);
   bool isSymmetric() const { return mode == "symmetric"; }

@@ -24,15 +24,15 @@ std::string toString(FixVerdict verdict);
 
 /// What is known of the robot's motion and of its receiver. The speed itself is estimated from the fixes.
 struct TrajectoryCleanerConfig {
-  double node_length_m = 1.3;       ///< fixes are summarised over about this much of the path
-  double speed_tolerance = 0.05;    ///< how much the speed of travel varies, as a share of it
-  double opening_cost = 8.0;        ///< evidence, in squared sigmas, that a rejected stretch must bring ...
-  double rejection_cost = 1.5;      ///< ... and as much more for each summarised position in it
-  double margin_m = 1.5;            ///< a rejected stretch grows by this much of the path at both ends
-  double smoothing_length_m = 1.5;  ///< the cleaned path follows details longer than this
-  double speed_stiffness = 0.1;     ///< how firmly the path keeps its speed, against how firmly its course
-  double outlier_distance_m = 1.0;  ///< residuals beyond this lose their influence on the path
-  double max_bridge_s = 90.0;       ///< longer stretches without believable fix are left open
+  double node_length_m = 1.3;
+  double speed_tolerance = 0.05;
+  double opening_cost = 8.0;
+  double rejection_cost = 1.5;
+  double margin_m = 1.5;
+  double smoothing_length_m = 1.5;
+  double speed_stiffness = 0.1;
+  double outlier_distance_m = 1.0;
+  double max_bridge_s = 90.0;
 
   void declare(ParameterVisitor& visitor);
 };

@@ -17,13 +17,13 @@ namespace visual_localization {
 /// says it.
 struct LocalizerConfig : TrackerConfig {
   std::string features = "sift";
-  std::string sift_backend = kNativeSift;  ///< which extractor; their features can be matched with each other
-  int seed = 1;                            ///< same seed, images and map: same track
-  bool prune = true;                       ///< keep only features that the image before showed as well
-  double max_image_gap_s = 10.0;           ///< longer pauses between images make the earlier one useless for pruning
-  double min_position_std_m = 0.5;         ///< accuracy of the map's own positions: no covariance claims more
-  double min_yaw_std_rad = 0.1;            ///< the camera is never mounted and driven exactly along the path
-  int sweep_images = 20000;                ///< of a larger map a sweep compares at most this number per image
+  std::string sift_backend = kNativeSift;
+  int seed = 1;
+  bool prune = true;
+  double max_image_gap_s = 10.0;
+  double min_position_std_m = 0.5;
+  double min_yaw_std_rad = 0.1;
+  int sweep_images = 20000;
   MatchConfig match;
   SimilarityConfig similarity;
   HybridConfig hybrid;

@@ -69,7 +69,7 @@ Prior around(const Eigen::Vector2d& centre_m, double radius_m);
 /// larger than one, symmetric and positive semi-definite.
 Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& covariance_m2);
 /// From the particles of another tracker, whose weights need not sum to one: half of the draws by weight, so that the
-/// best places are among few particles too, the other half from all alike, so that rivals are not forgotten. Throws
+/// best positions are among few particles too, the other half from all alike, so that rivals are not forgotten. Throws
 /// std::invalid_argument when there are none.
 Prior drawnFrom(std::vector<Particle> cloud);
 

@@ -26,19 +26,19 @@ struct Score {
 
 /// What a similarity means, for each kind of features.
 struct SimilarityConfig {
-  double sift_recognised = 0.05;   ///< m below this is a bad match (Kronfeld et al. (journal), section 5: 5 %)
-  double global_recognised = 0.6;  ///< the same for global features, whose m is never small
-  double global_exponent = 20.0;   ///< global m is raised to this to be a weight (Weiss et al., section IV.A)
+  double sift_recognised = 0.05;
+  double global_recognised = 0.6;
+  double global_exponent = 20.0;
 
   void declare(ParameterVisitor& visitor);
 };
 
 /// Thresholds of the hybrid choice (Weiss et al., section IV.B).
 struct HybridConfig {
-  double sift_below_m = 7.0;    ///< d_SIFT: after SIFT, global features are next when both sigmas are below
-  double global_above_m = 5.5;  ///< d_global: after global features, SIFT is next when one sigma is above
-  bool sift_in_doubt = true;    ///< SIFT also as long as the image looks more like another place
-  int sift_every = 10;          ///< SIFT at least so often, and then until an image confirms the position; 0: never
+  double sift_below_m = 7.0;
+  double global_above_m = 5.5;
+  bool sift_in_doubt = true;
+  int sift_every = 10;
 
   void declare(ParameterVisitor& visitor);
 };

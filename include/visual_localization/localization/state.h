@@ -29,23 +29,23 @@ std::string toString(LocalizationState state);
 
 /// When a position counts as confirmed.
 struct StateConfig {
-  double min_similarity = 0.08;         ///< a weaker best SIFT match does not confirm a position
-  int min_matches = 5;                  ///< fewer matched SIFT features are no evidence, whatever their share
-  double max_scale = 1.2;               ///< a best match seen this much larger or smaller does not confirm a position
-  double min_global_similarity = 0.65;  ///< a weaker best match by global features does not confirm a position
-  double max_distance_m = 5.0;          ///< a best match farther from the estimate does not confirm it
-  int window = 5;                       ///< number of the last images that decide
-  int images_to_confirm = 4;            ///< number of them that must confirm the position
-  double max_step_m = 10.0;             ///< a larger jump between two images makes what came before worthless
-  bool place_check = true;              ///< compare the whole map by global features: does another position fit better?
-  double sure_similarity = 0.2;         ///< a stronger SIFT match needs no such second witness
-  double min_place_ratio = 0.985;       ///< mean over the window; below, the position is in doubt
-  int motion_length = 10;               ///< number of the last estimates that must follow a steady motion
-  double max_motion_residual_m = 2.5;   ///< up to this root mean square distance from it
-  int off_map_images = 10;              ///< this many images that confirm nothing: off the map
-  int min_features = 10;                ///< images with fewer SIFT features are blind: they say nothing either way
-  int frozen_images = 3;                ///< this many repeated images in a row: the camera is frozen; 0: never
-  double frozen_time_s = 1.0;           ///< but only once they span this time
+  double min_similarity = 0.08;
+  int min_matches = 5;
+  double max_scale = 1.2;
+  double min_global_similarity = 0.65;
+  double max_distance_m = 5.0;
+  int window = 5;
+  int images_to_confirm = 4;
+  double max_step_m = 10.0;
+  bool place_check = true;
+  double sure_similarity = 0.2;
+  double min_place_ratio = 0.985;
+  int motion_length = 10;
+  double max_motion_residual_m = 2.5;
+  int off_map_images = 10;
+  int min_features = 10;
+  int frozen_images = 3;
+  double frozen_time_s = 1.0;
 
   void declare(ParameterVisitor& visitor);
 };

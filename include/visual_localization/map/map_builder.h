@@ -24,10 +24,10 @@ struct RawImage;
 
 /// How a recording becomes training images.
 struct MapBuilderConfig {
-  double min_spacing_m = 0.0;              ///< skip an image closer than this to the last kept one of its session
-  bool prune = true;                       ///< keep only features seen again in a neighbouring training image
-  int preview_width_px = 80;               ///< width of the stored preview; 0 = none
-  std::string sift_backend = kNativeSift;  ///< which extractor; the map is the same kind of map either way
+  double min_spacing_m = 0.0;
+  bool prune = true;
+  int preview_width_px = 80;
+  std::string sift_backend = kNativeSift;
   SiftConfig sift;
   MatchConfig match;
   TrajectoryCleanerConfig trajectory;
