@@ -30,7 +30,7 @@ struct Options {
   std::size_t steps = 200;
   std::size_t features = 100;
   std::uint64_t seed = 1;
-  double swarm_range_m = 0.0;
+  double max_range_m = LocalizerConfig().dpso.max_range_m;
   int sweep_images = LocalizerConfig().sweep_images;
   bool header = false;
 };
@@ -103,23 +103,17 @@ Drive drive(StreetImage& image, Localizer& localizer, std::size_t begin, std::si
   return result;
 }
 
-/// The swarm's speeds and the reach of its quantum particles are shares of the map's range. For a swarm that moves as
-/// in a map of `swarm_range_m` they are scaled; 0: left as they are.
-LocalizerConfig configFor(const TrainingMap& map, const Options& options) {
+LocalizerConfig configOf(const Options& options) {
   LocalizerConfig config;
   config.sweep_images = options.sweep_images;
-  if (options.swarm_range_m <= 0.0) return config;
-  const double scale = options.swarm_range_m / map.area().range().maxCoeff();
-  for (double* share : {&config.dpso.v0, &config.dpso.v0_min, &config.dpso.v0_max, &config.dpso.quantum_std}) {
-    *share *= scale;
-  }
+  config.dpso.max_range_m = options.max_range_m;
   return config;
 }
 
 Drive driveTracked(const StreetMap& streets, const std::shared_ptr<const TrainingMap>& map, const Options& options) {
   const std::size_t begin = map->size() / 2;
   const auto image = std::make_shared<StreetImage>(streets, *map);
-  Localizer localizer(map, configFor(*map, options), image);
+  Localizer localizer(map, configOf(options), image);
   localizer.relocalize(around(map->position_m(begin), 5.0));
   return drive(*image, localizer, begin, std::min(options.steps, map->size() - begin));
 }
@@ -145,10 +139,10 @@ void measure(const Options& options) {
   Drive warm = driveTracked(streets, map, options);
 
   const auto image = std::make_shared<StreetImage>(streets, *map);
-  Localizer lost_robot(map, configFor(*map, options), image);
+  Localizer lost_robot(map, configOf(options), image);
   Drive lost = drive(*image, lost_robot, 2 * map->size(), 30);
   const double lost_mib = resident_mib() - before_mib;
-  Localizer searching_robot(map, configFor(*map, options), image);
+  Localizer searching_robot(map, configOf(options), image);
   Drive searching = drive(*image, searching_robot, map->size() / 4, std::min<std::size_t>(400, map->size() / 2));
 
   if (options.header) {
@@ -177,7 +171,7 @@ int main(int argc, char** argv) {
   app.add_option("--steps", options.steps, "Images to drive")->capture_default_str();
   app.add_option("--features", options.features, "Of an image, as the map was made with")->capture_default_str();
   app.add_option("--seed", options.seed, "As the map was made with")->capture_default_str();
-  app.add_option("--swarm-range", options.swarm_range_m, "The swarm moves as in a map of so many metres");
+  app.add_option("--max-range", options.max_range_m, "As dpso/max_range, metres")->capture_default_str();
   app.add_option("--sweep-images", options.sweep_images, "As the parameter of the localizer")->capture_default_str();
   app.add_flag("--header", options.header, "Print the names of the columns");
   CLI11_PARSE(app, argc, argv);
