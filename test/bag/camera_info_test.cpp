@@ -265,9 +265,11 @@ TEST_F(BagCamera, ThatChangesOrCannotBeIsRefused) {
 TEST_F(BagCamera, WhoseLengthsLieIsRefused) {
   write({example()});
   std::string bytes = test::readAll(path_);
-  const std::size_t at = bytes.find("plumb_bob");
+  // The number of coefficients stands behind the model, a string with its own length.
+  const std::string model("\x09\0\0\0plumb_bob", 13);
+  const std::size_t at = bytes.find(model);
   ASSERT_NE(at, std::string::npos);
-  bytes.replace(at + 9, 4, "\xFF\xFF\xFF\xFF");  // number of coefficients
+  bytes.replace(at + model.size(), 4, "\xFF\xFF\xFF\xFF");
   test::writeAll(path_, bytes);
   EXPECT_THAT(refusal(), HasSubstr("shorter than its lengths claim"));
 }
