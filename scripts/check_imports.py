@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Iterator, Optional, Tuple
 
 PACKAGE = 'visual_localization'
-ORDER = ['base', 'parameters', 'geo', 'features', 'map', 'localization', 'survey', 'ros', 'bag', 'evaluation', 'node',
-         'apps']
+ORDER = ['base', 'parameters', 'geo', 'camera', 'features', 'map', 'localization', 'survey', 'ros', 'bag', 'evaluation',
+         'node', 'apps']
 KNOWS_ROS = {'ros', 'bag', 'node', 'apps'}
 READS_BAGS = {'round_recorder'}  # of evaluation/: the rest of it belongs to the library without ROS
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 ROS_HEADER = re.compile(
-    r'^(ros|rosbag|roscpp|nodelet|pluginlib|class_loader|cv_bridge|image_transport|message_filters|tf2?|tf2_\w+|'
-    r'\w+_msgs|std_srvs|diagnostic_updater|dynamic_reconfigure|topic_tools|bondcpp)/')
+    r'^(ros|rosbag|roscpp|nodelet|pluginlib|class_loader|camera_calibration_parsers|cv_bridge|image_transport|'
+    r'message_filters|tf2?|tf2_\w+|\w+_msgs|std_srvs|diagnostic_updater|dynamic_reconfigure|topic_tools|bondcpp)/')
 
 
 def includes(path: Path) -> Iterator[Tuple[int, str]]:

@@ -3,21 +3,25 @@
 
 JPEG images at 1 Hz on /stereo/left/image_raw/compressed, a DGPS at 5 Hz on /gps/fix with the faults of a real
 one (noise, slow bias, multipath bends, gaps, stretches without a fix, single spikes), and the exact positions
-on /ground_truth/fix for judging. The same seed gives the same faults.
+on /ground_truth/fix for judging. The same seed gives the same faults. With --camera-info, every image has a calibration
+on /stereo/left/camera_info beside it.
 """
 import argparse
+import copy
 import csv
 import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Iterator, List, Tuple
+from typing import Iterator, List, Optional, Tuple
 
 import cv2
 import numpy as np
 import rosbag
 import rospy
-from sensor_msgs.msg import CompressedImage, NavSatFix, NavSatStatus
+from camera_info import TOPIC as CAMERA_INFO_TOPIC
+from camera_info import read_camera_info
+from sensor_msgs.msg import CameraInfo, CompressedImage, NavSatFix, NavSatStatus
 
 # Origin of the local east-north frame.
 LATITUDE_DEG, LONGITUDE_DEG, ALTITUDE_M = 48.53450, 9.07130, 445.0
@@ -159,11 +163,13 @@ def make_image(path: Path, index: int, quality: int) -> CompressedImage:
     return image
 
 
-def image_events(folder: Path, drive: Round, quality: int) -> Iterator[Event]:
-    """Every image and its exact position, at the same stamp."""
+def image_events(folder: Path, drive: Round, quality: int, camera_info: Optional[CameraInfo]) -> Iterator[Event]:
+    """Every image, its calibration if there is one, and its exact position, at the same stamp."""
     for index, stamp in enumerate(drive.stamps):
         image = make_image(folder / f'frame_{index:04d}.png', index, quality)
         yield stamp, '/stereo/left/image_raw/compressed', image
+        if camera_info is not None:
+            yield stamp, CAMERA_INFO_TOPIC, copy.deepcopy(camera_info)
         truth = make_fix(drive.east[index], drive.north[index], NavSatStatus.STATUS_GBAS_FIX, 1e-4, 1e-4)
         yield stamp, '/ground_truth/fix', truth
 
@@ -193,6 +199,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--seed', type=int, default=0, help='of the faults (default: %(default)s)')
     parser.add_argument('--start', type=float, default=1226500000.0, help='unix time (default: %(default).0f)')
     parser.add_argument('--quality', type=int, default=92, help='of the JPEGs (default: %(default)s)')
+    parser.add_argument('--camera-info', type=Path, help='calibration of the camera, YAML')
     parser.add_argument('--perfect', action='store_true', help='a DGPS without faults')
     return parser.parse_args()
 
@@ -204,7 +211,8 @@ def main() -> None:
     drive = read_round(args.round, rng)
     track = drive_with_gps(drive, rng)
     faults = [] if args.perfect else add_faults(track, drive.stamps[-1], rng)
-    events = list(image_events(args.round, drive, args.quality)) + list(gps_events(track))
+    camera_info = read_camera_info(args.camera_info) if args.camera_info else None
+    events = list(image_events(args.round, drive, args.quality, camera_info)) + list(gps_events(track))
     write_bag(args.out, events, args.start)
     print(f'{args.out}: {len(drive.stamps)} images, {os.path.getsize(args.out) / 1e6:.1f} MB')
     for fault in faults:

@@ -54,6 +54,14 @@ CLI::Validator must(bool (*allowed)(const std::string&), const std::string& requ
 /// CLI11 reads -1 as a huge index.
 bool isNotNegative(const std::string& text) { return text.rfind('-', 0) != 0; }
 
+/// Of a camera whose calibration is not in the recording.
+template <class Options>
+void declareCamera(CLI::App& app, Options& options, const std::string& otherwise) {
+  app.add_option("--camera-info", options.camera_info,
+                 "Calibration, YAML or INI of camera_calibration; otherwise " + otherwise);
+  app.add_option("--mask", options.mask, "Grey PNG of the camera's size: features are used where it is white");
+}
+
 void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--bag", options.bags, "Recording; repeat it for more sessions in one map")
       ->required()
@@ -64,6 +72,7 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
       ->capture_default_str();
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix")->capture_default_str();
   app.add_option("--output", options.output, "Map file to write")->required();
+  declareCamera(app, options, "the camera_info beside the image topic");
   app.add_option("--config", options.config, "Parameters, YAML (see config/map_builder.yaml)");
   app.add_option("--min-spacing", options.min_spacing_m,
                  "Metres between training images of a session (parameter 'map/min_spacing')");
@@ -110,6 +119,7 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
   to->needs(at);
   app.add_option("--image-topic", options.image_topic, "Raw or compressed images; finds \"/compressed\" itself")
       ->capture_default_str();
+  declareCamera(app, options, "the camera_info beside the image topic, or the map's");
   app.add_option("--truth-topic", options.truth_topic, "NavSatFix with true positions: prints the error");
 }
 

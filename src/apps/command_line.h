@@ -22,6 +22,8 @@ struct MapBuilderOptions {
   std::string output;
   std::string config;
   std::string plot;
+  std::string camera_info;
+  std::string mask;
   std::optional<double> min_spacing_m;
   std::size_t threads = allCores();
   std::optional<std::string> sift_backend;
@@ -45,6 +47,8 @@ struct LocalizeOptions {
   std::string features;
   std::string image_topic = "/stereo/left/image_raw";
   std::string truth_topic;
+  std::string camera_info;
+  std::string mask;
   std::optional<std::int64_t> particles;
   std::optional<std::int64_t> seed;
   std::optional<std::int64_t> map_cache_mb;

@@ -14,6 +14,7 @@
 #include "evaluation/round_recorder.h"
 #include "evaluation/track_csv.h"
 #include "node/node_config.h"
+#include "ros/camera_info.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/localization/localizer.h"
@@ -116,15 +117,54 @@ std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index
   return std::nullopt;
 }
 
+/// Size of the first image that can be decoded; nothing when none can.
+std::optional<cv::Size> recordedSize(const BagImages& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    try {
+      return images.read(i).decode().size();
+    } catch (const ImageError&) {
+    }
+  }
+  return std::nullopt;
+}
+
+/// Gives the localizer the camera and the mask that belong to the drive: those of the options, the calibration in the
+/// bag, or the map's. Says which.
+void setCamera(const LocalizeOptions& options, const BagReader& bag, const BagImages& images, Localizer& localizer) {
+  const std::optional<cv::Size> size = recordedSize(images);
+  std::string from = "the map";
+  const std::optional<CameraModel> of_map = localizer.camera();
+  const bool named = !options.camera_info.empty();
+  const std::optional<CameraModel> camera =
+      named ? readCameraFile(options.camera_info) : bag.camera(options.image_topic);
+  if (camera) {
+    localizer.setCamera(size ? fittedTo(*size, *camera) : *camera);
+    from = named ? options.camera_info : cameraInfoTopic(options.image_topic);
+  }
+  if (!options.mask.empty()) {
+    const Mask mask = readMask(options.mask);
+    localizer.setMask(size ? fittedTo(*size, mask) : mask);
+  }
+  if (!localizer.camera()) {
+    std::printf("camera: no calibration (no camera_info, no --camera-info, none in the map): places only\n");
+    return;
+  }
+  std::printf("camera: %s, from %s\n", describe(camera ? *camera : *localizer.camera()).c_str(), from.c_str());
+  const std::string other = of_map ? differences(*localizer.camera(), *of_map) : "";
+  if (!other.empty()) std::printf("camera: not the map's: %s\n", other.c_str());
+}
+
 void run(const LocalizeOptions& options) {
   const NodeParameters config = configOf(options);
-  requireNoInput("--output", options.output, {options.map, options.bag, options.config});
+  requireNoInput("--output", options.output,
+                 {options.map, options.bag, options.config, options.camera_info, options.mask});
   PartialFile output(options.output);  // fails now, not after the run
   const auto warn = [](const std::string& reason) { std::cerr << "localize: " << reason << std::endl; };
   Localizer localizer(loadMap(options.map, config.node.mapLoading(warn)), config.localizer);
   const BagReader bag(options.bag);
   const BagImages images = bag.images(options.image_topic);
   const std::vector<std::size_t> order = orderOf(options, images.size());
+  setCamera(options, bag, images, localizer);
   std::optional<Trajectory> truth;
   if (!options.truth_topic.empty()) truth = trueTrajectory(bag, options.truth_topic, localizer.map().frame());
 

@@ -16,6 +16,7 @@
 #include "apps/command_line.h"
 #include "apps/map_plot.h"
 #include "base/files.h"
+#include "ros/camera_info.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/parameters/parameters.h"
@@ -95,12 +96,21 @@ void addImages(MapBuilder& builder, const BagReader& bag, const std::string& top
   }
 }
 
+/// That of the option, or of the bag.
+SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options) {
+  SessionCamera camera;
+  camera.model = options.camera_info.empty() ? bag.camera(options.image_topic) : readCameraFile(options.camera_info);
+  if (!options.mask.empty()) camera.mask = readMask(options.mask);
+  return camera;
+}
+
 void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOptions& options,
                 std::vector<PlottedSession>& sessions) {
   const BagReader bag(path);
   PlottedSession session{sessionName(path, sessions), bag.fixes(options.fix_topic), {}, {}};
+  const SessionCamera camera = cameraOf(bag, options);
   try {
-    builder.beginSession(session.name, session.fixes);
+    builder.beginSession(session.name, session.fixes, camera);
   } catch (const std::exception& error) {
     throw BagError(path + ": " + options.fix_topic + ": " + error.what());
   }
@@ -119,6 +129,19 @@ void printFixes(const PlottedSession& session) {
   }
   std::cout << "; " << session.cleaned.gaps_closed << " gaps closed, the longest " << session.cleaned.longest_gap_s
             << " s; path " << session.cleaned.trajectory.length() << " m\n";
+}
+
+void printCamera(const SessionImages& session, const MapBuilderOptions& options) {
+  std::cout << session.name << ": ";
+  if (session.camera.model) {
+    std::cout << "camera " << describe(*session.camera.model) << ", from "
+              << (options.camera_info.empty() ? cameraInfoTopic(options.image_topic) : options.camera_info);
+  } else {
+    std::cout << "no calibration (no camera_info, no --camera-info): a map of places";
+  }
+  if (!options.mask.empty())
+    std::cout << "; mask uses " << 100.0 * session.camera.mask.usedShare() << " % of the image";
+  std::cout << '\n';
 }
 
 /// What one session brought, and whether its images were distorted to fit.
@@ -143,8 +166,10 @@ void printSessionImages(const std::vector<SessionImages>& sessions) {
   for (const SessionImages& session : sessions) printImages(session, first->recorded);
 }
 
-void printReport(const MapBuildReport& report, const std::vector<PlottedSession>& sessions) {
+void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
+                 const std::vector<PlottedSession>& sessions) {
   std::cout << std::fixed << std::setprecision(1);
+  for (const SessionImages& session : report.session_images) printCamera(session, options);
   for (const PlottedSession& session : sessions) printFixes(session);
   if (sessions.size() > 1) printSessionImages(report.session_images);
   std::cout << "images: " << report.images_kept << " kept, " << report.images_without_position << " without position, "
@@ -184,7 +209,7 @@ void requireWritable(const std::string& path) { const PartialFile attempt(path);
 /// Refuses what could only fail after the work.
 void requireOutputs(const MapBuilderOptions& options) {
   std::vector<std::string> inputs = options.bags;
-  inputs.push_back(options.config);
+  inputs.insert(inputs.end(), {options.config, options.camera_info, options.mask});
   requireDifferent(options.bags);
   requireNoInput("--output", options.output, inputs);
   inputs.push_back(options.output);
@@ -213,7 +238,7 @@ void buildMap(const MapBuilderOptions& options) {
     ProgressBar bar("pruning features");
     builder.save(options.output, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
   }
-  printReport(builder.report(), sessions);
+  printReport(options, builder.report(), sessions);
   printSummary(options, builder.report(),
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   for (std::size_t s = 0; s < sessions.size(); ++s) {

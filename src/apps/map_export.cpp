@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 
 const std::string& sessionOf(const TrainingMap& map, int session) {
-  return map.header().sessions[static_cast<std::size_t>(session)];
+  return map.header().sessions[static_cast<std::size_t>(session)].name;
 }
 
 /// With this many significant digits: more would only pretend.

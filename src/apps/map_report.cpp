@@ -32,7 +32,7 @@ std::string key(const std::string& name) {
 }
 
 std::string nameOf(const TrainingMap& map, int session) {
-  return oneLine(map.header().sessions[static_cast<std::size_t>(session)], kLongestName);
+  return oneLine(map.header().sessions[static_cast<std::size_t>(session)].name, kLongestName);
 }
 
 /// "2010-06-01 10:20:30", UTC.
@@ -85,8 +85,9 @@ std::string whereItsFeaturesAre(double file_bytes) {
 void printFile(std::ostream& out, const std::string& path, const TrainingMap& map) {
   const MapHeader& header = map.header();
   const auto bytes = static_cast<double>(std::filesystem::file_size(path));
-  out << key("map") << path << ", version " << kMapSchemaVersion << ", written by visual_localization "
-      << packageVersionOf(path) << '\n'
+  const MapOrigin origin = originOf(path);
+  out << key("map") << path << ", version " << origin.schema_version << ", written by visual_localization "
+      << origin.package_version << '\n'
       << key("size") << humanSize(bytes) << " on disk, " << whereItsFeaturesAre(bytes) << '\n'
       << key("datum") << std::setprecision(9) << header.datum.latitude_deg << " deg, " << header.datum.longitude_deg
       << " deg, " << header.datum.altitude_m << " m; positions below are metres (east, north) from it\n"
@@ -127,6 +128,29 @@ void printSessions(std::ostream& out, const TrainingMap& map, const MapSurvey& s
     out << '\n';
   }
   if (shown < survey.sessions.size()) out << "      and " << survey.sessions.size() - shown << " more\n";
+}
+
+std::string cameraText(const Session& session) {
+  std::string text = session.camera ? describe(*session.camera) : "no calibration: places only";
+  if (!session.mask.empty()) text += "; mask uses " + percent(session.mask.usedShare(), 1.0) + " of the image";
+  return text;
+}
+
+/// One line for all sessions in a row with the same camera.
+void printCameras(std::ostream& out, const TrainingMap& map) {
+  const std::vector<Session>& sessions = map.header().sessions;
+  const std::size_t shown = std::min(sessions.size(), kMostSessions);
+  for (std::size_t first = 0; first < shown;) {
+    std::size_t last = first;
+    const auto is_same = [&](const Session& other) {
+      return other.camera == sessions[first].camera && other.mask == sessions[first].mask;
+    };
+    while (last + 1 < shown && is_same(sessions[last + 1])) ++last;
+    out << key(first == 0 ? "cameras" : "");
+    if (sessions.size() > 1) out << first << (last > first ? " to " + std::to_string(last) : "") << ": ";
+    out << cameraText(sessions[first]) << '\n';
+    first = last + 1;
+  }
 }
 
 void printCoverage(std::ostream& out, const TrainingMap& map, const MapSurvey& survey) {
@@ -247,6 +271,7 @@ void printMapReport(std::ostream& out, const std::string& path, const TrainingMa
   printFile(out, path, map);
   printFeatures(out, map);
   printSessions(out, map, findings.survey);
+  printCameras(out, map);
   printCoverage(out, map, findings.survey);
   printDensity(out, map, findings);
   printHeadings(out, map, findings.survey);

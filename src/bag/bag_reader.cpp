@@ -1,6 +1,7 @@
 #include "visual_localization/bag/bag_reader.h"
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include <ros/serialization.h>
+#include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/NavSatFix.h>
@@ -17,6 +19,8 @@
 
 #include "bag/bag_file.h"
 #include "base/text.h"
+#include "base/time.h"
+#include "ros/camera_info.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
@@ -98,11 +102,11 @@ class Cursor {
     at_ += static_cast<std::size_t>(count);
     return *this;
   }
-  /// A string or an array of bytes: four bytes of length and then the content.
-  Cursor& skipArray() {
+  /// A string or an array: four bytes of length and then as many elements of `element_bytes`.
+  Cursor& skipArray(std::uint64_t element_bytes = 1) {
     const std::size_t from = at_;
     skip(4);
-    return skip(bag::numberAt(bytes_, from, 4));
+    return skip(element_bytes * bag::numberAt(bytes_, from, 4));
   }
 
  private:
@@ -121,6 +125,13 @@ void requireLengths(std::string_view bytes, const sensor_msgs::CompressedImage*)
 }
 
 void requireLengths(std::string_view bytes, const sensor_msgs::NavSatFix*) { skipHeader(bytes).skip(3 + 12 * 8 + 1); }
+
+void requireLengths(std::string_view bytes, const sensor_msgs::CameraInfo*) {
+  constexpr std::uint64_t kMatrices = (9 + 9 + 12) * sizeof(double);
+  constexpr std::uint64_t kBinning = 2 * 4;
+  constexpr std::uint64_t kRegion = 4 * 4 + 1;
+  skipHeader(bytes).skip(8).skipArray().skipArray(sizeof(double)).skip(kMatrices + kBinning + kRegion);
+}
 
 /// Throws ImageError when the lengths inside the message do not fit.
 template <class Message>
@@ -152,6 +163,19 @@ Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
   return {stamp_ns,
           {message.latitude, message.longitude, message.altitude},
           message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX};
+}
+
+/// That of all these messages. Throws std::runtime_error when they do not say the same.
+sensor_msgs::CameraInfo onlyCalibration(bag::BagFile& file, const std::vector<bag::Message>& messages) {
+  const auto first = deserialize<sensor_msgs::CameraInfo>(file.read(messages.front()));
+  for (const bag::Message& message : messages) {
+    const auto info = deserialize<sensor_msgs::CameraInfo>(file.read(message));
+    if (sameCalibration(*info, *first)) continue;
+    const double after_s = secondsBetween(messages.front().stamp_ns, message.stamp_ns);
+    throw CameraError("the calibration changes " + std::to_string(std::llround(after_s)) +
+                      " s after the first: cut the bag there, or name one that holds for all of it (--camera-info)");
+  }
+  return *first;
 }
 
 }  // namespace
@@ -202,6 +226,20 @@ BagImages BagReader::images(const std::string& topic) const {
     content->is_compressed = true;
     content->messages = messagesOf<sensor_msgs::CompressedImage>(*file_, content->topic);
     return BagImages(content);
+  });
+}
+
+std::optional<CameraModel> BagReader::camera(const std::string& image_topic) const {
+  const std::string topic = cameraInfoTopic(image_topic);
+  return withBag(path_, [&]() -> std::optional<CameraModel> {
+    if (topicsOf<sensor_msgs::CameraInfo>(*file_).count(topic) == 0) return std::nullopt;
+    const std::vector<bag::Message> messages = messagesOf<sensor_msgs::CameraInfo>(*file_, topic);
+    if (messages.empty()) return std::nullopt;
+    try {
+      return toCamera(onlyCalibration(*file_, messages), isRectified(image_topic));
+    } catch (const CameraError& error) {
+      throw BagError(path_ + ": " + oneLine(topic) + ": " + oneLine(error.what()));
+    }
   });
 }
 

@@ -157,13 +157,15 @@ void removePartialFilesOnSignals() {
   ::signal(SIGXFSZ, SIG_IGN);
 }
 
-std::string readFile(const std::string& path) {
+std::string readFile(const std::string& path, std::size_t most_bytes) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rbe"), std::fclose);
   if (!file) refuseToRead(path, errno);
   std::string text;
   std::array<char, 65536> block{};
   while (const std::size_t count = std::fread(block.data(), 1, block.size(), file.get())) {
     text.append(block.data(), count);
+    if (text.size() <= most_bytes) continue;
+    throw FileError(path + ": has more than the " + std::to_string(most_bytes) + " bytes that are allowed");
   }
   if (std::ferror(file.get()) != 0) refuseToRead(path, errno);  // a folder, for instance
   return text;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -47,7 +49,8 @@ void writeFile(const std::string& path, const std::string& content);
 /// SIGTERM, and lets a write beyond the file size limit fail as an error instead of ending the process.
 void removePartialFilesOnSignals();
 
-/// The whole content of a file, or of a pipe, which can be read only once. Throws FileError.
-std::string readFile(const std::string& path);
+/// The whole content of a file, or of a pipe, which can be read only once. Throws FileError, also when it has more than
+/// `most_bytes`: whoever knows what a file may hold need not take memory for what it does.
+std::string readFile(const std::string& path, std::size_t most_bytes = std::numeric_limits<std::size_t>::max());
 
 }  // namespace visual_localization

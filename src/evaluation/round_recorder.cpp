@@ -106,7 +106,7 @@ std::shared_ptr<const TrainingMap> recordMap(const std::string& path, const Roun
   MapBuilder builder(config);
   const std::vector<Fix> fixes = bag.fixes(recording.fix_topic);
   try {
-    builder.beginSession(recording.name, fixes);
+    builder.beginSession(recording.name, fixes, {bag.camera(recording.image_topic), {}});
     forEachImage(bag, recording.image_topic, [&builder](std::int64_t stamp_ns, const cv::Mat& grey) {
       if (builder.wants(stamp_ns)) builder.addImage(stamp_ns, grey);
     });

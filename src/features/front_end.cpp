@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "base/time.h"
 #include "visual_localization/features/sift_matcher.h"
@@ -35,10 +36,10 @@ bool areIdentical(const cv::Mat& a, const cv::Mat& b) {
 
 }  // namespace
 
-GreyLevels greyLevelsOf(const cv::Mat& grey) {
+GreyLevels greyLevelsOf(const cv::Mat& grey, const Mask& mask) {
   cv::Scalar mean;
   cv::Scalar deviation;
-  cv::meanStdDev(grey, mean, deviation);
+  cv::meanStdDev(grey, mean, deviation, mask.grey());
   return {mean[0], deviation[0]};
 }
 
@@ -51,6 +52,24 @@ const cv::Mat& withUsualContrast(const cv::Mat& grey, const GreyLevels& levels, 
   return buffer;
 }
 
+const cv::Mat& withoutMasked(const cv::Mat& grey, const Mask& mask, cv::Mat& buffer) {
+  if (mask.empty()) return grey;
+  buffer.create(grey.size(), CV_8U);
+  buffer.setTo(kMiddle);
+  grey.copyTo(buffer, mask.grey());
+  return buffer;
+}
+
+void dropMasked(const Mask& mask, SiftFeatures& features) {
+  if (mask.empty()) return;
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    const SiftKeypoint& keypoint = features.keypoints()[i];
+    if (mask.allows(keypoint.x_px, keypoint.y_px)) used.push_back(i);
+  }
+  if (used.size() < features.size()) features = features.subset(used);
+}
+
 FrontEnd::FrontEnd(const FrontEndConfig& config)
     : config_(config), sift_extractor_(makeSiftExtractor(config.sift, config.sift_backend)) {}
 
@@ -58,6 +77,7 @@ void FrontEnd::configure(const FrontEndConfig& config) {
   config_.match = config.match;
   config_.prune = config.prune;
   config_.max_image_gap_s = config.max_image_gap_s;
+  config_.mask = config.mask;
   has_pruned_ = false;
 }
 
@@ -65,7 +85,7 @@ void FrontEnd::setImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   requireExtractable(grey);
   const cv::Mat& fitting = fitted(grey, config_.image_size, resized_);
-  const GreyLevels levels = greyLevelsOf(fitting);
+  const GreyLevels levels = greyLevelsOf(fitting, config_.mask);
   const cv::Mat& image = withUsualContrast(fitting, levels, spread_);
   is_repeated_ = current_ && areIdentical(image, current_->grey);
   if (!is_repeated_) takeImage(image);
@@ -102,13 +122,15 @@ const SiftFeatures& FrontEnd::sift() {
 const GlobalFeatures& FrontEnd::global() {
   if (global_) return *global_;
   const Stopwatch stopwatch;
-  global_ = global_extractor_.extract(current_->grey);
+  global_ = global_extractor_.extract(withoutMasked(current_->grey, config_.mask, masked_));
   extract_ms_ += stopwatch.elapsed_ms();
   return *global_;
 }
 
 const SiftFeatures& FrontEnd::unprunedSift(Image& image) {
-  if (!image.has_sift) sift_extractor_->extract(image.grey, image.sift);
+  if (image.has_sift) return image.sift;
+  sift_extractor_->extract(image.grey, image.sift);
+  dropMasked(config_.mask, image.sift);
   image.has_sift = true;
   return image.sift;
 }

@@ -18,6 +18,8 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
                      std::shared_ptr<QueryImage> image)
     : map_(std::move(map)),
       config_(requireValid(config)),
+      camera_(map_->header().sessions.front().camera),
+      mask_(map_->header().sessions.front().mask),
       image_(std::move(image)),
       scores_(map_->size()),
       sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept()),
@@ -136,12 +138,26 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
 
 void Localizer::configure(const LocalizerConfig& config) {
   const LocalizerConfig before = std::exchange(config_, LocalizerConfig(requireValid(config)));
-  image_->configure(frontEndConfigOf(config_, map_->header()), config_.similarity);
+  image_->configure(frontEndConfig(), config_.similarity);
   if (config_.sweep_images != before.sweep_images) sweep_.configure(static_cast<std::size_t>(config_.sweep_images));
   choice_.configure(config_.features, config_.hybrid);
   assessor_.configure(config_.state);
   configureTracker(before.tracker);
   last_.reset();
+}
+
+void Localizer::setCamera(const CameraModel& camera) { camera_ = camera.scaledTo(map_->header().image_size); }
+
+void Localizer::setMask(const Mask& mask) {
+  mask_ = mask.scaledTo(map_->header().image_size);
+  image_->configure(frontEndConfig(), config_.similarity);
+  last_.reset();
+}
+
+FrontEndConfig Localizer::frontEndConfig() const {
+  FrontEndConfig config = frontEndConfigOf(config_, map_->header());
+  config.mask = mask_;
+  return config;
 }
 
 void Localizer::configureTracker(const std::string& tracker_before) {

@@ -41,7 +41,10 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
 }
 
 FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map) {
-  return {map.image_size, map.sift, config.match, config.prune, config.max_image_gap_s, config.sift_backend};
+  FrontEndConfig front_end{map.image_size,         map.sift,           config.match, config.prune,
+                           config.max_image_gap_s, config.sift_backend};
+  if (!map.sessions.empty()) front_end.mask = map.sessions.front().mask;  // until somebody gives another camera's
+  return front_end;
 }
 
 }  // namespace visual_localization

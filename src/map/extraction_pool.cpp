@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -37,9 +38,12 @@ ExtractionPool::ExtractionPool(const SiftConfig& sift, const std::string& sift_b
 ExtractionPool::~ExtractionPool() = default;
 
 TrainingImage ExtractionPool::extract(const RawImage& image, Worker& worker) const {
-  const GreyLevels levels = greyLevelsOf(image.grey);  // named: GCC 13 and later take the result for a part of it
+  const GreyLevels levels =
+      greyLevelsOf(image.grey, image.mask);  // named: GCC 13 and later take the result for a part of it
   const cv::Mat& grey = withUsualContrast(image.grey, levels, worker.spread);
-  return {image.pose, worker.sift->extract(grey), worker.global.extract(grey),
+  SiftFeatures features = worker.sift->extract(grey);
+  dropMasked(image.mask, features);
+  return {image.pose, std::move(features), worker.global.extract(withoutMasked(grey, image.mask, worker.masked)),
           previewOf(image.grey, preview_width_px_)};
 }
 

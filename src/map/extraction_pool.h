@@ -15,7 +15,8 @@ namespace visual_localization {
 /// An image that has its pose, but no features yet.
 struct RawImage {
   TrainingPose pose;
-  cv::Mat grey;  ///< 8-bit, one channel, of the map's size
+  cv::Mat grey;    ///< 8-bit, one channel, of the map's size
+  Mask mask = {};  ///< of the map's size, or empty
 };
 
 /// Makes training images of several images at once. What comes out does not depend on the number of threads.
@@ -34,6 +35,7 @@ class ExtractionPool {
     std::unique_ptr<SiftExtractor> sift;
     GlobalExtractor global;
     cv::Mat spread;  ///< a dull image with the usual contrast
+    cv::Mat masked;  ///< that without what the mask hides
   };
   TrainingImage extract(const RawImage& image, Worker& worker) const;
 

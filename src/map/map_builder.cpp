@@ -141,7 +141,7 @@ MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources
 
 MapBuilder::~MapBuilder() = default;
 
-void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& fixes) {
+void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera) {
   try {
     if (!frame_) frame_ = frameFor(fixes, config_.trajectory);
     requireNear(middleOf(fixes), frame_->datum());
@@ -150,8 +150,8 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
     throw std::runtime_error("session '" + name + "': " + error.what());
   }
   header_.datum = frame_->datum();
-  header_.sessions.push_back(name);
-  report_.session_images.push_back({name, 0, {}, {}});
+  header_.sessions.push_back({name});
+  report_.session_images.push_back({name, 0, {}, {}, camera});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
 }
@@ -183,11 +183,13 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
     return;
   }
   if (report_.images_kept == 0) header_.image_size = grey.size();
+  if (report_.session_images.back().kept == 0) fitCamera(grey.size());
   RawImage image;
   image.pose = {stamp_ns, static_cast<int>(header_.sessions.size()) - 1, point->position_m, point->yaw_rad};
   // A camera's or a decoder's buffer does not stay.
   cv::Mat resized;
   image.grey = fitted(grey, header_.image_size, resized).clone();
+  image.mask = header_.sessions.back().mask;
   waiting_.push_back(std::move(image));
   last_kept_m_ = point->position_m;
   SessionImages& session = report_.session_images.back();
@@ -196,6 +198,18 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   session.positions_m.push_back(point->position_m);
   ++report_.images_kept;
   if (waiting_.size() >= most_waiting_) extractWaiting();
+}
+
+/// Camera and mask of a session for images of the map's size; those it has recorded are resized to it.
+void MapBuilder::fitCamera(cv::Size recorded) {
+  const SessionCamera& camera = report_.session_images.back().camera;
+  Session& session = header_.sessions.back();
+  try {
+    if (camera.model) session.camera = fittedTo(recorded, *camera.model).scaledTo(header_.image_size);
+    session.mask = fittedTo(recorded, camera.mask).scaledTo(header_.image_size);
+  } catch (const CameraError& error) {
+    throw CameraError("session '" + session.name + "': " + error.what());
+  }
 }
 
 void MapBuilder::extractWaiting() {

@@ -117,13 +117,27 @@ struct Opened {
   map_rows::Budget budget;  ///< for the rest
 };
 
-Opened readPosesAndHeader(const sqlite::Database& database, std::int64_t file_size) {
+map_schema::MaskBits readMasks(const map_rows::MapDatabase& map, map_rows::Budget& budget) {
+  map_schema::MaskBits masks;
+  if (map.version < map_schema::kSinceCameras) return masks;
+  Statement row(map.database, "SELECT session, bits FROM masks ORDER BY session");
+  while (row.step()) {
+    const std::int64_t session = row.integer(0);
+    if (!masks.empty() && session <= masks.rbegin()->first) throw Refusal("is damaged: its masks are not in order");
+    const sqlite::Bytes bits = row.blob(1);
+    budget.spend(sizeof(session) + bits.size);
+    masks[session].assign(bits.data, bits.data + bits.size);
+  }
+  return masks;
+}
+
+Opened readPosesAndHeader(const map_rows::MapDatabase& map, std::int64_t file_size) {
   map_rows::Budget budget(file_size);
-  ParameterValues meta = readMeta(database, budget);
+  ParameterValues meta = readMeta(map.database, budget);
   const std::int64_t expected = takeChecksum(meta);
   map_schema::Checksum checksum;
-  Opened opened{map_schema::toHeader(meta), {}, budget};
-  opened.poses = readPoses(database, file_size, opened.header.sessions.size(), checksum);
+  Opened opened{map_schema::toHeader(meta, map.version, readMasks(map, budget)), {}, budget};
+  opened.poses = readPoses(map.database, file_size, opened.header.sessions.size(), checksum);
   checksum.add(meta);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
   return opened;
@@ -196,33 +210,33 @@ auto withMapFile(const std::string& path, Read read) {
 }  // namespace
 
 std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoading& loading) {
-  return withMapFile(path, [&](sqlite::Database&& database, std::int64_t size) {
-    Opened opened = readPosesAndHeader(database, size);
-    if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(database, std::move(opened));
-    auto store = std::make_unique<FileFeatureStore>(std::move(database), path, opened.poses.feature_counts,
+  return withMapFile(path, [&](map_rows::MapDatabase&& map, std::int64_t size) {
+    Opened opened = readPosesAndHeader(map, size);
+    if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(map.database, std::move(opened));
+    auto store = std::make_unique<FileFeatureStore>(std::move(map.database), path, opened.poses.feature_counts,
                                                     loading.cache_bytes, loading.warn);
     return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.poses), std::move(store));
   });
 }
 
 void checkMap(const std::string& path) {
-  withMapFile(path, [](const sqlite::Database& database, std::int64_t size) {
-    Opened opened = readPosesAndHeader(database, size);
-    forEachImage(database, opened, [](TrainingImage&&) {});
-    requireIntegrity(database);
+  withMapFile(path, [](const map_rows::MapDatabase& file, std::int64_t size) {
+    Opened opened = readPosesAndHeader(file, size);
+    forEachImage(file.database, opened, [](TrainingImage&&) {});
+    requireIntegrity(file.database);
     // What a map may not be besides.
     const TrainingMap map(std::move(opened.header), std::move(opened.poses),
                           std::make_unique<MemoryFeatureStore>(std::vector<TrainingImage>()));
   });
 }
 
-std::string packageVersionOf(const std::string& path) {
-  return withMapFile(path, [](const sqlite::Database& database, std::int64_t size) {
+MapOrigin originOf(const std::string& path) {
+  return withMapFile(path, [](const map_rows::MapDatabase& map, std::int64_t size) {
     map_rows::Budget budget(size);
-    const ParameterValues meta = readMeta(database, budget);
+    const ParameterValues meta = readMeta(map.database, budget);
     const auto found = meta.find("package_version");
     if (found == meta.end()) throw Refusal("is damaged: it has no package version");
-    return oneLine(parameters::toString(found->second));
+    return MapOrigin{map.version, oneLine(parameters::toString(found->second))};
   });
 }
 

@@ -26,8 +26,15 @@ std::string imageName(std::int64_t id);
 /// Size in bytes of the regular file at `path`. Throws Refusal.
 std::int64_t fileSize(const std::string& path);
 
-/// Opens what is a complete map of our version, without any schema but our own. Throws Refusal or sqlite::Error.
-sqlite::Database open(const std::string& path, std::int64_t size);
+/// An open map file.
+struct MapDatabase {
+  sqlite::Database database;
+  int version = 0;  ///< of its schema
+};
+
+/// Opens what is a complete map of a version that we know, without any schema but that. Throws Refusal or
+/// sqlite::Error.
+MapDatabase open(const std::string& path, std::int64_t size);
 
 /// What may be read of a file: no more than it has. Rows of a damaged one may claim the same bytes again and again.
 class Budget {

@@ -1,7 +1,11 @@
 #include "map/map_schema.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -9,6 +13,24 @@
 
 namespace visual_localization::map_schema {
 namespace {
+
+constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
+constexpr const char* kMask = "/mask";
+
+/// Of every version, in order of name.
+constexpr std::array<Table, 6> kTables{{
+    {"features",
+     "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL, "
+     "crc32 INTEGER NOT NULL)"},
+    {"globals",
+     "CREATE TABLE globals(image INTEGER PRIMARY KEY, wgoh BLOB NOT NULL, wgii BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
+    {"images",
+     "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
+     "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL)"},
+    {"masks", "CREATE TABLE masks(session INTEGER PRIMARY KEY, bits BLOB NOT NULL)", kSinceCameras},
+    {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
+    {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
+}};
 
 /// Removes `key` from `meta` and returns its value.
 template <class T>
@@ -46,10 +68,56 @@ SiftConfig takeSift(ParameterValues& meta) {
 
 std::string sessionKey(std::size_t session) { return "session/" + std::to_string(session); }
 
-std::vector<std::string> takeSessions(ParameterValues& meta) {
-  std::vector<std::string> names;
-  while (meta.count(sessionKey(names.size())) != 0) names.push_back(take<std::string>(meta, sessionKey(names.size())));
-  return names;
+/// Removes all values whose keys begin with `prefix` and returns them without it.
+ParameterValues takeGroup(ParameterValues& meta, const std::string& prefix) {
+  ParameterValues group;
+  auto value = meta.lower_bound(prefix);
+  while (value != meta.end() && value->first.compare(0, prefix.size(), prefix) == 0) {
+    group.emplace(value->first.substr(prefix.size()), value->second);
+    value = meta.erase(value);
+  }
+  return group;
+}
+
+std::optional<CameraModel> takeCamera(ParameterValues& meta, const std::string& session) {
+  const ParameterValues values = takeGroup(meta, session + kCamera);
+  if (values.empty()) return std::nullopt;
+  try {
+    return cameraOf(values);
+  } catch (const CameraError& error) {
+    throw std::runtime_error("the camera of " + session + ": " + error.what());
+  }
+}
+
+Mask takeMask(ParameterValues& meta, std::size_t session, const cv::Size& size, const MaskBits& masks) {
+  const std::string key = sessionKey(session);
+  const auto bits = masks.find(static_cast<std::int64_t>(session));
+  if ((meta.count(key + kMask) == 0) != (bits == masks.end())) {
+    throw std::runtime_error("the mask of " + key + " is missing or unexpected");
+  }
+  if (bits == masks.end()) return {};
+  const sqlite::Bytes bytes{bits->second.data(), bits->second.size()};
+  if (take<std::int64_t>(meta, key + kMask) != crc32Of(bytes)) {
+    throw std::runtime_error("the mask of " + key + " does not agree with its checksum");
+  }
+  return unpackMask(bytes, size);
+}
+
+std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::Size& size, const MaskBits& masks) {
+  std::vector<Session> sessions;
+  std::size_t used = 0;
+  while (meta.count(sessionKey(sessions.size())) != 0) {
+    const std::string key = sessionKey(sessions.size());
+    Session session{take<std::string>(meta, key)};
+    if (version >= kSinceCameras) {
+      session.camera = takeCamera(meta, key);
+      session.mask = takeMask(meta, sessions.size(), size, masks);
+    }
+    if (!session.mask.empty()) ++used;
+    sessions.push_back(std::move(session));
+  }
+  if (used != masks.size()) throw std::runtime_error("there is a mask without a session");
+  return sessions;
 }
 
 template <class Unsigned>
@@ -81,18 +149,12 @@ void putFloat(float value, std::uint8_t* to) {
 
 }  // namespace
 
-const std::array<Table, 5> kTables{{
-    {"features",
-     "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL, "
-     "crc32 INTEGER NOT NULL)"},
-    {"globals",
-     "CREATE TABLE globals(image INTEGER PRIMARY KEY, wgoh BLOB NOT NULL, wgii BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
-    {"images",
-     "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
-     "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL)"},
-    {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
-    {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
-}};
+std::vector<Table> tablesOf(int version) {
+  std::vector<Table> tables;
+  std::copy_if(kTables.begin(), kTables.end(), std::back_inserter(tables),
+               [version](const Table& table) { return table.since <= version; });
+  return tables;
+}
 
 std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous) {
   // SQLite's own limit of 2 GiB a value keeps every size within zlib's 32 bits.
@@ -162,11 +224,21 @@ ParameterValues toMeta(const MapHeader& header) {
   meta["image/width_px"] = std::int64_t{header.image_size.width};
   meta["image/height_px"] = std::int64_t{header.image_size.height};
   meta["package_version"] = std::string(VISUAL_LOCALIZATION_VERSION);
-  for (std::size_t i = 0; i < header.sessions.size(); ++i) meta[sessionKey(i)] = header.sessions[i];
+  for (std::size_t i = 0; i < header.sessions.size(); ++i) {
+    const Session& session = header.sessions[i];
+    const std::string key = sessionKey(i);
+    meta[key] = session.name;
+    if (session.camera) {
+      for (const auto& [name, value] : toValues(*session.camera)) meta[key + kCamera + name] = value;
+    }
+    if (session.mask.empty()) continue;
+    const std::vector<std::uint8_t> bits = packMask(session.mask);
+    meta[key + kMask] = crc32Of({bits.data(), bits.size()});
+  }
   return meta;
 }
 
-MapHeader toHeader(ParameterValues meta) {
+MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
   MapHeader header;
   header.datum.latitude_deg = take<double>(meta, "datum/latitude_deg");
   header.datum.longitude_deg = take<double>(meta, "datum/longitude_deg");
@@ -174,9 +246,34 @@ MapHeader toHeader(ParameterValues meta) {
   header.image_size = {takeSide(meta, "image/width_px"), takeSide(meta, "image/height_px")};
   take<std::string>(meta, "package_version");
   header.sift = takeSift(meta);
-  header.sessions = takeSessions(meta);
+  header.sessions = takeSessions(meta, version, header.image_size, masks);
   if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");
   return header;
+}
+
+std::vector<std::uint8_t> packMask(const Mask& mask) {
+  std::vector<std::uint8_t> bytes((mask.grey().total() + 7) / 8);
+  std::size_t pixel = 0;
+  for (int row = 0; row < mask.grey().rows; ++row) {
+    for (int column = 0; column < mask.grey().cols; ++column, ++pixel) {
+      const unsigned bit = mask.grey().at<std::uint8_t>(row, column) != 0 ? 0x80U : 0U;
+      bytes[pixel / 8] = static_cast<std::uint8_t>(bytes[pixel / 8] | bit >> (pixel % 8));
+    }
+  }
+  return bytes;
+}
+
+Mask unpackMask(sqlite::Bytes bytes, const cv::Size& size) {
+  const auto pixels = static_cast<std::size_t>(size.area());
+  if (bytes.size != (pixels + 7) / 8) {
+    throw std::runtime_error("a mask has " + std::to_string(bytes.size) + " bytes instead of " +
+                             std::to_string((pixels + 7) / 8));
+  }
+  cv::Mat grey(size, CV_8U);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    grey.data[pixel] = (bytes.data[pixel / 8] << (pixel % 8) & 0x80) != 0 ? 255 : 0;
+  }
+  return Mask(grey);
 }
 
 std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints) {

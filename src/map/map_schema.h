@@ -1,14 +1,15 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <initializer_list>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
+#include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -26,13 +27,17 @@ constexpr std::size_t kKeypointBytes = 16;
 constexpr std::int64_t kMaxRowBytes =
     kMaxFeaturesPerImage * static_cast<std::int64_t>(kKeypointBytes + SiftFeatures::kDescriptorSize) + 4096;
 
+/// From this version on sessions have a camera and a mask.
+constexpr int kSinceCameras = 4;
+
 struct Table {
   const char* name;
   const char* sql;
+  int since = kOldestMapSchemaVersion;  ///< the version of the schema that it came with
 };
 
-/// All that may be in a map's schema, in order of name.
-extern const std::array<Table, 5> kTables;
+/// All that may be in the schema of a map of this version, in order of name.
+std::vector<Table> tablesOf(int version);
 
 /// CRC-32 over a sequence of values, each in one byte order on every machine.
 class Checksum {
@@ -68,11 +73,18 @@ struct ImageRow {
   void addTo(Checksum& checksum) const;
 };
 
-/// The header as rows of the table `meta`, without the checksum.
+/// The header as rows of the table `meta`, without the checksum. Of a mask they hold the checksum of its bits.
 ParameterValues toMeta(const MapHeader& header);
-/// Inverse of toMeta(). Throws std::runtime_error when a value is missing, unknown, of the wrong type or out of
-/// range.
-MapHeader toHeader(ParameterValues meta);
+/// Masks as they are stored, by the number of their session.
+using MaskBits = std::map<std::int64_t, std::vector<std::uint8_t>>;
+/// Inverse of toMeta() for a map of this version. Throws std::runtime_error when a value or a mask is missing, unknown,
+/// of the wrong type or out of range, and when a mask does not agree with its checksum.
+MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks);
+
+/// One bit a pixel, row by row, the first pixel in the highest bit; the last byte is filled up with zeros.
+std::vector<std::uint8_t> packMask(const Mask& mask);
+/// Inverse of packMask(). Throws std::runtime_error unless there are as many bytes as `size` needs.
+Mask unpackMask(sqlite::Bytes bytes, const cv::Size& size);
 
 /// Four little-endian 32-bit floats a keypoint: x, y, size, angle.
 std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints);

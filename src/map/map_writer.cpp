@@ -23,7 +23,9 @@ sqlite::Database createTables(const std::string& path) {
   database.execute("BEGIN");
   database.execute("PRAGMA application_id = " + std::to_string(map_schema::kApplicationId));
   database.execute("PRAGMA user_version = " + std::to_string(kMapSchemaVersion));
-  for (const map_schema::Table& table : map_schema::kTables) database.execute(table.sql);
+  for (const map_schema::Table& table : map_schema::tablesOf(kMapSchemaVersion)) {
+    database.execute(table.sql);
+  }
   return database;
 }
 
@@ -57,6 +59,7 @@ class MapWriter::Tables {
     // Behind each other in the file, because they are read together when the map is opened.
     for (std::size_t i = 0; i < poses_.size(); ++i) writePose(i);
     writeMeta(map_schema::toMeta(header));
+    writeMasks(header.sessions);
     looks_.reset();
     pose_row_.reset();
     database_.execute("COMMIT");
@@ -133,6 +136,17 @@ class MapWriter::Tables {
       if (const auto* integer = std::get_if<std::int64_t>(&value)) row.bind(1, *integer);
       if (const auto* real = std::get_if<double>(&value)) row.bind(1, *real);
       if (const auto* text = std::get_if<std::string>(&value)) row.bind(1, *text);
+      row.run();
+    }
+  }
+
+  void writeMasks(const std::vector<Session>& sessions) {
+    Statement row(database_, "INSERT INTO masks VALUES(?,?)");
+    for (std::size_t i = 0; i < sessions.size(); ++i) {
+      if (sessions[i].mask.empty()) continue;
+      const std::vector<std::uint8_t> bits = map_schema::packMask(sessions[i].mask);
+      row.bind(0, static_cast<std::int64_t>(i));
+      row.bind(1, bytesOf(bits));
       row.run();
     }
   }

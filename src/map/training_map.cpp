@@ -17,6 +17,21 @@ namespace {
   throw std::invalid_argument("training map: image " + std::to_string(image) + ": " + reason);
 }
 
+void requireOfSize(const cv::Size& size, const cv::Size& image_size, const std::string& what) {
+  if (size == image_size) return;
+  throw std::invalid_argument("training map: " + what + " is for images of " + std::to_string(size.width) + "x" +
+                              std::to_string(size.height) + ", not for the map's");
+}
+
+void requireCamerasOfSize(const MapHeader& header) {
+  for (std::size_t i = 0; i < header.sessions.size(); ++i) {
+    const Session& session = header.sessions[i];
+    const std::string of_session = " of session " + std::to_string(i);
+    if (session.camera) requireOfSize(session.camera->size(), header.image_size, "the camera" + of_session);
+    if (!session.mask.empty()) requireOfSize(session.mask.size(), header.image_size, "the mask" + of_session);
+  }
+}
+
 /// The poses, if a map can be made of them.
 TrainingPoses checked(const MapHeader& header, TrainingPoses poses) {
   if (poses.size() == 0) throw std::invalid_argument("training map: there is no image");
@@ -24,6 +39,7 @@ TrainingPoses checked(const MapHeader& header, TrainingPoses poses) {
     throw std::invalid_argument("training map: image size " + std::to_string(header.image_size.width) + "x" +
                                 std::to_string(header.image_size.height) + " is not positive");
   }
+  requireCamerasOfSize(header);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Eigen::Vector2d& position_m = poses.positions_m[i];
     const int session = poses.sessions[i];

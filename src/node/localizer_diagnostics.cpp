@@ -81,6 +81,7 @@ LocalizerDiagnostics::LocalizerDiagnostics(const ros::NodeHandle& node, const ro
   updater_.add("localization", this, &LocalizerDiagnostics::reportState);
   updater_.add("images", this, &LocalizerDiagnostics::reportImages);
   updater_.add("map", this, &LocalizerDiagnostics::reportMap);
+  updater_.add("camera", this, &LocalizerDiagnostics::reportCamera);
   if (config.tf_mode != "none") updater_.add("transform", this, &LocalizerDiagnostics::reportTransform);
 }
 
@@ -130,6 +131,12 @@ void LocalizerDiagnostics::mapLoaded(const std::string& path, std::size_t images
   map_path_ = path;
   map_images_ = images;
   estimate_.reset();
+}
+
+void LocalizerDiagnostics::cameraIs(const std::string& description, const std::string& trouble) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  camera_ = description;
+  camera_trouble_ = trouble;
 }
 
 void LocalizerDiagnostics::reportState(Wrapper& status) {
@@ -186,6 +193,14 @@ void LocalizerDiagnostics::reportTransform(Wrapper& status) {
   const bool missing = !missing_transform_.empty();
   status.summary(missing ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
                  missing ? "No transform broadcast: " + missing_transform_ : "Transform broadcast with every image");
+}
+
+void LocalizerDiagnostics::reportCamera(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool troubled = !camera_trouble_.empty();
+  status.summary(troubled ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
+                 troubled ? "Calibration refused: " + camera_trouble_ : camera_);
+  if (troubled) status.add("In use", camera_);
 }
 
 void LocalizerDiagnostics::reportMap(Wrapper& status) {

@@ -72,6 +72,8 @@ class LocalizerDiagnostics {
   /// Empty when the transform was broadcast.
   void transformMissing(const std::string& reason);
   void mapLoaded(const std::string& path, std::size_t images);
+  /// What is known of the camera. `trouble`: why its last calibration is not used; empty when it is.
+  void cameraIs(const std::string& description, const std::string& trouble);
   void publish() { updater_.force_update(); }
 
  private:
@@ -81,6 +83,7 @@ class LocalizerDiagnostics {
   void reportState(Wrapper& status);
   void reportImages(Wrapper& status);
   void reportMap(Wrapper& status);
+  void reportCamera(Wrapper& status);
   void reportTransform(Wrapper& status);
   double age_s() const;
 
@@ -92,6 +95,8 @@ class LocalizerDiagnostics {
   std::string map_path_;
   std::size_t map_images_ = 0;
   std::string missing_transform_;
+  std::string camera_;
+  std::string camera_trouble_;
   DescribeCamera describe_camera_;
   CountImages count_images_;
   RateMeter arrivals_;

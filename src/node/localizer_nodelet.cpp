@@ -49,6 +49,7 @@ void LocalizerNodelet::stop() {
   initial_pose_.shutdown();
   if (images_) images_->shutdown();
   worker_.reset();
+  camera_.reset();
   images_.reset();
   publisher_.reset();
   diagnostics_.reset();
@@ -69,6 +70,14 @@ void LocalizerNodelet::start() {
         diagnostics_->imageArrived();
         worker_->push(std::move(image));
       });
+  camera_ = std::make_unique<CameraWatch>(node, parameters_.node, images_->topic(), *localizer_, *diagnostics_,
+                                          [this](bool warning, const std::string& text) {
+                                            if (warning) {
+                                              NODELET_WARN_STREAM(text);
+                                            } else {
+                                              NODELET_INFO_STREAM(text);
+                                            }
+                                          });
   if (!parameters_.node.map.empty()) {
     try {
       useMap(parameters_.node.map);
@@ -184,6 +193,7 @@ std::size_t LocalizerNodelet::useMap(const std::string& path) {
     ROS_WARN_STREAM_NAMED(name, "Map " << reason);  // the map may outlive the nodelet
   }));
   localizer_->setMap(map);
+  camera_->mapIs(map->header());
   publisher_->publishMap(*map);
   diagnostics_->mapLoaded(path, map->size());
   NODELET_INFO_STREAM("Map " << path << " with " << map->size() << " training images");

@@ -16,6 +16,7 @@
 #include <visual_localization/LoadMap.h>
 #include <visual_localization/Relocalize.h>
 
+#include "node/camera_watch.h"
 #include "node/image_source.h"
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
@@ -58,6 +59,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   std::unique_ptr<LocalizerPublisher> publisher_;
   std::unique_ptr<ImageWorker> worker_;
   std::unique_ptr<ImageSource> images_;
+  std::unique_ptr<CameraWatch> camera_;
   ros::Subscriber initial_pose_;
   ros::CallbackQueue service_queue_;
   std::vector<ros::ServiceServer> services_;

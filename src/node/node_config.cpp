@@ -60,6 +60,12 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.text(
       {"image_transport", "", "raw, compressed (decoded here) or another installed image transport", kAtStartOnly},
       image_transport);
+  visitor.text({"camera_info_file", "", "calibration of camera_calibration, YAML or INI; empty: the topic camera_info",
+                kAtStartOnly},
+               camera_info_file);
+  visitor.text({"mask_file", "", "grey PNG of the camera's size, features are used where it is white; empty: the map's",
+                kAtStartOnly},
+               mask_file);
   visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf", kAtStartOnly},
                  tf_mode, {"none", "map_to_odom", "map_to_base"});
   visitor.real({"transform_tolerance", "s", "added to the image stamp in the stamp of the transform"},

@@ -16,6 +16,8 @@ struct NodeConfig {
   int map_cache_mb = kDefaultMapCache_mb;
   std::string map_directory;
   std::string image_transport = "raw";
+  std::string camera_info_file;
+  std::string mask_file;
   std::string tf_mode = "none";
   double transform_tolerance_s = 0.1;
   double image_timeout_s = 5.0;

@@ -55,12 +55,26 @@ void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
   auto localizer = std::make_unique<Localizer>(map, configuration());  // without the lock: images go on meanwhile
   const std::lock_guard<std::mutex> lock(mutex_);
   localizer->configure(config_);  // it may have changed just now
+  if (camera_) localizer->setCamera(*camera_);
+  if (!mask_.empty()) localizer->setMask(mask_);
   if (waiting_prior_) localizer->relocalize(*waiting_prior_);
   waiting_prior_.reset();
   // The old localizer and map now end with this function, when the lock is free again.
   localizer_.swap(localizer);
   map_.swap(map);
   has_map_ = true;
+}
+
+void SharedLocalizer::setCamera(const CameraModel& camera) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  camera_ = camera;
+  if (localizer_) localizer_->setCamera(camera);
+}
+
+void SharedLocalizer::setMask(const Mask& mask) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (localizer_) localizer_->setMask(mask);
+  mask_ = mask;
 }
 
 std::shared_ptr<const TrainingMap> SharedLocalizer::map() const {

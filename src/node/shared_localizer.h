@@ -47,6 +47,10 @@ class SharedLocalizer {
   /// Never waits, unlike map(), which waits for the end of the image that is being processed.
   bool hasMap() const { return has_map_; }
 
+  /// See Localizer: for this map and all later ones.
+  void setCamera(const CameraModel& camera);
+  void setMask(const Mask& mask);
+
   /// See Localizer::process. Nothing without a map. Throws std::invalid_argument for an unusable image.
   std::optional<Result> process(std::int64_t stamp_ns, const cv::Mat& grey);
 
@@ -67,6 +71,8 @@ class SharedLocalizer {
 
   mutable std::mutex mutex_;
   LocalizerConfig config_;
+  std::optional<CameraModel> camera_;  ///< if somebody has said
+  Mask mask_;                          ///< the same; otherwise empty
   std::shared_ptr<const TrainingMap> map_;
   std::unique_ptr<Localizer> localizer_;
   std::optional<Prior> waiting_prior_;

@@ -194,6 +194,18 @@ std::vector<YamlMap> YamlMap::maps(const std::string& key) {
   return maps;
 }
 
+std::size_t YamlMap::numbers(const std::string& key, std::size_t most) {
+  const YAML::Node value = takeRequired(key);
+  if (!value.IsSequence() || value.size() > most) {
+    refuse(key, "must be a list of at most " + std::to_string(most) + " numbers");
+  }
+  for (const auto& item : value) {
+    double number = 0.0;
+    if (!item.IsScalar() || !YAML::convert<double>::decode(item, number)) refuse(key, "must hold numbers only");
+  }
+  return value.size();
+}
+
 std::vector<std::vector<std::string>> YamlMap::textLists(const std::string& key, std::size_t length) {
   const YAML::Node value = takeRequired(key);
   const std::string expected = "must be a list of lists of " + std::to_string(length) + " names";

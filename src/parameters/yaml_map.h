@@ -39,6 +39,9 @@ class YamlMap {
   std::vector<YamlMap> maps(const std::string& key);
   /// Throws when the key is missing or no list of lists of `length` texts.
   std::vector<std::vector<std::string>> textLists(const std::string& key, std::size_t length);
+  /// How many numbers a list has. Throws when the key is missing, no list or one of more than `most` entries, or when
+  /// an entry is no number.
+  std::size_t numbers(const std::string& key, std::size_t most);
   /// Parameters, nested or with full names; none when the key is missing.
   ParameterValues parameters(const std::string& key);
   /// The same of the whole mapping.

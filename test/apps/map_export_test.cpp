@@ -16,7 +16,8 @@ using testing::HasSubstr;
 
 TrainingMap mapOf(const std::vector<std::string>& sessions) {
   MapHeader header = test::exampleHeader();
-  header.sessions = sessions;
+  header.sessions.clear();
+  for (const std::string& name : sessions) header.sessions.push_back({name});
   return TrainingMap(header, test::exampleImages(20));
 }
 

@@ -65,5 +65,12 @@ TEST(MapReport, AStretchThatWasNotComparedHasNoTwin) {
   EXPECT_THAT(reportOf(places), HasSubstr("10 images\n")) << "image 11 is of another session";
 }
 
+TEST(MapReport, SaysWhichCameraEachSessionHas) {
+  const std::string report = reportOf(AmbiguousPlaces());
+  EXPECT_THAT(report,
+              HasSubstr("cameras:     0: 320 x 240 px, focal length 266.3 x 266.5 px, plumb_bob; mask uses 83 % of "
+                        "the image\n             1: no calibration: places only\n"));
+}
+
 }  // namespace
 }  // namespace visual_localization::apps

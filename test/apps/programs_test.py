@@ -10,7 +10,7 @@ from pathlib import Path
 
 from program_runner import PROGRAMS, ProgramTest, run
 
-MAP, DRIVE, CONFIG = (Path(argument) for argument in sys.argv[2:5])
+MAP, DRIVE, CONFIG, CALIBRATION = (Path(argument) for argument in sys.argv[2:6])
 HEADER = ('stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,'
           'extract_ms,match_ms,update_ms,swept').split(',')
 TIMES = ('extract_ms', 'match_ms', 'update_ms')
@@ -105,6 +105,29 @@ class ProgramsTest(ProgramTest):
             self.assert_refused(result, 2, 'would overwrite')
         self.assertEqual(copy.read_bytes(), MAP.read_bytes())
         self.assertEqual(bag.read_bytes(), DRIVE.read_bytes())
+
+    def test_the_calibration_is_that_of_option_bag_or_map(self):
+        other = self.folder / 'other.yaml'
+        other.write_text(CALIBRATION.read_text(encoding='utf-8').replace('266.2847172', '300.0'), encoding='utf-8')
+        self.localize()
+        self.assertIn('camera: 320 x 240 px, focal length 266.3 x 266.3 px, no distortion, from /stereo/left/camera_info\n',
+                      self.output)
+        self.assertNotIn("not the map's", self.output)
+        self.localize('--camera-info', other)
+        self.assertIn(f'focal length 300 x 300 px, no distortion, from {other}\n', self.output)
+        self.assertIn("camera: not the map's: fx 300 instead of 266.285", self.output)
+        self.assertIn('cameras:     320 x 240 px, focal length 266.3', run('map_info', MAP).stdout)
+
+    def test_an_impossible_calibration_or_mask_is_refused(self):
+        bad, mask, output = (self.folder / name for name in ('bad.yaml', 'mask.png', 'out'))
+        bad.write_text(CALIBRATION.read_text(encoding='utf-8').replace('[266.2847172', '[.nan'), encoding='utf-8')
+        mask.write_bytes(b'\x89PNG\r\n')
+        for program in (('map_builder', '--bag', DRIVE), ('localize', '--map', MAP, '--bag', DRIVE)):
+            for option, path, word in (('--camera-info', bad, 'fx = nan'), ('--mask', mask, 'is not a PNG image'),
+                                       ('--camera-info', self.folder / 'none.yaml', 'No such file')):
+                self.assert_refused(run(*program, '--output', output, option, path), 1, path.name, word)
+            self.assert_refused(run(*program, '--output', bad, '--camera-info', bad), 2, 'would overwrite')
+        self.assertFalse(output.exists())
 
     def test_an_unknown_parameter_is_named(self):
         config = self.folder / 'config.yaml'

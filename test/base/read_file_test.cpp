@@ -40,5 +40,13 @@ TEST(ReadFile, NamesWhatCannotBeRead) {
   EXPECT_THROW(readFile(""), FileError);
 }
 
+TEST(ReadFile, TakesNoMoreThanIsAllowed) {
+  const test::TemporaryFolder folder;
+  test::writeAll(folder / "a", "12345");
+  EXPECT_EQ(readFile(folder / "a", 5), "12345");
+  EXPECT_THROW(readFile(folder / "a", 4), FileError);
+  EXPECT_THROW(readFile("/dev/zero", 100), FileError);
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -34,7 +34,7 @@ class StreetMap {
     MapHeader header;
     header.datum = {48.5, 9.05, 400.0};
     header.image_size = {320, 240};
-    header.sessions = {"streets"};
+    header.sessions = {{"streets"}};
     return header;
   }
 

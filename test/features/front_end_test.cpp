@@ -1,5 +1,8 @@
 #include "visual_localization/features/front_end.h"
 
+#include <cmath>
+#include <vector>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
@@ -219,6 +222,66 @@ TEST_F(FrontEndTest, TheTimeCountsWhatWasExtracted) {
   EXPECT_GT(both_ms, global_ms);
   front_end.sift();
   EXPECT_EQ(front_end.extract_ms(), both_ms);
+}
+
+/// White but for the left half.
+Mask rightHalf() {
+  cv::Mat grey(240, 320, CV_8U, cv::Scalar(255));
+  grey.colRange(0, 160).setTo(0);
+  return Mask(grey);
+}
+
+TEST_F(FrontEndTest, FeaturesUnderTheMaskAreNotUsed) {
+  FrontEndConfig config = configOf(false);
+  FrontEnd all(config);
+  config.mask = rightHalf();
+  FrontEnd masked(config);
+  all.setImage(0, viewAt(10.0));
+  masked.setImage(0, viewAt(10.0));
+  std::vector<std::size_t> right;
+  for (std::size_t i = 0; i < all.sift().size(); ++i) {
+    if (std::lround(all.sift().keypoints()[i].x_px) >= 160) right.push_back(i);
+  }
+  ASSERT_GT(right.size(), 10U);
+  ASSERT_LT(right.size(), all.sift().size());
+  EXPECT_EQ(masked.sift().descriptors(), all.sift().subset(right).descriptors());
+}
+
+TEST_F(FrontEndTest, WhatTheMaskHidesChangesNothing) {
+  FrontEndConfig config = configOf(false);
+  config.mask = rightHalf();
+  FrontEnd clean(config);
+  FrontEnd dirty(config);
+  cv::Mat image = viewAt(10.0);
+  clean.setImage(0, image);
+  image.colRange(0, 100).setTo(0);  // the robot's arm; what is described near the border of the mask stays
+  dirty.setImage(0, image);
+  EXPECT_EQ(clean.global().wgoh, dirty.global().wgoh);
+  EXPECT_EQ(clean.global().wgii, dirty.global().wgii);
+  EXPECT_EQ(clean.statistics().mean_grey, dirty.statistics().mean_grey);
+}
+
+TEST_F(FrontEndTest, AMapIsMadeUnderTheSameMask) {
+  FrontEndConfig config = configOf(false);
+  config.mask = rightHalf();
+  FrontEnd live(config);
+  live.setImage(0, viewAt(10.0));
+  ExtractionPool pool({}, kNativeSift, 0, 1);
+  const TrainingImage training = pool.extract({{{}, viewAt(10.0), rightHalf()}}).front();
+  EXPECT_EQ(training.sift.descriptors(), live.sift().descriptors());
+  EXPECT_EQ(training.global.wgoh, live.global().wgoh);
+}
+
+TEST_F(FrontEndTest, AnotherMaskHoldsFromTheNextImageOn) {
+  FrontEnd front_end(configOf(false));
+  FrontEndConfig config = configOf(false);
+  config.mask = rightHalf();
+  front_end.setImage(0, viewAt(10.0));
+  const std::size_t all = front_end.sift().size();
+  front_end.configure(config);
+  front_end.setImage(kSecond, viewAt(10.6));
+  EXPECT_LT(front_end.sift().size(), all);
+  for (const SiftKeypoint& keypoint : front_end.sift().keypoints()) EXPECT_GE(keypoint.x_px, 159.0F);
 }
 
 }  // namespace

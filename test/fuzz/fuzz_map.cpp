@@ -31,6 +31,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (whole && !lazy) fuzz::fail("the whole map is fine, its places are not");
   const bool checked = fuzz::expect<MapStoreError>([&] { checkMap(path); });
   if (checked && !whole) fuzz::fail("checked and found good, but refused");
-  fuzz::expect<MapStoreError>([&] { packageVersionOf(path); });
+  fuzz::expect<MapStoreError>([&] { originOf(path); });
   return 0;
 }

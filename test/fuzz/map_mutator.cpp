@@ -76,6 +76,24 @@ class Editor {
     }
   }
 
+  /// To be called before repairChecksum().
+  void repairMasks() {
+    std::vector<std::pair<std::int64_t, std::int64_t>> checksums;
+    const Row row = prepare("SELECT session, bits FROM masks");
+    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
+      const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(row.get(), 1));
+      const auto size = static_cast<std::size_t>(sqlite3_column_bytes(row.get(), 1));
+      checksums.emplace_back(sqlite3_column_int64(row.get(), 0), map_schema::crc32Of({data, size}));
+    }
+    const Row change = prepare("INSERT OR REPLACE INTO meta VALUES('session/' || ? || '/mask', ?)");
+    for (const auto& [session, checksum] : checksums) {
+      sqlite3_bind_int64(change.get(), 1, session);
+      sqlite3_bind_int64(change.get(), 2, checksum);
+      sqlite3_step(change.get());
+      sqlite3_reset(change.get());
+    }
+  }
+
   void repairChecksum() {
     map_schema::Checksum checksum;
     const Row row =
@@ -127,11 +145,11 @@ class Editor {
 };
 
 std::string anySql(Random& random) {
-  static const std::array<const char*, 16> kColumns{
+  static const std::array<const char*, 18> kColumns{
       "images.id",      "images.session",       "images.stamp_ns",    "images.east_m",        "images.north_m",
       "images.yaw_rad", "images.feature_count", "features.keypoints", "features.descriptors", "features.image",
       "globals.wgoh",   "globals.wgii",         "previews.jpeg",      "previews.image",       "meta.key",
-      "meta.value"};
+      "meta.value",     "masks.session",        "masks.bits"};
   static const std::array<const char*, 18> kValues{"0",
                                                    "1",
                                                    "-1",
@@ -187,7 +205,10 @@ void repairHeader(std::vector<std::uint8_t>& bytes) {
   const std::size_t page = declared == 1 ? 65536 : std::max<std::size_t>(declared, 512);
   bytes.resize((bytes.size() + page - 1) / page * page);
   putBigEndian(bytes, 28, bytes.size() / page);
-  putBigEndian(bytes, 60, kMapSchemaVersion);
+  if (bytes[60] != 0 || bytes[61] != 0 || bytes[62] != 0 || bytes[63] < kOldestMapSchemaVersion ||
+      bytes[63] > kMapSchemaVersion) {
+    putBigEndian(bytes, 60, kMapSchemaVersion);
+  }
   putBigEndian(bytes, 68, static_cast<std::uint64_t>(map_schema::kApplicationId));
 }
 
@@ -222,6 +243,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
                         "UPDATE features SET crc32 = ? WHERE image = ?");
       editor.repairRows("SELECT image, wgoh, wgii FROM globals", 2, "UPDATE globals SET crc32 = ? WHERE image = ?");
       editor.repairRows("SELECT image, jpeg FROM previews", 1, "UPDATE previews SET crc32 = ? WHERE image = ?");
+      editor.repairMasks();
       editor.repairChecksum();
     }
     if (std::vector<std::uint8_t> changed = editor.bytes(); !changed.empty()) bytes = std::move(changed);

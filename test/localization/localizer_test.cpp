@@ -1,12 +1,15 @@
 #include "visual_localization/localization/localizer.h"
 
+#include <memory>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
 #include "test/localization/wall_street.h"
+#include "test/support/example_map.h"
 #include "test/support/fake_image.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/parameters/parameters.h"
@@ -256,6 +259,41 @@ TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
   EXPECT_GT(by_sift.matches, 50U);
   EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kSift, 50).matches);
   EXPECT_GT(image.report().match_ms, global_ms);
+}
+
+TEST_F(LocalizerTest, TheCameraIsTheMapsUntilAnotherOneIsGiven) {
+  EXPECT_FALSE(Localizer(map(), LocalizerConfig()).camera());
+  MapHeader header = map()->header();
+  header.sessions.front().camera = test::exampleCamera();
+  Localizer localizer(std::make_shared<TrainingMap>(header, std::vector<TrainingImage>{map()->image(0)}),
+                      LocalizerConfig());
+  EXPECT_EQ(localizer.camera(), test::exampleCamera());
+  const CameraModel other({{640, 360}, 500.0, 500.0, 320.0, 180.0, Distortion::kPlumbBob, {}});
+  localizer.setCamera(other);
+  EXPECT_EQ(localizer.camera(), other.scaledTo({320, 240})) << "like the images";
+}
+
+TEST_F(LocalizerTest, FeaturesUnderTheMaskOfMapOrDriveAreNotUsed) {
+  cv::Mat left(240, 320, CV_8U, cv::Scalar(255));
+  left.colRange(160, 320).setTo(0);
+  MapHeader header = map()->header();
+  header.sessions.front().mask = Mask(left);
+  LocalizerConfig config;
+  config.features = "sift";
+  Localizer localizer(std::make_shared<TrainingMap>(header, std::vector<TrainingImage>{map()->image(0)}), config);
+  localizer.process(0, viewAt(0.3));
+  const SiftFeatures left_half = localizer.lastSift();
+  ASSERT_FALSE(left_half.empty());
+  for (const SiftKeypoint& keypoint : left_half.keypoints()) EXPECT_LE(keypoint.x_px, 160.0F);
+  cv::Mat right;
+  cv::flip(left, right, 1);
+  cv::resize(right, right, {640, 480}, 0.0, 0.0, cv::INTER_NEAREST);
+  localizer.setMask(Mask(right));
+  localizer.configure(config);
+  localizer.process(kSecond, viewAt(5.3));
+  const SiftFeatures right_half = localizer.lastSift();
+  ASSERT_FALSE(right_half.empty());
+  for (const SiftKeypoint& keypoint : right_half.keypoints()) EXPECT_GE(keypoint.x_px, 159.0F);
 }
 
 }  // namespace

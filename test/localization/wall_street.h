@@ -64,7 +64,7 @@ class WallStreet : public ::testing::Test {
     MapHeader header;
     header.datum = {48.5, 9.0, 400.0};
     header.image_size = {320, 240};
-    header.sessions = {"wall"};
+    header.sessions = {{"wall"}};
     return std::make_shared<TrainingMap>(header, std::move(images));
   }
 };

@@ -21,7 +21,7 @@ std::shared_ptr<const TrainingMap> bothWays() {
   MapHeader header;
   header.datum = {48.5, 9.0, 400.0};
   header.image_size = {320, 240};
-  header.sessions = {"there", "back"};
+  header.sessions = {{"there"}, {"back"}};
   return std::make_shared<const TrainingMap>(header, std::move(images));
 }
 

@@ -1,5 +1,6 @@
 #include "visual_localization/map/map_builder.h"
 
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -51,7 +52,8 @@ TEST(MapBuilder, ImagesGetThePositionOfTheirStamp) {
     EXPECT_FALSE(map->preview(i).empty());
   }
   EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
-  EXPECT_THAT(map->header().sessions, testing::ElementsAre("round"));
+  ASSERT_EQ(map->header().sessions.size(), 1U);
+  EXPECT_EQ(map->header().sessions[0].name, "round");
 }
 
 TEST(MapBuilder, CountsWhyImagesAreDropped) {
@@ -292,6 +294,51 @@ TEST(MapBuilder, SaysWhatIsMissing) {
   MapBuilderConfig config;
   config.min_spacing_m = std::numeric_limits<double>::quiet_NaN();
   EXPECT_ANY_THROW(MapBuilder{config});
+}
+
+SessionCamera exampleCamera(cv::Size size) {
+  cv::Mat grey(size, CV_8U, cv::Scalar(255));
+  grey.rowRange(size.height / 2, size.height).setTo(0);
+  const CameraModel model({{320, 240}, 266.0, 267.0, 159.5, 119.5, Distortion::kPlumbBob, {-0.1, 0.01, 0.0, 0.0}});
+  return {model.scaledTo(size), Mask(grey)};
+}
+
+TEST(MapBuilder, CameraAndMaskAreScaledWithTheImages) {
+  MapBuilder builder({});
+  builder.beginSession("first", straightRound());
+  builder.addImage(1 * kSecond_ns, scene(1, 0));
+  builder.beginSession("second", straightRound(), exampleCamera({640, 480}));
+  cv::Mat large;
+  cv::resize(scene(1, 0), large, {640, 480});
+  builder.addImage(1 * kSecond_ns, large);
+  const auto map = builder.build();
+  const std::vector<Session>& sessions = map->header().sessions;
+  EXPECT_FALSE(sessions[0].camera);
+  EXPECT_TRUE(sessions[0].mask.empty());
+  EXPECT_EQ(sessions[1].camera, exampleCamera({640, 480}).model->scaledTo({320, 240}));
+  EXPECT_TRUE(sessions[1].mask == exampleCamera({320, 240}).mask);
+  ASSERT_GT(map->sift(0)->size(), 10U);
+  ASSERT_GT(map->sift(1)->size(), 10U);
+  float lowest_px = 0.0F;
+  for (const SiftKeypoint& keypoint : map->sift(0)->keypoints()) lowest_px = std::max(lowest_px, keypoint.y_px);
+  EXPECT_GT(lowest_px, 150.0F);
+  for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.y_px, 120.0F);
+}
+
+TEST(MapBuilder, ACameraForImagesOfAnotherShapeIsRefused) {
+  for (const bool mask : {false, true}) {
+    SessionCamera camera = exampleCamera({320, 200});
+    if (mask) camera.model.reset();
+    MapBuilder builder({});
+    builder.beginSession("round", straightRound(), camera);
+    try {
+      builder.addImage(1 * kSecond_ns, scene(1, 0));
+      FAIL() << "accepted";
+    } catch (const CameraError& error) {
+      EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("session 'round'"),
+                                               testing::HasSubstr("320 x 200 px, but the images have 320 x 240 px")));
+    }
+  }
 }
 
 }  // namespace

@@ -31,7 +31,12 @@ void expectSame(const TrainingMap& a, const TrainingMap& b) {
   EXPECT_EQ(a.header().datum.longitude_deg, b.header().datum.longitude_deg);
   EXPECT_EQ(a.header().datum.altitude_m, b.header().datum.altitude_m);
   EXPECT_EQ(a.header().image_size, b.header().image_size);
-  EXPECT_EQ(a.header().sessions, b.header().sessions);
+  ASSERT_EQ(a.header().sessions.size(), b.header().sessions.size());
+  for (std::size_t s = 0; s < a.header().sessions.size(); ++s) {
+    EXPECT_EQ(a.header().sessions[s].name, b.header().sessions[s].name);
+    EXPECT_EQ(a.header().sessions[s].camera, b.header().sessions[s].camera);
+    EXPECT_TRUE(a.header().sessions[s].mask == b.header().sessions[s].mask);
+  }
   EXPECT_EQ(a.header().sift.contrast_threshold, b.header().sift.contrast_threshold);
   EXPECT_EQ(a.header().sift.max_features, b.header().sift.max_features);
   ASSERT_EQ(a.size(), b.size());
@@ -93,7 +98,8 @@ class MapStore : public testing::Test {
 TEST_F(MapStore, RoundTripIsIdentical) {
   expectSame(exampleMap(), *loadMap(path_));
   EXPECT_NO_THROW(checkMap(path_));
-  EXPECT_FALSE(packageVersionOf(path_).empty());
+  EXPECT_EQ(originOf(path_).schema_version, 4);
+  EXPECT_FALSE(originOf(path_).package_version.empty());
 }
 
 TEST_F(MapStore, SavingAgainWritesTheSameBytes) {
@@ -135,7 +141,7 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 
 TEST_F(MapStore, NamesBothVersions) {
   tamper("PRAGMA user_version = 7");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("version 3")));
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("versions 3 to 4")));
 }
 
 TEST_F(MapStore, RefusesEveryTruncation) {
@@ -199,6 +205,10 @@ TEST_F(MapStore, RefusesChangedContent) {
                           "INSERT INTO meta VALUES('extra', 1)",
                           "DELETE FROM meta",
                           "DELETE FROM features WHERE image = 3",
+                          "DELETE FROM masks",
+                          "INSERT INTO masks VALUES(1, (SELECT bits FROM masks))",
+                          "UPDATE masks SET session = 1",
+                          "UPDATE masks SET bits = zeroblob(9600)",
                           "UPDATE features SET keypoints = zeroblob(320) WHERE image = 3",
                           "UPDATE features SET descriptors = zeroblob(10000000) WHERE image = 3",
                           "INSERT INTO features VALUES(99, x'', x'', 0)",
@@ -209,6 +219,75 @@ TEST_F(MapStore, RefusesChangedContent) {
     tamper(sql);
     EXPECT_NE(refusal(path_), "") << sql;
   }
+}
+
+TEST_F(MapStore, CamerasAndMasksThatCannotBeAreRefused) {
+  const std::string whole = test::readAll(path_);
+  const std::string camera = "'session/0/camera/";
+  const struct {
+    std::string sql, reason;
+  } cases[] = {
+      {"UPDATE meta SET value = 0.0 WHERE key = " + camera + "fx'", "fx = 0 is not in"},
+      {"UPDATE meta SET value = 1e300 WHERE key = " + camera + "cx'", "cx = 1e+300"},
+      {"UPDATE meta SET value = 640 WHERE key = " + camera + "width'", "does not agree with its checksum"},
+      {"UPDATE meta SET value = -1 WHERE key = " + camera + "height'", "height = -1"},
+      {"UPDATE meta SET value = 'fov' WHERE key = " + camera + "distortion'", "unknown distortion model 'fov'"},
+      {"UPDATE meta SET value = 'x' WHERE key = " + camera + "d0'", "'d0' is of the wrong type"},
+      {"UPDATE meta SET value = -9.0 WHERE key = " + camera + "d0'", "cannot be undone"},
+      {"DELETE FROM meta WHERE key = " + camera + "fy'", "'fy' is missing"},
+      {"INSERT INTO meta VALUES(" + camera + "zoom', 1.0)", "unknown value 'zoom'"},
+      {"INSERT INTO meta VALUES('session/9/mask', 1)", "'session/9/mask' is unknown"},
+      {"DELETE FROM meta WHERE key = 'session/0/mask'", "mask of session/0 is missing or unexpected"},
+      {"DELETE FROM masks", "mask of session/0 is missing or unexpected"},
+      {"UPDATE masks SET session = -1", "mask of session/0 is missing or unexpected"},
+      {"INSERT INTO masks VALUES(7, x'00')", "a mask without a session"},
+      {"UPDATE masks SET bits = x''", "does not agree with its checksum"},
+      {"UPDATE masks SET bits = zeroblob(9600)", "does not agree with its checksum"}};
+  for (const auto& [sql, reason] : cases) {
+    test::writeAll(path_, whole);
+    tamper(sql);
+    EXPECT_THAT(refusal(path_), HasSubstr(reason)) << sql;
+  }
+}
+
+TEST_F(MapStore, MasksOfAWrongSizeAreRefused) {
+  const std::string whole = test::readAll(path_);
+  // With the checksum that belongs to it: 3 bytes and 9600 zeros.
+  for (const char* sql : {"UPDATE masks SET bits = x'616263'; UPDATE meta SET value = 891568578 WHERE key = "
+                          "'session/0/mask'",
+                          "UPDATE masks SET bits = zeroblob(9600); UPDATE meta SET value = 1369079857 WHERE key = "
+                          "'session/0/mask'"}) {
+    test::writeAll(path_, whole);
+    tamper(sql);
+    EXPECT_THAT(refusal(path_), testing::AnyOf(HasSubstr("a mask has 3 bytes instead of 9600"),
+                                               HasSubstr("must use some of the image")))
+        << sql;
+  }
+}
+
+TEST_F(MapStore, MapsOfVersion3HaveNoCameras) {
+  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/pages_of_2048.map";
+  EXPECT_EQ(originOf(old).schema_version, 3);
+  const auto map = loadMap(old);
+  ASSERT_FALSE(map->header().sessions.empty());
+  for (const Session& session : map->header().sessions) {
+    EXPECT_FALSE(session.camera);
+    EXPECT_TRUE(session.mask.empty());
+  }
+  EXPECT_NO_THROW(checkMap(old));
+  // Saved again it is a map of today.
+  saveMap(*map, path_);
+  EXPECT_EQ(originOf(path_).schema_version, 4);
+  expectSame(*map, *loadMap(path_));
+}
+
+TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
+  tamper("PRAGMA user_version = 3");
+  EXPECT_THAT(refusal(path_), HasSubstr("unexpected table 'masks'"));
+  tamper("DROP TABLE masks");
+  EXPECT_THAT(refusal(path_), HasSubstr("'session/0/camera/cx' is unknown"));
+  tamper("PRAGMA user_version = 4");
+  EXPECT_THAT(refusal(path_), HasSubstr("its schema has an unexpected table"));
 }
 
 /// `count` floats as an SQL blob; the last one has these bytes in the file, in hexadecimal digits.

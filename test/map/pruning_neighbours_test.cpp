@@ -27,7 +27,7 @@ std::shared_ptr<const TrainingMap> mapOf(const std::vector<Place>& places) {
   MapHeader header;
   header.datum = {48.5, 9.05, 0.0};
   header.image_size = {320, 240};
-  header.sessions = {"a", "b", "unused"};
+  header.sessions = {{"a"}, {"b"}, {"unused"}};
   return std::make_shared<const TrainingMap>(header, std::move(images));
 }
 

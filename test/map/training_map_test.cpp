@@ -143,5 +143,15 @@ TEST(TrainingMap, NowhereHasNoNearestImage) {
   EXPECT_TRUE(map.nearest({0.0, 0.0}, 0).empty());
 }
 
+TEST(TrainingMap, RefusesACameraOrAMaskForImagesOfAnotherSize) {
+  MapHeader header = test::exampleHeader();
+  header.sessions[0].camera = test::exampleCamera().scaledTo({640, 480});
+  EXPECT_THROW(TrainingMap(header, test::exampleImages(2)), std::invalid_argument);
+  header = test::exampleHeader();
+  header.sessions[0].mask = test::exampleMask().scaledTo({160, 120});
+  EXPECT_THROW(TrainingMap(header, test::exampleImages(2)), std::invalid_argument);
+  EXPECT_NO_THROW(TrainingMap(test::exampleHeader(), test::exampleImages(2)));
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -36,7 +36,7 @@ TEST(MapMessages, OfACityAtMost20000PositionsAreShown) {
   std::vector<TrainingImage> images(50001);
   for (std::size_t i = 0; i < images.size(); ++i) images[i].position_m.x() = static_cast<double>(i);
   MapHeader header = test::smallMap()->header();
-  header.sessions = {"one"};
+  header.sessions = {{"one"}};
   const TrainingMap city(header, std::move(images));
   const auto path = toPath(city, "map");
   EXPECT_LE(path.poses.size(), 20000U);

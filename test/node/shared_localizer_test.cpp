@@ -41,6 +41,24 @@ TEST(SharedLocalizer, WithMapEveryImageHasAResult) {
   EXPECT_EQ(result->map, localizer.map());
 }
 
+TEST(SharedLocalizer, AMaskHoldsForTheMapThatComesLaterAndForTheNext) {
+  LocalizerConfig config;
+  config.features = "sift";
+  SharedLocalizer localizer{config};
+  cv::Mat left(240, 320, CV_8U, cv::Scalar(255));
+  left.colRange(160, 320).setTo(0);
+  localizer.setMask(Mask(left));
+  for (int i = 0; i < 2; ++i) {
+    localizer.setMap(test::smallMap());
+    const auto result = localizer.process((i + 1) * kSecond_ns, noise());
+    ASSERT_TRUE(result.has_value());
+    ASSERT_GT(result->sift.size(), 0U);
+    const int width_px = result->map->header().image_size.width;
+    for (const SiftKeypoint& keypoint : result->sift.keypoints())
+      EXPECT_LE(keypoint.x_px, 0.5F * static_cast<float>(width_px));
+  }
+}
+
 TEST(SharedLocalizer, AGuessWaitsForTheMap) {
   SharedLocalizer localizer{LocalizerConfig{}};
   const SharedLocalizer::Guess guess{{2.0, 20.0}, Eigen::Matrix2d::Zero()};

@@ -28,7 +28,7 @@ inline std::shared_ptr<const TrainingMap> smallMap() {
   MapHeader header;
   header.datum = {48.5, 9.05, 340.0};
   header.image_size = {320, 240};
-  header.sessions = {"morning", "evening"};
+  header.sessions = {{"morning"}, {"evening"}};
   std::vector<TrainingImage> images;
   for (int i = 0; i < 10; ++i) {
     TrainingImage image;

@@ -47,7 +47,7 @@ std::shared_ptr<const TrainingMap> mapAt(const std::vector<Eigen::Vector2d>& pos
   MapHeader header;
   header.datum = {48.5, 9.0, 400.0};
   header.image_size = {320, 240};
-  header.sessions = {"synthetic"};
+  header.sessions = {{"synthetic"}};
   return std::make_shared<TrainingMap>(header, std::move(images));
 }
 

@@ -32,7 +32,7 @@ class Rounds {
   }
   std::shared_ptr<const TrainingMap> map() const {
     MapHeader header = test::exampleHeader();
-    header.sessions = {"first", "second", "third"};
+    header.sessions = {{"first"}, {"second"}, {"third"}};
     return std::make_shared<const TrainingMap>(header, images_);
   }
 
@@ -131,7 +131,7 @@ TEST(MapSurvey, FewFeaturesAreWeakUnlessAnotherSessionSeesMore) {
 
 TEST(MapSurvey, ManySessionsThatAlternateTakeNoLonger) {
   MapHeader header = test::exampleHeader();
-  header.sessions.assign(5000, "s");
+  header.sessions.assign(5000, {"s"});
   std::vector<TrainingImage> images(50000);
   for (std::size_t i = 0; i < images.size(); ++i) {
     images[i].session = static_cast<int>(i % 5000);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geo/geodetic_point.h"
 #include "visual_localization/ros/image_error.h"
 
@@ -64,6 +66,11 @@ class BagReader {
   /// All fixes of a sensor_msgs/NavSatFix topic in the order of recording, believable or not. Throws BagError
   /// naming the fix topics that the bag does have.
   std::vector<Fix> fixes(const std::string& topic) const;
+
+  /// Calibration of the camera whose images are on `image_topic`, raw or compressed: the sensor_msgs/CameraInfo beside
+  /// them, by image_transport's naming. Nothing when the bag has none or the camera is not calibrated. Throws BagError
+  /// when the calibration cannot be used, or when it changes within the bag: then it holds for a part of the images.
+  std::optional<CameraModel> camera(const std::string& image_topic) const;
 
   const std::string& path() const { return path_; }
 

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "visual_localization/camera/mask.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
@@ -28,13 +29,20 @@ struct GreyLevels {
   double contrast = 0.0;  ///< standard deviation
 };
 
-/// `grey`: 8-bit, one channel. Takes nothing from the heap.
-GreyLevels greyLevelsOf(const cv::Mat& grey);
+/// `grey`: 8-bit, one channel. Of what `mask`, which is empty or of the same size, uses. Takes nothing from the heap.
+GreyLevels greyLevelsOf(const cv::Mat& grey, const Mask& mask = {});
 
 /// A dark or foggy image with its grey levels spread to the usual contrast, in `buffer`; an image that has contrast
 /// enough, or none but noise, as it is. Extractors look for a contrast in grey levels, and find nothing in a dull image
 /// that shows all they need. The same for training images and live ones, so that both see the same.
 const cv::Mat& withUsualContrast(const cv::Mat& grey, const GreyLevels& levels, cv::Mat& buffer);
+
+/// The image with a uniform grey where `mask`, which is empty or of the same size, does not use it, in `buffer`; the
+/// image as it is without a mask. So global features, which are of the whole image, see nothing there.
+const cv::Mat& withoutMasked(const cv::Mat& grey, const Mask& mask, cv::Mat& buffer);
+
+/// Drops the features that lie where `mask`, which is empty or of the image's size, does not use the image.
+void dropMasked(const Mask& mask, SiftFeatures& features);
 
 /// `image` at this size: itself when it has it, otherwise resized into `buffer`.
 inline const cv::Mat& fitted(const cv::Mat& image, cv::Size size, cv::Mat& buffer) {
@@ -56,6 +64,7 @@ struct FrontEndConfig {
   bool prune = true;              ///< keep only features that the image before showed as well
   double max_image_gap_s = 10.0;  ///< longer pauses make the image before useless for pruning
   std::string sift_backend = kNativeSift;
+  Mask mask = {};  ///< of image_size, or empty: features under it are not used
 };
 
 /// Live image in, features out: resizes to the map's size, spreads the grey levels of a dull image and extracts either
@@ -67,7 +76,8 @@ class FrontEnd {
  public:
   explicit FrontEnd(const FrontEndConfig& config);
 
-  /// Holds from the next image on. Size, SIFT parameters and backend stay what they are.
+  /// Holds from the next image on. Size, SIFT parameters and backend stay what they are. Features of the image before
+  /// keep the mask that they were extracted with.
   void configure(const FrontEndConfig& config);
   /// The next image. `grey`: 8-bit, one channel, any size of at least 16 x 16; throws std::invalid_argument otherwise,
   /// and then nothing has changed.
@@ -107,6 +117,7 @@ class FrontEnd {
   std::optional<Image> current_;
   cv::Mat resized_;
   cv::Mat spread_;
+  cv::Mat masked_;
   bool is_repeated_ = false;
   ImageStatistics statistics_;
   SiftFeatures pruned_;  ///< like those of the images kept when it no longer holds, for the sake of its memory

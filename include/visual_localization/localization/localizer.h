@@ -8,6 +8,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "visual_localization/camera/camera_model.h"
+#include "visual_localization/camera/mask.h"
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/localization/scores.h"
@@ -37,6 +39,15 @@ class Localizer {
   /// of particles, begins with particles drawn from the present ones; the rest keeps all it knows. The seed holds for
   /// trackers that are made from now on. Throws ParameterError when `config` is invalid, and then nothing has changed.
   void configure(const LocalizerConfig& config);
+  /// The calibration of the camera that images come from, from the next image on; resized like them to the map's size.
+  /// Until then that of the map's first session, if it has one.
+  void setCamera(const CameraModel& camera);
+  /// For images of the map's size; nothing when neither the map nor anybody else knows it.
+  const std::optional<CameraModel>& camera() const { return camera_; }
+  /// Features under it are not used, from the next image on. Until then that of the map's first session. Throws
+  /// CameraError when nothing is left of it at the map's size.
+  void setMask(const Mask& mask);
+
   /// The position is unknown: anywhere in the map.
   void relocalize();
   /// The position is unknown within a prior (see particles.h).
@@ -61,6 +72,7 @@ class Localizer {
     void add(std::int64_t stamp_ns, bool repeated);
   };
 
+  FrontEndConfig frontEndConfig() const;
   bool isRepetition(std::int64_t stamp_ns) const;
   Estimate estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const Evidence& evidence,
                       LocalizationState state);
@@ -74,6 +86,8 @@ class Localizer {
 
   std::shared_ptr<const TrainingMap> map_;
   LocalizerConfig config_;
+  std::optional<CameraModel> camera_;
+  Mask mask_;
   std::shared_ptr<QueryImage> image_;
   Scores scores_;
   MapSweep sweep_;

@@ -35,12 +35,19 @@ struct MapBuilderConfig {
   void declare(ParameterVisitor& visitor);
 };
 
+/// The camera of a session, for images as they are recorded.
+struct SessionCamera {
+  std::optional<CameraModel> model = {};  ///< none: not calibrated
+  Mask mask = {};                         ///< features under it are not used; empty: all are
+};
+
 /// What one session brought.
 struct SessionImages {
   std::string name;
   std::size_t kept = 0;
   std::vector<Eigen::Vector2d> positions_m;  ///< of those kept
   cv::Size recorded;  ///< size of its first image, pixels; the map's is that of the first session
+  SessionCamera camera;
 };
 
 /// A map is flat: farther from its datum north and lengths are wrong by more than a degree and a part in 8000.
@@ -75,11 +82,12 @@ class MapBuilder {
   /// Starts a session: cleans its fixes. The first believable fix ever given becomes the datum. Throws
   /// std::runtime_error naming the session when the fixes are not enough for a path, or when it lies farther than
   /// kFarthestSession_m from the datum.
-  void beginSession(const std::string& name, const std::vector<Fix>& fixes);
+  void beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera = {});
   /// True when the image at `stamp_ns` has a position and is far enough from the last one: only then is it
   /// worth decoding and giving to addImage. Counts the reasons otherwise.
   bool wants(std::int64_t stamp_ns);
-  /// `grey`: 8-bit, one channel; resized to the size of the first image. An empty one counts as unusable.
+  /// `grey`: 8-bit, one channel; resized to the size of the first image. An empty one counts as unusable. Throws
+  /// CameraError when the session's camera or mask is for images of another shape.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
   /// Prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
   std::shared_ptr<const TrainingMap> build(const Progress& progress = {});
@@ -94,6 +102,7 @@ class MapBuilder {
 
  private:
   using Sink = std::function<void(const TrainingImage& image)>;
+  void fitCamera(cv::Size recorded);
   void extractWaiting();
   void prune(const Sink& sink, const Progress& progress);
 

@@ -16,8 +16,10 @@ class MapStoreError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Version of the schema that this build writes; the only one it reads.
-constexpr int kMapSchemaVersion = 3;
+/// Version of the schema that this build writes.
+constexpr int kMapSchemaVersion = 4;
+/// The oldest one that it reads. Version 3 knows neither cameras nor masks.
+constexpr int kOldestMapSchemaVersion = 3;
 
 /// Megabytes (2^20 bytes) of features that are kept in memory unless someone says otherwise.
 constexpr int kDefaultMapCache_mb = 256;
@@ -44,7 +46,13 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
 /// image: in little memory, however large the map is. Throws MapStoreError.
 void checkMap(const std::string& path);
 
-/// Version of this package that wrote the map. Throws MapStoreError.
-std::string packageVersionOf(const std::string& path);
+/// What wrote a map.
+struct MapOrigin {
+  int schema_version = 0;
+  std::string package_version;
+};
+
+/// Throws MapStoreError.
+MapOrigin originOf(const std::string& path);
 
 }  // namespace visual_localization

@@ -10,6 +10,8 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "visual_localization/camera/camera_model.h"
+#include "visual_localization/camera/mask.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_features.h"
@@ -51,12 +53,19 @@ struct TrainingPoses {
 /// The poses of these images, in their order.
 TrainingPoses posesOf(const std::vector<TrainingImage>& images);
 
+/// A recording in a map, and the camera that made it.
+struct Session {
+  std::string name;
+  std::optional<CameraModel> camera = {};  ///< of images of the map's size; none: not calibrated
+  Mask mask = {};                          ///< of the map's size; features under it were not used
+};
+
 /// What holds for all images of a map.
 struct MapHeader {
-  GeodeticPoint datum;                ///< origin of the map frame
-  cv::Size image_size;                ///< pixels; live images are resized to it
-  SiftConfig sift;                    ///< how features were extracted
-  std::vector<std::string> sessions;  ///< their names
+  GeodeticPoint datum;            ///< origin of the map frame
+  cv::Size image_size;            ///< pixels; live images are resized to it
+  SiftConfig sift;                ///< how features were extracted
+  std::vector<Session> sessions;  ///< its recordings
 };
 
 /// Axis-aligned rectangle in the map frame, metres. A range may be zero (a single straight street).
@@ -77,7 +86,8 @@ struct Neighbour {
 class TrainingMap {
  public:
   /// A map that is all in memory. Throws std::invalid_argument, in one line, when there is no image, the image size is
-  /// not positive, a position or heading is not finite or a session index is out of range.
+  /// not positive, a position or heading is not finite, a session index is out of range or a camera or mask is not for
+  /// images of the map's size.
   TrainingMap(MapHeader header, std::vector<TrainingImage> images);
   /// A map whose images' looks are in `store`. Throws like the other one.
   TrainingMap(MapHeader header, TrainingPoses poses, std::unique_ptr<const FeatureStore> store);

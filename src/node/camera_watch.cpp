@@ -1,0 +1,105 @@
+#include "node/camera_watch.h"
+
+#include <utility>
+
+#include "ros/camera_info.h"
+#include "visual_localization/camera/mask.h"
+#include "visual_localization/parameters/parameters.h"
+
+namespace visual_localization {
+namespace {
+
+/// Runs `read` and names the parameter when its file cannot be used.
+template <class Read>
+auto ofParameter(const std::string& name, Read read) {
+  try {
+    return read();
+  } catch (const CameraError& error) {
+    throw ParameterError("parameter '" + name + "' is not allowed: " + error.what());
+  }
+}
+
+}  // namespace
+
+CameraWatch::CameraWatch(ros::NodeHandle node, const NodeConfig& config, const std::string& image_topic,
+                         SharedLocalizer& localizer, LocalizerDiagnostics& diagnostics, Say say)
+    : localizer_(localizer),
+      diagnostics_(diagnostics),
+      say_(std::move(say)),
+      topic_(cameraInfoTopic(image_topic)),
+      rectified_(isRectified(image_topic)) {
+  if (!config.mask_file.empty()) {
+    localizer_.setMask(ofParameter("mask_file", [&config] { return readMask(config.mask_file); }));
+  }
+  const std::string& file = config.camera_info_file;
+  if (!file.empty()) use(ofParameter("camera_info_file", [&file] { return readCameraFile(file); }), file);
+  report();
+  // Last: from here on another thread calls.
+  if (file.empty()) subscriber_ = node.subscribe(topic_, 1, &CameraWatch::onCameraInfo, this);
+}
+
+void CameraWatch::onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (last_ && sameCalibration(*info, *last_)) return;  // comes with every image
+  last_ = info;
+  try {
+    if (const std::optional<CameraModel> camera = toCamera(*info, rectified_)) {
+      use(*camera, topic_);
+    } else {
+      refuse(topic_ + ": the camera is not calibrated: its matrix is zero");
+    }
+  } catch (const CameraError& error) {
+    refuse(topic_ + ": " + error.what());
+  }
+  report();
+}
+
+void CameraWatch::use(const CameraModel& camera, const std::string& source) {
+  trouble_.clear();
+  if (camera_ == camera) return;
+  if (camera_) {
+    say_(true, "The calibration of the camera changes: " + differences(camera, *camera_) + "; " + source);
+  } else {
+    say_(false, "Camera: " + describe(camera) + ", from " + source);
+  }
+  camera_ = camera;
+  source_ = source;
+  localizer_.setCamera(camera);
+  compareWithMap();
+}
+
+/// The calibration before, or the map's, goes on.
+void CameraWatch::refuse(const std::string& reason) {
+  if (reason == trouble_) return;  // a NaN differs from itself, and so each message from the one before
+  trouble_ = reason;
+  say_(true, "Calibration refused: " + reason);
+}
+
+void CameraWatch::mapIs(const MapHeader& map) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  of_map_ = map.sessions.front().camera;
+  map_size_ = map.image_size;
+  if (!of_map_) say_(false, "The map has no calibration: places only");
+  compareWithMap();
+  report();
+}
+
+/// Another camera than the map's is what calibration is for: people only should know.
+void CameraWatch::compareWithMap() {
+  if (!camera_ || !of_map_) return;
+  const std::string words = differences(camera_->scaledTo(map_size_), *of_map_);
+  if (!words.empty() && words != said_) say_(false, "Not the camera of the map: " + words);
+  said_ = words;
+}
+
+void CameraWatch::report() {
+  std::string text = "No calibration: places only";
+  if (camera_) {
+    text = describe(*camera_) + ", from " + source_;
+  } else if (of_map_) {
+    text = describe(*of_map_) + ", from the map";
+  }
+  diagnostics_.cameraIs(said_.empty() ? text : text + "; not the map's: " + said_, trouble_);
+}
+
+}  // namespace visual_localization

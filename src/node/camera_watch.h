@@ -1,0 +1,62 @@
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <ros/node_handle.h>
+#include <ros/subscriber.h>
+#include <sensor_msgs/CameraInfo.h>
+
+#include "node/localizer_diagnostics.h"
+#include "node/node_config.h"
+#include "node/shared_localizer.h"
+#include "visual_localization/camera/camera_model.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// Keeps the localizer informed about the camera: its calibration, from a file or from the topic beside the images, and
+/// its mask. Says once each what it uses and how that differs from the map's camera. A calibration that cannot be used
+/// changes nothing.
+class CameraWatch {
+ public:
+  /// Tells people something; `warning`: it needs their attention.
+  using Say = std::function<void(bool warning, const std::string& text)>;
+
+  /// Reads the files that `config` names; without a file of calibration subscribes to the topic beside `image_topic`.
+  /// Throws ParameterError, naming the parameter, when a file cannot be used. The others must outlive it.
+  CameraWatch(ros::NodeHandle node, const NodeConfig& config, const std::string& image_topic,
+              SharedLocalizer& localizer, LocalizerDiagnostics& diagnostics, Say say);
+  ~CameraWatch() { subscriber_.shutdown(); }
+  CameraWatch(const CameraWatch&) = delete;
+  CameraWatch& operator=(const CameraWatch&) = delete;
+
+  /// The localizer has another map now.
+  void mapIs(const MapHeader& map);
+
+ private:
+  void onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info);
+  void use(const CameraModel& camera, const std::string& source);
+  void refuse(const std::string& reason);
+  void compareWithMap();
+  void report();
+
+  SharedLocalizer& localizer_;
+  LocalizerDiagnostics& diagnostics_;
+  Say say_;
+  std::string topic_;  ///< beside the images
+  bool rectified_;
+  std::mutex mutex_;  ///< images and services have threads of their own
+  sensor_msgs::CameraInfoConstPtr last_;
+  std::optional<CameraModel> camera_;
+  std::optional<CameraModel> of_map_;
+  cv::Size map_size_;
+  std::string source_;
+  std::string trouble_;
+  std::string said_;  ///< about the difference from the map's camera
+  ros::Subscriber subscriber_;
+};
+
+}  // namespace visual_localization
