@@ -12,6 +12,7 @@ cmake g++ make: the build
 libopencv-dev: images
 libeigen3-dev: vectors and matrices
 libsqlite3-dev zlib1g-dev: map files
+libceres-dev: adjustment of landmarks and poses
 libnanoflann-dev: search for the training images near a position
 libgeographiclib-dev: GPS positions to metres
 libcli11-dev: command lines of the programs

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <vector>
 
+#include "map/packed_geometry.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {
@@ -49,7 +52,50 @@ inline MapHeader exampleHeader() {
   return header;
 }
 
-/// `count` images on a curve, half of them in each session; the first has no features of any kind and no preview.
+/// A covariance that floats hold exactly; position and rotation depend on each other.
+inline Eigen::Matrix<double, 6, 6> exampleCovariance() {
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  covariance.diagonal() << 0.25, 0.25, 1.0, 0.0625, 0.0625, 0.03125;
+  covariance(0, 5) = covariance(5, 0) = 0.03125;
+  return covariance;
+}
+
+/// As a map file keeps it: every second feature shows a landmark.
+inline ImageGeometry exampleGeometry(std::size_t features, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> metres(-100.0F, 100.0F);
+  std::uniform_int_distribution<int> sigma(0, 255);
+  ImageGeometry geometry;
+  geometry.camera = {levelCamera(0.1 * seed), {50.0 + seed, -1.0 / 3.0, 1.5}};
+  geometry.covariance = exampleCovariance();
+  for (std::size_t i = 1; i < features; i += 2) {
+    const auto sigmaOfAnyClass = [&] { return map_schema::sigmaOf(static_cast<std::uint8_t>(sigma(random))); };
+    geometry.landmarks.push_back({static_cast<std::uint32_t>(i),
+                                  static_cast<std::uint32_t>(random()),
+                                  {metres(random), metres(random), metres(random)},
+                                  sigmaOfAnyClass(),
+                                  sigmaOfAnyClass()});
+  }
+  return geometry;
+}
+
+/// To the last bit.
+inline bool same(const SeenLandmark& a, const SeenLandmark& b) {
+  return a.feature == b.feature && a.id == b.id && a.offset_m == b.offset_m && a.sigma_along_m == b.sigma_along_m &&
+         a.sigma_across_m == b.sigma_across_m;
+}
+
+/// To the last bit; none is the same as none.
+inline bool same(const std::optional<ImageGeometry>& a, const std::optional<ImageGeometry>& b) {
+  if (!a || !b) return !a && !b;
+  return a->camera.position_m == b->camera.position_m && a->camera.rotation.coeffs() == b->camera.rotation.coeffs() &&
+         a->covariance == b->covariance &&
+         std::equal(a->landmarks.begin(), a->landmarks.end(), b->landmarks.begin(), b->landmarks.end(),
+                    [](const SeenLandmark& one, const SeenLandmark& other) { return same(one, other); });
+}
+
+/// `count` images on a curve, half of them in each session; the first has no features of any kind and no preview. Of
+/// three images the first has no geometry.
 inline std::vector<TrainingImage> exampleImages(std::size_t count, std::size_t features = 20, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::vector<TrainingImage> images(count);
@@ -64,6 +110,7 @@ inline std::vector<TrainingImage> exampleImages(std::size_t count, std::size_t f
     images[i].global.wgoh = randomHistogram(random);
     images[i].global.wgii = randomHistogram(random);
     images[i].preview_jpeg = {0xFF, 0xD8, static_cast<std::uint8_t>(i)};
+    if (i % 3 != 0) images[i].geometry = exampleGeometry(features, seed + static_cast<unsigned>(i));
   }
   return images;
 }

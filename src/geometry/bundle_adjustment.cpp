@@ -1,0 +1,272 @@
+#include "geometry/bundle_adjustment.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/sized_cost_function.h>
+#include <ceres/solver.h>
+#include <glog/logging.h>
+
+#include "geometry/mounting_residual.h"
+#include "geometry/rotation_vector.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kNearest_m = 0.05;  ///< a landmark closer to a camera's plane than this has no projection
+constexpr double kBehind_sigmas = 1e3;
+constexpr double kTiltLoss = 2.0;      ///< sigmas
+constexpr double kRoughness_m = 0.01;  ///< of a level road, from one image to the next
+
+/// Camera parameters: turn[3] (camera_in_map = start * exp(turn)) and position[3]. Landmark: position[3]. Focal scale.
+class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 1> {
+ public:
+  SightingCost(const Eigen::Matrix3d& map_from_start, const LandmarkSighting& sighting)
+      : start_from_map_(map_from_start.transpose()), seen_(sighting.normalised), weight_(1.0 / sighting.sigma) {}
+
+  bool Evaluate(const double* const* parameters, double* residuals, double** derivatives) const override {
+    const Eigen::Map<const Eigen::Vector3d> turn(parameters[0]);
+    const Eigen::Map<const Eigen::Vector3d> position(parameters[0] + 3);
+    const Eigen::Map<const Eigen::Vector3d> landmark(parameters[1]);
+    const Eigen::Matrix3d camera_from_map = exponential(-turn) * start_from_map_;
+    const Eigen::Vector3d point = camera_from_map * (landmark - position);
+    Eigen::Map<Eigen::Vector2d> residual(residuals);
+    if (point.z() < kNearest_m) {  // a constant: the robust loss gives it no say
+      residual.setConstant(kBehind_sigmas);
+      for (int block = 0; derivatives != nullptr && block < 3; ++block) {
+        if (derivatives[block] != nullptr) std::fill_n(derivatives[block], kDerivatives[block], 0.0);
+      }
+      return true;
+    }
+    const double inverse_z = 1.0 / point.z();
+    const double scale = *parameters[2];
+    residual = weight_ * (scale * point.head<2>() * inverse_z - seen_);
+    if (derivatives == nullptr) return true;
+
+    Eigen::Matrix<double, 2, 3> by_point;
+    by_point << inverse_z, 0.0, -point.x() * inverse_z * inverse_z, 0.0, inverse_z, -point.y() * inverse_z * inverse_z;
+    by_point *= scale * weight_;
+    const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera_from_map;
+    if (derivatives[0] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> jacobian(derivatives[0]);
+      jacobian.leftCols<3>() = by_point * crossMatrix(point) * rightJacobian(turn);
+      jacobian.rightCols<3>() = -by_landmark;
+    }
+    if (derivatives[1] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> jacobian(derivatives[1]);
+      jacobian = by_landmark;
+    }
+    if (derivatives[2] != nullptr) {
+      derivatives[2][0] = weight_ * point.x() * inverse_z;
+      derivatives[2][1] = weight_ * point.y() * inverse_z;
+    }
+    return true;
+  }
+
+ private:
+  static constexpr int kDerivatives[] = {12, 6, 2};
+
+  Eigen::Matrix3d start_from_map_;
+  Eigen::Vector2d seen_;
+  double weight_;
+};
+
+/// rho(s) = s / (1 + s / c^2): what is far off loses its say altogether (Geman and McClure 1987).
+class GemanMcClureLoss final : public ceres::LossFunction {
+ public:
+  explicit GemanMcClureLoss(double scale) : squared_(scale * scale) {}
+  void Evaluate(double s, double rho[3]) const override {
+    const double shrink = squared_ / (squared_ + s);
+    rho[0] = s * shrink;
+    rho[1] = shrink * shrink;
+    rho[2] = -2.0 * shrink * shrink * shrink / squared_;
+  }
+
+ private:
+  double squared_;
+};
+
+struct PositionResidual {
+  Eigen::Vector2d measured_m;
+  double sigma_m;
+
+  template <class T>
+  bool operator()(const T* camera, T* residual) const {
+    for (int i = 0; i < 2; ++i) residual[i] = (camera[3 + i] - T(measured_m[i])) / T(sigma_m);
+    return true;
+  }
+};
+
+/// Roads are not steep.
+struct SlopeResidual {
+  double sigma_m;
+
+  template <class T>
+  bool operator()(const T* camera, const T* next, T* residual) const {
+    residual[0] = (next[5] - camera[5]) / T(sigma_m);
+    return true;
+  }
+};
+
+/// A step that cannot be solved is tried again with more damping. Ceres warns of each on stderr.
+class QuietCeres {
+ public:
+  QuietCeres() : before_(std::exchange(FLAGS_minloglevel, google::GLOG_ERROR)) {}
+  ~QuietCeres() { FLAGS_minloglevel = before_; }
+  QuietCeres(const QuietCeres&) = delete;
+  QuietCeres& operator=(const QuietCeres&) = delete;
+
+ private:
+  int before_;
+};
+
+/// MountingResidual on the six parameters of a camera.
+struct CameraMountingResidual {
+  MountingResidual residual_of_turn;
+
+  template <class T>
+  bool operator()(const T* camera, const T* mounting, T* residual) const {
+    return residual_of_turn(camera, mounting, residual);
+  }
+};
+
+struct HeightResidual {
+  template <class T>
+  bool operator()(const T* camera, T* residual) const {
+    residual[0] = camera[5] / T(0.01);
+    return true;
+  }
+};
+
+/// A calibration is about right.
+struct FocalResidual {
+  template <class T>
+  bool operator()(const T* scale, T* residual) const {
+    residual[0] = (scale[0] - T(1.0)) / T(0.1);
+    return true;
+  }
+};
+
+/// The problem as Ceres takes it. Losses and parameters must live as long as Ceres works on it.
+class Adjustment {
+ public:
+  Adjustment(BundleProblem& problem, const BundleConfig& config)
+      : problem_(problem),
+        config_(config),
+        sighting_loss_(config.landmark_loss),
+        tilt_loss_(kTiltLoss),
+        position_loss_(config.position_loss),
+        ceres_(borrowedLosses()) {
+    for (const CameraPose& camera : problem.cameras) {
+      const Eigen::Vector3d& position = camera.position_m;
+      starts_.push_back(camera.rotation.toRotationMatrix());
+      cameras_.push_back({0.0, 0.0, 0.0, position.x(), position.y(), position.z()});
+    }
+    addSightings();
+    addPositions();
+    addPriors();
+  }
+
+  double solve() {
+    const ceres::Solver::Options options = solverOptions();
+    ceres::Solver::Summary summary;
+    const QuietCeres quiet;
+    ceres::Solve(options, &ceres_, &summary);
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      const Eigen::Map<const Eigen::Vector3d> turn(cameras_[i].data());
+      const Eigen::Map<const Eigen::Vector3d> position(cameras_[i].data() + 3);
+      problem_.cameras[i] = {Eigen::Quaterniond(Eigen::Matrix3d(starts_[i] * exponential(turn))).normalized(),
+                             position};
+    }
+    return summary.final_cost;
+  }
+
+ private:
+  template <class Residual, int kResiduals, int... kSizes>
+  static ceres::CostFunction* automatic(const Residual& residual) {
+    return new ceres::AutoDiffCostFunction<Residual, kResiduals, kSizes...>(new Residual(residual));
+  }
+
+  static ceres::Problem::Options borrowedLosses() {
+    ceres::Problem::Options options;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
+  void addSightings() {
+    for (Landmark& landmark : problem_.landmarks) {
+      for (const LandmarkSighting& sighting : landmark.sightings) {
+        ceres_.AddResidualBlock(new SightingCost(starts_[sighting.image], sighting), &sighting_loss_,
+                                cameras_[sighting.image].data(), landmark.position_m.data(), &problem_.focal_scale);
+      }
+    }
+    ceres_.AddResidualBlock(automatic<FocalResidual, 1, 1>({}), nullptr, &problem_.focal_scale);
+    if (!config_.focal_is_free) ceres_.SetParameterBlockConstant(&problem_.focal_scale);
+  }
+
+  void addPositions() {
+    for (const PositionObservation& position : problem_.positions) {
+      ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6>({position.east_north_m, position.sigma_m}),
+                              &position_loss_, cameras_[position.image].data());
+    }
+  }
+
+  void addPriors() {
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      const MountingResidual mounting(problem_.cameras[i].rotation, problem_.travel[i], config_.tilt_sigma_rad);
+      ceres_.AddResidualBlock(automatic<CameraMountingResidual, 3, 6, 3>({mounting}), &tilt_loss_, cameras_[i].data(),
+                              problem_.mounting_rad.data());
+      if (i + 1 == cameras_.size()) continue;
+      const double run_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i].position_m).head<2>().norm();
+      ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>({config_.slope_sigma * run_m + kRoughness_m}), nullptr,
+                              cameras_[i].data(), cameras_[i + 1].data());
+    }
+    if (!cameras_.empty()) {
+      ceres_.AddResidualBlock(automatic<HeightResidual, 1, 6>({}), nullptr, cameras_.front().data());
+    }
+  }
+
+  /// Landmarks first. Left to itself Ceres eliminates the mounting as well, which ties every camera to every other.
+  ceres::Solver::Options solverOptions() {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_SCHUR;
+    options.max_num_iterations = config_.max_iterations;
+    options.num_threads = config_.threads;
+    options.logging_type = ceres::SILENT;
+    options.function_tolerance = config_.tolerance;
+    options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (Landmark& landmark : problem_.landmarks) {
+      if (!landmark.sightings.empty()) options.linear_solver_ordering->AddElementToGroup(landmark.position_m.data(), 0);
+    }
+    for (auto& camera : cameras_) options.linear_solver_ordering->AddElementToGroup(camera.data(), 1);
+    options.linear_solver_ordering->AddElementToGroup(problem_.mounting_rad.data(), 1);
+    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 1);
+    return options;
+  }
+
+  BundleProblem& problem_;
+  const BundleConfig& config_;
+  ceres::CauchyLoss sighting_loss_;
+  ceres::CauchyLoss tilt_loss_;
+  GemanMcClureLoss position_loss_;
+  std::vector<Eigen::Matrix3d> starts_;
+  std::vector<std::array<double, 6>> cameras_;  ///< as in SightingCost
+  ceres::Problem ceres_;
+};
+
+}  // namespace
+
+double adjust(BundleProblem& problem, const BundleConfig& config) { return Adjustment(problem, config).solve(); }
+
+double reprojectionError(const CameraPose& camera, const Eigen::Vector3d& landmark_m, const Eigen::Vector2d& seen) {
+  const Eigen::Vector3d point = camera.toCamera(landmark_m);
+  if (!(point.z() >= kNearest_m)) return std::numeric_limits<double>::infinity();
+  return (point.hnormalized() - seen).norm();
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "visual_localization/geometry/camera_pose.h"
+
+namespace visual_localization {
+
+/// Where an image shows a landmark.
+struct LandmarkSighting {
+  std::uint32_t image = 0;
+  std::uint32_t feature = 0;
+  Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z in the camera's frame
+  double sigma = 1.0;                                    ///< of each coordinate, in the same unit
+};
+
+/// A point of the world and the images that show it.
+struct Landmark {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< map frame
+  std::vector<LandmarkSighting> sightings;
+};
+
+/// What a satellite receiver says about where a camera was.
+struct PositionObservation {
+  std::uint32_t image = 0;
+  Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();
+  double sigma_m = 0.3;
+};
+
+/// Cameras in order of time, what they saw, and what is known besides.
+struct BundleProblem {
+  std::vector<CameraPose> cameras;
+  std::vector<Landmark> landmarks;
+  std::vector<PositionObservation> positions;
+  std::vector<Eigen::Quaterniond> travel;  ///< of each camera: levelCamera() along the direction of travel
+  Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
+  double focal_scale = 1.0;                                ///< true focal length, as a share of the calibration's
+};
+
+struct BundleConfig {
+  double landmark_loss = 2.5;                       ///< scale of the Cauchy loss of a sighting, sigmas
+  double position_loss = 1.0;                       ///< scale of the Geman-McClure loss of a fix, sigmas
+  Eigen::Vector3d tilt_sigma_rad{0.02, 0.1, 0.02};  ///< of a camera about the mounting: pitch, yaw, roll
+  double slope_sigma = 0.1;                         ///< rise over run
+  int max_iterations = 30;
+  double tolerance = 1e-4;  ///< relative change of the cost at which it ends
+  bool focal_is_free = false;
+  int threads = 1;  ///< the last digits depend on it: Ceres adds up in the order in which threads end
+};
+
+/// Moves cameras, landmarks and mounting, and the focal length when it is free, to where all observations agree best.
+/// Returns the final cost.
+double adjust(BundleProblem& problem, const BundleConfig& config);
+
+/// Distance of where a landmark is seen from where it projects to, normalised coordinates; infinite behind the camera.
+double reprojectionError(const CameraPose& camera, const Eigen::Vector3d& landmark_m, const Eigen::Vector2d& seen);
+
+}  // namespace visual_localization

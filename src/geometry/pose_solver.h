@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "visual_localization/geometry/camera_pose.h"
+
+namespace visual_localization {
+
+/// A landmark and where the image seems to show it.
+struct LandmarkMatch {
+  Eigen::Vector2d normalised = Eigen::Vector2d::Zero();     ///< x/z, y/z in the camera's frame
+  double sigma = 1.0;                                       ///< of each coordinate
+  Eigen::Vector3d landmark_m = Eigen::Vector3d::Zero();     ///< map frame
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< of the landmark, map frame
+};
+
+/// A camera's pose and how well it is known.
+struct SolvedPose {
+  CameraPose camera;
+  /// Position (map frame, metres), then rotation about the map's axes (radians).
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  std::vector<std::size_t> inliers;  ///< of the matches
+  double median_error = 0.0;         ///< distance of an inlier from its landmark's projection, normalised coordinates
+};
+
+/// The pose from which most matches are right: AP3P in a robust loop, then least squares on all inliers, each weighed
+/// by its own and its landmark's covariance (Cauchy loss). `tolerance`: farthest of an inlier from its landmark's
+/// projection, normalised coordinates. Nothing with fewer than `min_inliers` (at least 4), or when they leave the pose
+/// open. The result depends on the input alone.
+std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, double tolerance,
+                                    std::size_t min_inliers);
+
+}  // namespace visual_localization

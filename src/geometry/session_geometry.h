@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "visual_localization/camera/camera_model.h"
+#include "visual_localization/features/sift_features.h"
+#include "visual_localization/geo/trajectory.h"
+#include "visual_localization/geometry/geometry_config.h"
+#include "visual_localization/geometry/image_geometry.h"
+
+namespace visual_localization {
+
+/// A fix in the map frame, believable or not.
+struct MapFix {
+  std::int64_t stamp_ns = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north
+  double sigma_m = 0.0;                                  ///< per axis, as the receiver claims; 0: not known
+};
+
+/// A session before its adjustment.
+struct UnadjustedSession {
+  std::vector<TrajectoryPoint> images;  ///< where the cleaned path has them, in order of time
+  std::function<std::shared_ptr<const SiftFeatures>(std::size_t)> features;  ///< of an image
+  const CameraModel* camera = nullptr;
+  std::vector<MapFix> fixes;  ///< in order of time
+};
+
+/// What the adjustment of a session came to.
+struct SessionGeometry {
+  std::vector<std::optional<ImageGeometry>> images;  ///< nothing where too few landmarks are seen
+  std::size_t landmarks = 0;
+  std::size_t sightings = 0;
+  double focal_scale = 1.0;              ///< what the images say the focal length is, as a share of the calibration's
+  bool contradicts_calibration = false;  ///< then it is no geometry to rely on
+  double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
+  double mean_shift_m = 0.0;             ///< of the images from the cleaned path
+  double largest_shift_m = 0.0;
+  double far_share = 0.0;                                  ///< of all images: moved by more than 3 m
+  Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
+};
+
+/// Landmarks and camera poses of a session from its images and fixes: matches of neighbouring images, verified; their
+/// rotations averaged; landmarks triangulated; all adjusted together, so that the images decide which fixes lie.
+/// Landmark ids begin with `first_id`. The result does not depend on the number of threads.
+SessionGeometry adjustSession(const UnadjustedSession& session, const GeometryConfig& config, std::uint32_t first_id,
+                              std::size_t threads);
+
+}  // namespace visual_localization

@@ -1,0 +1,241 @@
+#include "geometry/pose_solver.h"
+
+#include <cmath>
+#include <random>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
+
+namespace visual_localization {
+namespace {
+
+constexpr double kSigma = 0.3 / 450.0;
+constexpr double kTolerance = 3.0 / 450.0;
+constexpr std::size_t kMinInliers = 12;
+
+double uniform(std::mt19937& random, double from, double to) {
+  return std::uniform_real_distribution<double>(from, to)(random);
+}
+
+CameraPose somePose() {
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.1, Eigen::Vector3d(1.0, 0.3, -0.5).normalized()));
+  return {levelCamera(0.7) * tilt, {120.0, -340.0, 2.0}};
+}
+
+/// Points that the camera sees to `depth_m` away, seen exactly.
+std::vector<LandmarkMatch> exactMatches(const CameraPose& pose, std::size_t count, double nearest_m, double farthest_m,
+                                        std::mt19937& random) {
+  std::vector<LandmarkMatch> matches(count);
+  for (LandmarkMatch& match : matches) {
+    const double x = uniform(random, -0.7, 0.7);
+    match.normalised = {x, uniform(random, -0.5, 0.5)};
+    const double depth_m = uniform(random, nearest_m, farthest_m);
+    match.landmark_m = pose.position_m + pose.rotation * (depth_m * match.normalised.homogeneous());
+    match.sigma = kSigma;
+  }
+  return matches;
+}
+
+/// Known to 1 % along the ray and 0.1 % across it.
+void giveCovariances(std::vector<LandmarkMatch>& matches, const CameraPose& pose) {
+  for (LandmarkMatch& match : matches) {
+    const Eigen::Vector3d offset = match.landmark_m - pose.position_m;
+    match.covariance_m2 =
+        1e-6 * offset.squaredNorm() * Eigen::Matrix3d::Identity() + 1e-4 * offset * offset.transpose();
+  }
+}
+
+/// Errors as large as the matches say.
+void addNoise(std::vector<LandmarkMatch>& matches, std::mt19937& random) {
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const auto vector = [&] {
+    const double x = normal(random);
+    const double y = normal(random);
+    return Eigen::Vector3d(x, y, normal(random));
+  };
+  for (LandmarkMatch& match : matches) {
+    match.normalised += match.sigma * vector().head<2>();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(match.covariance_m2);
+    const Eigen::Vector3d sigmas_m = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+    match.landmark_m += eigen.eigenvectors() * sigmas_m.cwiseProduct(vector());
+  }
+}
+
+/// Position (map frame), then rotation about the map's axes.
+Eigen::Matrix<double, 6, 1> errorOf(const CameraPose& solved, const CameraPose& truth) {
+  const Eigen::AngleAxisd turn(solved.rotation * truth.rotation.conjugate());
+  Eigen::Matrix<double, 6, 1> error;
+  error << solved.position_m - truth.position_m, turn.angle() * turn.axis();
+  return error;
+}
+
+double largestSigma_m(const SolvedPose& solved) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(solved.covariance.topLeftCorner<3, 3>());
+  return std::sqrt(eigen.eigenvalues().maxCoeff());
+}
+
+TEST(PoseSolver, IsExactWithoutNoise) {
+  std::mt19937 random(1);
+  const CameraPose truth = somePose();
+  const auto solved = solvePose(exactMatches(truth, 40, 4.0, 25.0, random), kTolerance, kMinInliers);
+  ASSERT_TRUE(solved);
+  EXPECT_LT(errorOf(solved->camera, truth).norm(), 1e-6);
+  EXPECT_EQ(solved->inliers.size(), 40U);
+  EXPECT_LT(solved->median_error, 1e-9);
+}
+
+TEST(PoseSolver, SolvesWhereAllLandmarksAreOnOnePlane) {
+  std::mt19937 random(2);
+  const CameraPose truth = somePose();
+  auto matches = exactMatches(truth, 40, 1.0, 1.0, random);
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.3, -0.2, 1.0).normalized();  // a wall, seen at an angle
+  for (LandmarkMatch& match : matches) {
+    const Eigen::Vector3d ray = match.normalised.homogeneous();
+    match.landmark_m = truth.position_m + truth.rotation * (8.0 / normal.dot(ray) * ray);
+  }
+  const auto solved = solvePose(matches, kTolerance, kMinInliers);
+  ASSERT_TRUE(solved);
+  EXPECT_LT(errorOf(solved->camera, truth).norm(), 1e-6);
+}
+
+TEST(PoseSolver, DropsFourOutliersInTen) {
+  const CameraPose truth = somePose();
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    auto matches = exactMatches(truth, 60, 4.0, 25.0, random);
+    giveCovariances(matches, truth);
+    addNoise(matches, random);
+    for (std::size_t i = 0; i < 24; ++i) {
+      const double x = uniform(random, -0.7, 0.7);
+      matches[i].normalised = {x, uniform(random, -0.5, 0.5)};
+    }
+    const auto solved = solvePose(matches, kTolerance, kMinInliers);
+    ASSERT_TRUE(solved) << seed;
+    const Eigen::Matrix<double, 6, 1> error = errorOf(solved->camera, truth);
+    EXPECT_LT(error.dot(solved->covariance.inverse() * error), 30.0) << seed << ": 4 in 100 000 are above";
+    EXPECT_LT(largestSigma_m(*solved), 0.1) << seed;
+  }
+}
+
+TEST(PoseSolver, IsNothingWithTooFewInliers) {
+  std::mt19937 random(3);
+  const CameraPose truth = somePose();
+  auto matches = exactMatches(truth, 30, 4.0, 25.0, random);
+  for (std::size_t i = kMinInliers - 1; i < matches.size(); ++i) {
+    const double x = uniform(random, -0.7, 0.7);
+    matches[i].normalised = {x, uniform(random, -0.5, 0.5)};
+  }
+  EXPECT_FALSE(solvePose(matches, kTolerance, kMinInliers + 3)) << "some outliers may fit by accident";
+  matches.resize(kMinInliers - 1);
+  EXPECT_FALSE(solvePose(matches, kTolerance, kMinInliers));
+  EXPECT_TRUE(solvePose(matches, kTolerance, kMinInliers - 1));
+  matches.resize(3);
+  EXPECT_FALSE(solvePose(matches, kTolerance, 0));
+  EXPECT_FALSE(solvePose({}, kTolerance, 0));
+}
+
+// A world a hundred times as large looks the same, so the position is known a hundred times less well.
+TEST(PoseSolver, SaysHowLittleFarLandmarksTell) {
+  const CameraPose truth = somePose();
+  std::mt19937 random(4);
+  auto matches = exactMatches(truth, 40, 4.0, 25.0, random);
+  const auto close = solvePose(matches, kTolerance, kMinInliers);
+  for (LandmarkMatch& match : matches) {
+    match.landmark_m = truth.position_m + 100.0 * (match.landmark_m - truth.position_m);
+  }
+  const auto far = solvePose(matches, kTolerance, kMinInliers);
+  ASSERT_TRUE(close && far);
+  EXPECT_NEAR(largestSigma_m(*far) / largestSigma_m(*close), 100.0, 1.0);
+  EXPECT_NEAR(std::sqrt(far->covariance(5, 5) / close->covariance(5, 5)), 1.0, 0.01) << "but not the heading";
+}
+
+/// Mean over 300 poses of error' covariance^-1 error; 6 when the covariance is right.
+double meanNees(double nearest_m, double farthest_m) {
+  const CameraPose truth = somePose();
+  double sum = 0.0;
+  constexpr int kTrials = 300;
+  for (int seed = 0; seed < kTrials; ++seed) {
+    std::mt19937 random(static_cast<std::uint32_t>(seed));
+    auto matches = exactMatches(truth, 40, nearest_m, farthest_m, random);
+    giveCovariances(matches, truth);
+    addNoise(matches, random);
+    const auto solved = solvePose(matches, 3.0 * kTolerance, kMinInliers);
+    if (!solved) return -1.0;
+    const Eigen::Matrix<double, 6, 1> error = errorOf(solved->camera, truth);
+    sum += error.dot(solved->covariance.ldlt().solve(error));
+  }
+  return sum / kTrials;
+}
+
+// The mean over 300 has a sigma of 0.2. The Cauchy loss gives every match less weight than it has, so the covariance
+// is some 25 % too large: about 4.8.
+TEST(PoseSolver, KnowsItsCovariance) {
+  const double nees = meanNees(4.0, 25.0);
+  EXPECT_GT(nees, 4.0);
+  EXPECT_LT(nees, 9.0);
+}
+
+TEST(PoseSolver, KnowsItsCovarianceWhenAllIsFarAway) {
+  const double nees = meanNees(100.0, 300.0);
+  EXPECT_GT(nees, 4.0);
+  EXPECT_LT(nees, 9.0);
+}
+
+// The camera may turn around the row and sees the same.
+TEST(PoseSolver, DoesNotPretendToKnowThePoseFromARow) {
+  const CameraPose truth = somePose();
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    std::vector<LandmarkMatch> matches(5);
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      const Eigen::Vector3d in_camera(-2.0 + static_cast<double>(i), 0.5, 8.0 + 0.5 * static_cast<double>(i));
+      matches[i].landmark_m = truth.position_m + truth.rotation * in_camera;
+      const double off = kSigma * std::normal_distribution<double>(0.0, 1.0)(random);
+      matches[i].normalised = in_camera.hnormalized() + Eigen::Vector2d(off, -0.5 * off);
+      matches[i].sigma = kSigma;
+    }
+    const auto solved = solvePose(matches, kTolerance, 4);
+    if (solved) {
+      EXPECT_GT(largestSigma_m(*solved), 2.0) << seed;
+    }
+  }
+}
+
+TEST(PoseSolver, DependsOnTheInputAlone) {
+  std::mt19937 random(5);
+  const CameraPose truth = somePose();
+  auto matches = exactMatches(truth, 40, 4.0, 25.0, random);
+  addNoise(matches, random);
+  const auto first = solvePose(matches, kTolerance, kMinInliers);
+  solvePose(exactMatches(truth, 20, 4.0, 25.0, random), kTolerance, kMinInliers);
+  const auto second = solvePose(matches, kTolerance, kMinInliers);
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->camera.position_m, second->camera.position_m);
+  EXPECT_EQ(first->covariance, second->covariance);
+}
+
+// All the same, in a row, on the camera, at random: a pose or none, but always numbers.
+TEST(PoseSolver, IsAlwaysFinite) {
+  const CameraPose truth = somePose();
+  for (std::uint32_t seed = 0; seed < 105; ++seed) {
+    std::mt19937 random(seed);
+    auto matches = exactMatches(truth, 4 + seed % 12, 4.0, 25.0, random);
+    for (LandmarkMatch& match : matches) {
+      if (seed % 5 == 0) match.landmark_m = matches.front().landmark_m;
+      if (seed % 5 == 1) match.landmark_m.tail<2>() = matches.front().landmark_m.tail<2>();
+      if (seed % 5 == 2) match.landmark_m = truth.position_m;
+      if (seed % 5 == 3) match.normalised = {uniform(random, -0.7, 0.7), 0.0};
+      if (seed % 7 == 0) match.normalised = matches.front().normalised;
+    }
+    const auto solved = solvePose(matches, kTolerance, 4);
+    if (!solved) continue;
+    EXPECT_TRUE(solved->camera.position_m.allFinite()) << seed;
+    EXPECT_TRUE(solved->camera.rotation.coeffs().allFinite()) << seed;
+    EXPECT_TRUE(solved->covariance.allFinite()) << seed;
+    EXPECT_TRUE(std::isfinite(solved->median_error)) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization
