@@ -18,46 +18,77 @@ std::size_t bytesOf(const SiftFeatures& features) {
 
 std::size_t bytesOf(const GlobalFeatures&) { return sizeof(GlobalFeatures); }
 
+std::size_t bytesOf(const std::optional<ImageGeometry>& geometry) {
+  return sizeof(geometry) + (geometry ? geometry->landmarks.capacity() * sizeof(SeenLandmark) : 0);
+}
+
+/// What is kept of an image, by the number of its key.
+enum Kind : std::uint64_t { kSift, kGlobal, kGeometry, kKinds };
+
+std::uint64_t keyOf(std::size_t image, Kind kind) { return kKinds * image + kind; }
+
 }  // namespace
 
 MemoryFeatureStore::MemoryFeatureStore(std::vector<TrainingImage>&& images) {
   sift_.reserve(images.size());
   global_.reserve(images.size());
   previews_.reserve(images.size());
+  geometry_.resize(images.size());
   for (TrainingImage& image : images) {
     sift_.push_back(std::move(image.sift));
     global_.push_back(image.global);
     previews_.push_back(std::move(image.preview_jpeg));
+    if (!image.geometry) continue;
+    geometry_[previews_.size() - 1] = std::make_unique<const ImageGeometry>(std::move(*image.geometry));
+    ++geometry_count_;
   }
 }
 
-FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path,
-                                   std::vector<std::uint32_t> feature_counts, std::size_t cache_bytes, Warn warn)
+FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, StoredCounts counts,
+                                   std::size_t cache_bytes, Warn warn)
     : path_(std::move(path)),
-      feature_counts_(std::move(feature_counts)),
+      counts_(std::move(counts)),
       cache_bytes_(cache_bytes),
       warn_(std::move(warn)),
       database_(std::move(database)),
       sift_rows_(database_, std::string(map_rows::kSelectSift) + kOfOneImage),
       global_rows_(database_, std::string(map_rows::kSelectGlobal) + kOfOneImage),
       preview_rows_(database_, std::string(map_rows::kSelectPreview) + kOfOneImage),
-      cache_(cache_bytes) {}
+      cache_(cache_bytes) {
+  // A map of an older version has no such table.
+  if (counts_.geometry > 0) geometry_rows_.emplace(database_, std::string(map_rows::kSelectGeometry) + kOfOneImage);
+}
 
 std::shared_ptr<const SiftFeatures> FileFeatureStore::sift(std::size_t image) const {
-  return get<SiftFeatures>(2 * image, [&] {
+  return get<SiftFeatures>(keyOf(image, kSift), [&] {
     return read(image, sift_rows_, "features",
-                [&](const sqlite::Statement& row) { return map_rows::siftOf(row, feature_counts_[image]); });
+                [&](const sqlite::Statement& row) { return map_rows::siftOf(row, counts_.features[image]); });
   });
 }
 
 std::shared_ptr<const GlobalFeatures> FileFeatureStore::global(std::size_t image) const {
-  return get<GlobalFeatures>(2 * image + 1,
+  return get<GlobalFeatures>(keyOf(image, kGlobal),
                              [&] { return read(image, global_rows_, "global features", map_rows::globalOf); });
 }
 
 std::vector<std::uint8_t> FileFeatureStore::preview(std::size_t image) const {
   const std::lock_guard<std::mutex> lock(reading_);
   return read(image, preview_rows_, "preview", map_rows::previewOf);
+}
+
+std::shared_ptr<const ImageGeometry> FileFeatureStore::geometry(std::size_t image) const {
+  if (!geometry_rows_) return nullptr;
+  // That an image has none is kept as well.
+  const auto kept = get<std::optional<ImageGeometry>>(keyOf(image, kGeometry), [&] { return readGeometry(image); });
+  if (!*kept) return nullptr;
+  return {kept, &**kept};
+}
+
+std::optional<ImageGeometry> FileFeatureStore::readGeometry(std::size_t image) const {
+  const auto decode = [&](const sqlite::Statement& row) {
+    return std::optional<ImageGeometry>(map_rows::geometryOf(row, counts_.features[image]));
+  };
+  return read(image, *geometry_rows_, "landmarks", decode, true);
 }
 
 std::size_t FileFeatureStore::globalsKept() const {
@@ -82,13 +113,17 @@ std::shared_ptr<const void> FileFeatureStore::find(std::uint64_t key) const {
 }
 
 template <class Decode>
-auto FileFeatureStore::read(std::size_t image, sqlite::Statement& row, const char* what, Decode decode) const
-    -> decltype(decode(row)) {
+auto FileFeatureStore::read(std::size_t image, sqlite::Statement& row, const char* what, Decode decode,
+                            bool may_be_missing) const -> decltype(decode(row)) {
   try {
     row.reset();
     row.bind(0, static_cast<std::int64_t>(image));
-    if (!row.step()) throw map_rows::Refusal("they are missing");
-    auto value = decode(row);
+    decltype(decode(row)) value{};
+    if (row.step()) {
+      value = decode(row);
+    } else if (!may_be_missing) {
+      throw map_rows::Refusal("they are missing");
+    }
     row.reset();
     return value;
   } catch (const std::exception& error) {
@@ -101,8 +136,8 @@ auto FileFeatureStore::read(std::size_t image, sqlite::Statement& row, const cha
 void FileFeatureStore::warnOnce(std::size_t image, const char* what, const std::string& reason) const {
   if (std::exchange(warned_, true) || !warn_) return;
   warn_(path_ + ": " + what + " of " + map_rows::imageName(static_cast<std::int64_t>(image)) +
-        " cannot be used: " + oneLine(reason) +
-        "; it counts as without features, and so does any other such image from now on without a word");
+        " cannot be used: " + oneLine(reason) + "; it counts as without " + what +
+        ", and what else cannot be read from now on does so without a word");
 }
 
 }  // namespace visual_localization

@@ -7,6 +7,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
+#include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -30,6 +32,10 @@ class FeatureStore {
   virtual std::shared_ptr<const GlobalFeatures> global(std::size_t image) const = 0;
   /// Small grey JPEG for people; may be empty.
   virtual std::vector<std::uint8_t> preview(std::size_t image) const = 0;
+  /// Camera's pose and landmarks; null when there are none.
+  virtual std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const = 0;
+  /// How many images have a geometry, without reading it.
+  virtual std::size_t geometryCount() const = 0;
   /// How many images' global features can be in memory at a time, with room for SIFT features beside them; more than
   /// any map has when all of them are.
   virtual std::size_t globalsKept() const = 0;
@@ -44,6 +50,10 @@ class MemoryFeatureStore final : public FeatureStore {
   std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override { return unowned(sift_[image]); }
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override { return unowned(global_[image]); }
   std::vector<std::uint8_t> preview(std::size_t image) const override { return previews_[image]; }
+  std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override {
+    return geometry_[image] ? unowned(*geometry_[image]) : nullptr;
+  }
+  std::size_t geometryCount() const override { return geometry_count_; }
   std::size_t globalsKept() const override { return std::numeric_limits<std::size_t>::max(); }
 
  private:
@@ -56,6 +66,8 @@ class MemoryFeatureStore final : public FeatureStore {
   std::vector<SiftFeatures> sift_;
   std::vector<GlobalFeatures> global_;
   std::vector<std::vector<std::uint8_t>> previews_;
+  std::vector<std::unique_ptr<const ImageGeometry>> geometry_;  ///< null where there is none
+  std::size_t geometry_count_ = 0;
 };
 
 /// Keeps what was used last, up to a number of bytes. Not thread-safe. `T`: what is kept; never null.
@@ -106,35 +118,44 @@ class FeatureCache {
   std::unordered_map<std::uint64_t, typename std::list<Entry>::iterator> entry_of_;
 };
 
+/// What is known of a map's images without reading what they looked like.
+struct StoredCounts {
+  std::vector<std::uint32_t> features;  ///< of each image
+  std::size_t geometry = 0;             ///< images that have one
+};
+
 /// Reads what an image looked like from the map's file when it is first needed, verifies it, and keeps what was used
 /// last. What cannot be read, does not agree with its checksum or has another number of features than the map says
-/// counts as without features: the file may be damaged, cut or overwritten at any time. For several threads at once;
-/// one of them reads at a time.
+/// counts as without features or geometry: the file may be damaged, cut or overwritten at any time. For several threads
+/// at once; one of them reads at a time.
 class FileFeatureStore final : public FeatureStore {
  public:
   /// Called with one line about the first image that cannot be read, by the thread that needs it; never again.
   using Warn = std::function<void(const std::string&)>;
 
-  /// `path`: to be named in the warning. `feature_counts`: of the images. `cache_bytes`: what may be kept; 0
-  /// keeps nothing.
-  FileFeatureStore(sqlite::Database database, std::string path, std::vector<std::uint32_t> feature_counts,
-                   std::size_t cache_bytes, Warn warn);
+  /// `path`: to be named in the warning. `cache_bytes`: what may be kept; 0 keeps nothing.
+  FileFeatureStore(sqlite::Database database, std::string path, StoredCounts counts, std::size_t cache_bytes,
+                   Warn warn);
 
   std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
   std::vector<std::uint8_t> preview(std::size_t image) const override;
+  std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override;
+  std::size_t geometryCount() const override { return counts_.geometry; }
   std::size_t globalsKept() const override;
 
  private:
+  std::optional<ImageGeometry> readGeometry(std::size_t image) const;
   template <class T, class Read>
   std::shared_ptr<const T> get(std::uint64_t key, Read readIt) const;
   std::shared_ptr<const void> find(std::uint64_t key) const;
   template <class Decode>
-  auto read(std::size_t image, sqlite::Statement& row, const char* what, Decode decode) const -> decltype(decode(row));
+  auto read(std::size_t image, sqlite::Statement& row, const char* what, Decode decode,
+            bool may_be_missing = false) const -> decltype(decode(row));
   void warnOnce(std::size_t image, const char* what, const std::string& reason) const;
 
   const std::string path_;
-  const std::vector<std::uint32_t> feature_counts_;
+  const StoredCounts counts_;
   const std::size_t cache_bytes_;
   const Warn warn_;
   mutable std::mutex reading_;  ///< held while the file is read
@@ -142,6 +163,7 @@ class FileFeatureStore final : public FeatureStore {
   mutable sqlite::Statement sift_rows_;
   mutable sqlite::Statement global_rows_;
   mutable sqlite::Statement preview_rows_;
+  mutable std::optional<sqlite::Statement> geometry_rows_;  ///< none where there is nothing to read
   mutable bool warned_ = false;
 
   mutable std::mutex keeping_;  ///< held while the cache is touched, never while the file is read

@@ -9,6 +9,7 @@
 
 #include "base/files.h"
 #include "base/statistics.h"
+#include "geometry/session_geometry.h"
 #include "map/extraction_pool.h"
 #include "map/map_writer.h"
 #include "map/pruning_neighbours.h"
@@ -70,6 +71,53 @@ std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, con
   return features;
 }
 
+/// Images [begin, end) of the map, which are one session.
+UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::size_t end, const CameraModel& camera,
+                             const std::vector<MapFix>& fixes) {
+  UnadjustedSession session;
+  for (std::size_t i = begin; i < end; ++i) {
+    session.images.push_back({map.pose(i).stamp_ns, map.position_m(i), map.yaw_rad(i)});
+  }
+  session.features = [&map, begin](std::size_t i) { return map.sift(begin + i); };
+  session.camera = &camera;
+  session.fixes = fixes;
+  return session;
+}
+
+SessionLandmarks summaryOf(const SessionGeometry& geometry) {
+  const auto images = std::count_if(geometry.images.begin(), geometry.images.end(),
+                                    [](const auto& image) { return image.has_value(); });
+  SessionLandmarks summary;
+  summary.images = static_cast<std::size_t>(images);
+  summary.landmarks = geometry.landmarks;
+  summary.sightings = geometry.sightings;
+  summary.contradicts_calibration = geometry.contradicts_calibration;
+  summary.focal_scale = geometry.focal_scale;
+  summary.far_share = geometry.far_share;
+  summary.median_error_px = geometry.median_error_px;
+  summary.mean_shift_m = geometry.mean_shift_m;
+  summary.largest_shift_m = geometry.largest_shift_m;
+  return summary;
+}
+
+/// The image is where the adjustment has its camera.
+void place(TrainingImage& image, ImageGeometry geometry) {
+  image.position_m = geometry.camera.position_m.head<2>();
+  image.yaw_rad = geometry.camera.yaw_rad();
+  image.geometry = std::move(geometry);
+}
+
+std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
+  std::vector<MapFix> found;
+  for (const Fix& fix : fixes) {
+    if (fix.has_fix && isValid(fix.position))
+      found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m});
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const MapFix& a, const MapFix& b) { return a.stamp_ns < b.stamp_ns; });
+  return found;
+}
+
 std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<const SiftFeatures>>& owned) {
   std::vector<const SiftFeatures*> pointers;
   for (const auto& features : owned) pointers.push_back(features.get());
@@ -118,6 +166,11 @@ class ImageSpool {
 void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"map/min_spacing", "m", "skip an image closer than this to the last kept one of its session"},
                min_spacing_m, 0.0, 1000.0);
+  visitor.real(
+      {"map/spacing", "m",
+       "keep, after all images were pruned and adjusted, only those at least this far from the last kept one of their "
+       "session"},
+      spacing_m, 0.0, 1000.0);
   visitor.flag(
       {"map/prune", "", "keep only features that one of the two nearest training images of its session shows too"},
       prune);
@@ -128,10 +181,12 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   sift.declare(visitor);
   match.declare(visitor);
   trajectory.declare(visitor);
+  geometry.declare(visitor);
 }
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources)
     : config_(requireValid(config)),
+      resources_(resources),
       extraction_(std::make_unique<ExtractionPool>(config_.sift, config_.sift_backend, config_.preview_width_px,
                                                    resources.threads)),
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
@@ -151,6 +206,7 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   }
   header_.datum = frame_->datum();
   header_.sessions.push_back({name});
+  fixes_.push_back(inFrame(fixes, *frame_));
   report_.session_images.push_back({name, 0, {}, {}, camera});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
@@ -220,34 +276,84 @@ void MapBuilder::extractWaiting() {
   waiting_.clear();
 }
 
-void MapBuilder::prune(const Sink& sink, const Progress& progress) {
+void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
   extractWaiting();
   const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
-  const PruningNeighbours neighbours_of(*unpruned);
+  const bool adjusts = config_.geometry.enabled && hasCalibratedSession();
+  if (!adjusts && !(config_.spacing_m > 0.0)) {
+    prune(*unpruned, sink, progress);
+    return;
+  }
+  ImageSpool pruned(resources_.spool_beside);
+  prune(
+      *unpruned, [&pruned](const TrainingImage& image) { pruned.append(image); }, progress);
+  addGeometry(*pruned.finish(header_), sink, progress);
+}
+
+bool MapBuilder::hasCalibratedSession() const {
+  return std::any_of(header_.sessions.begin(), header_.sessions.end(),
+                     [](const Session& session) { return session.camera.has_value(); });
+}
+
+void MapBuilder::prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress) {
+  const PruningNeighbours neighbours_of(unpruned);
   report_.features_kept = 0;
-  for (std::size_t i = 0; i < unpruned->size(); ++i) {
-    TrainingImage image = unpruned->image(i);
-    const auto neighbours = neighboursOf(i, neighbours_of, *unpruned);
+  for (std::size_t i = 0; i < unpruned.size(); ++i) {
+    TrainingImage image = unpruned.image(i);
+    const auto neighbours = neighboursOf(i, neighbours_of, unpruned);
     // An image on its own has nothing to be compared with: it keeps all its features.
     if (config_.prune && !neighbours.empty()) {
       image.sift = keepSeenIn(image.sift, pointersTo(neighbours), config_.match.max_angle_ratio);
     }
     report_.features_kept += image.sift.size();
     sink(image);
-    if (progress) progress(i + 1, unpruned->size());
+    if (progress) progress(i + 1, unpruned.size());
+  }
+}
+
+/// The images of a session follow each other.
+void MapBuilder::addGeometry(const TrainingMap& pruned, const Sink& sink, const Progress& progress) {
+  std::uint32_t next_id = 0;
+  for (std::size_t begin = 0; begin < pruned.size();) {
+    const auto session = static_cast<std::size_t>(pruned.pose(begin).session);
+    const std::size_t end = begin + report_.session_images[session].kept;
+    SessionGeometry geometry;
+    if (config_.geometry.enabled && header_.sessions[session].camera) {
+      geometry = adjustSession(unadjusted(pruned, begin, end, *header_.sessions[session].camera, fixes_[session]),
+                               config_.geometry, next_id, resources_.threads);
+      next_id += static_cast<std::uint32_t>(geometry.landmarks);
+      report_.session_images[session].geometry = summaryOf(geometry);
+      if (geometry.contradicts_calibration) {
+        geometry.images.clear();
+        header_.sessions[session].camera.reset();
+      }
+    }
+    std::optional<Eigen::Vector2d> last_m;
+    for (std::size_t i = begin; i < end; ++i) {
+      TrainingImage image = pruned.image(i);
+      if (!geometry.images.empty() && geometry.images[i - begin]) place(image, std::move(*geometry.images[i - begin]));
+      if (last_m && (image.position_m - *last_m).norm() < config_.spacing_m) {
+        ++report_.images_thinned;
+        continue;
+      }
+      last_m = image.position_m;
+      sink(image);
+    }
+    begin = end;
+    if (progress) progress(end, pruned.size());
   }
 }
 
 std::shared_ptr<const TrainingMap> MapBuilder::build(const Progress& progress) {
   std::vector<TrainingImage> images;
-  prune([&images](const TrainingImage& image) { images.push_back(image); }, progress);
+  finish([&images](const TrainingImage& image) { images.push_back(image); }, progress);
   return std::make_shared<const TrainingMap>(header_, std::move(images));
 }
 
 void MapBuilder::save(const std::string& path, const Progress& progress) {
   MapWriter writer(path);
-  prune([&writer](const TrainingImage& image) { writer.append(image); }, progress);
+  finish([&writer](const TrainingImage& image) { writer.append(image); }, progress);
   writer.finish(header_);
 }
 

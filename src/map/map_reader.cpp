@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 #include <new>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "map/feature_store.h"
 #include "map/map_rows.h"
 #include "map/map_schema.h"
+#include "map/packed_geometry.h"
 #include "map/sqlite.h"
 #include "visual_localization/map/map_file.h"
 
@@ -114,7 +116,8 @@ TrainingPoses readPoses(const sqlite::Database& database, std::int64_t file_size
 struct Opened {
   MapHeader header;
   TrainingPoses poses;
-  map_rows::Budget budget;  ///< for the rest
+  std::size_t geometry_count = 0;  ///< images with a geometry
+  map_rows::Budget budget;         ///< for the rest
 };
 
 map_schema::MaskBits readMasks(const map_rows::MapDatabase& map, map_rows::Budget& budget) {
@@ -136,10 +139,14 @@ Opened readPosesAndHeader(const map_rows::MapDatabase& map, std::int64_t file_si
   ParameterValues meta = readMeta(map.database, budget);
   const std::int64_t expected = takeChecksum(meta);
   map_schema::Checksum checksum;
-  Opened opened{map_schema::toHeader(meta, map.version, readMasks(map, budget)), {}, budget};
+  ParameterValues of_header = meta;
+  const std::size_t geometry_count = map_schema::takeGeometryCount(of_header, map.version);
+  Opened opened{
+      map_schema::toHeader(std::move(of_header), map.version, readMasks(map, budget)), {}, geometry_count, budget};
   opened.poses = readPoses(map.database, file_size, opened.header.sessions.size(), checksum);
   checksum.add(meta);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
+  if (geometry_count > opened.poses.size()) throw Refusal("is damaged: more images have landmarks than there are");
   return opened;
 }
 
@@ -151,18 +158,54 @@ void stepTo(std::size_t image, Statement& row, const char* what) {
   }
 }
 
+/// The rows of the landmarks, while the images pass by in their order.
+class GeometryRows {
+ public:
+  explicit GeometryRows(const map_rows::MapDatabase& map) {
+    if (map.version < map_schema::kSinceLandmarks) return;
+    row_.emplace(map.database, map_rows::kSelectGeometry + std::string(" ORDER BY image"));
+    has_row_ = row_->step();
+  }
+
+  std::optional<ImageGeometry> of(std::size_t image, std::size_t feature_count) {
+    if (!has_row_ || row_->integer(0) != static_cast<std::int64_t>(image)) return std::nullopt;
+    std::optional<ImageGeometry> geometry = map_rows::geometryOf(*row_, feature_count);
+    ++found_;
+    has_row_ = row_->step();
+    return geometry;
+  }
+
+  /// After the last image. Throws Refusal unless that were all rows, and as many as expected.
+  void requireEnd(std::size_t expected) const {
+    if (has_row_) throw Refusal("is damaged: it has landmarks without an image");
+    if (found_ == expected) return;
+    throw Refusal("is damaged: " + std::to_string(found_) + " images have landmarks instead of " +
+                  std::to_string(expected));
+  }
+
+ private:
+  std::optional<Statement> row_;
+  bool has_row_ = false;
+  std::size_t found_ = 0;
+};
+
 std::uint64_t storedBytes(const TrainingImage& image) {
-  return image.sift.size() * (map_schema::kKeypointBytes + SiftFeatures::kDescriptorSize) +
+  const std::size_t landmark_bytes = map_schema::landmarkBytes(image.sift.size());
+  const std::size_t of_geometry =
+      image.geometry ? map_schema::kPoseBytes + image.geometry->landmarks.size() * landmark_bytes : 0;
+  return of_geometry + image.sift.size() * (map_schema::kKeypointBytes + SiftFeatures::kDescriptorSize) +
          2 * map_schema::kHistogramBytes + image.preview_jpeg.size();
 }
 
 /// Reads and verifies what all images looked like, one after the other.
-void forEachImage(const sqlite::Database& database, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
+void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
+  const sqlite::Database& database = map.database;
   const TrainingPoses& poses = opened.poses;
   const std::string in_order = " ORDER BY image";
   Statement sift(database, map_rows::kSelectSift + in_order);
   Statement global(database, map_rows::kSelectGlobal + in_order);
   Statement preview(database, map_rows::kSelectPreview + in_order);
+  GeometryRows geometry(map);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     stepTo(i, sift, "features");
     stepTo(i, global, "global features");
@@ -170,19 +213,21 @@ void forEachImage(const sqlite::Database& database, Opened& opened, const std::f
     TrainingImage image{{poses.stamps_ns[i], poses.sessions[i], poses.positions_m[i], poses.yaws_rad[i]},
                         map_rows::siftOf(sift, poses.feature_counts[i]),
                         map_rows::globalOf(global),
-                        map_rows::previewOf(preview)};
+                        map_rows::previewOf(preview),
+                        geometry.of(i, poses.feature_counts[i])};
     opened.budget.spend(storedBytes(image));
     use(std::move(image));
   }
   if (sift.step() || global.step() || preview.step()) {
     throw Refusal("is damaged: it has features or previews without an image");
   }
+  geometry.requireEnd(opened.geometry_count);
 }
 
-std::shared_ptr<const TrainingMap> readWhole(const sqlite::Database& database, Opened opened) {
+std::shared_ptr<const TrainingMap> readWhole(const map_rows::MapDatabase& map, Opened opened) {
   std::vector<TrainingImage> images;
   images.reserve(opened.poses.size());
-  forEachImage(database, opened, [&images](TrainingImage&& image) { images.push_back(std::move(image)); });
+  forEachImage(map, opened, [&images](TrainingImage&& image) { images.push_back(std::move(image)); });
   return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(images));
 }
 
@@ -212,9 +257,10 @@ auto withMapFile(const std::string& path, Read read) {
 std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoading& loading) {
   return withMapFile(path, [&](map_rows::MapDatabase&& map, std::int64_t size) {
     Opened opened = readPosesAndHeader(map, size);
-    if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(map.database, std::move(opened));
-    auto store = std::make_unique<FileFeatureStore>(std::move(map.database), path, opened.poses.feature_counts,
-                                                    loading.cache_bytes, loading.warn);
+    if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(map, std::move(opened));
+    const StoredCounts counts{opened.poses.feature_counts, opened.geometry_count};
+    auto store =
+        std::make_unique<FileFeatureStore>(std::move(map.database), path, counts, loading.cache_bytes, loading.warn);
     return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.poses), std::move(store));
   });
 }
@@ -222,7 +268,7 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
 void checkMap(const std::string& path) {
   withMapFile(path, [](const map_rows::MapDatabase& file, std::int64_t size) {
     Opened opened = readPosesAndHeader(file, size);
-    forEachImage(file.database, opened, [](TrainingImage&&) {});
+    forEachImage(file, opened, [](TrainingImage&&) {});
     requireIntegrity(file.database);
     // What a map may not be besides.
     const TrainingMap map(std::move(opened.header), std::move(opened.poses),

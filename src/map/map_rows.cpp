@@ -10,6 +10,7 @@
 
 #include <sys/stat.h>
 
+#include "map/packed_geometry.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization::map_rows {
@@ -152,6 +153,17 @@ std::vector<std::uint8_t> previewOf(const Statement& row) {
   requireChecksum(map_schema::rowChecksum(row.integer(0), {jpeg}), row, 2, "bytes of the preview");
   if (jpeg.size == 0) return {};
   return {jpeg.data, jpeg.data + jpeg.size};
+}
+
+ImageGeometry geometryOf(const Statement& row, std::size_t feature_count) {
+  const Bytes pose = row.blob(1);
+  const Bytes points = row.blob(2);
+  requireChecksum(map_schema::rowChecksum(row.integer(0), {pose, points}), row, 3, "landmarks");
+  try {
+    return map_schema::unpackGeometry(pose, points, feature_count);
+  } catch (const std::runtime_error& error) {
+    throw Refusal("is damaged: " + imageName(row.integer(0)) + ": " + error.what());
+  }
 }
 
 }  // namespace visual_localization::map_rows

@@ -10,6 +10,7 @@
 #include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
+#include "visual_localization/geometry/image_geometry.h"
 
 /// The parts of reading a map file that the whole map and a single image share.
 namespace visual_localization::map_rows {
@@ -51,6 +52,8 @@ class Budget {
 constexpr const char* kSelectSift = "SELECT image, keypoints, descriptors, crc32 FROM features";
 constexpr const char* kSelectGlobal = "SELECT image, wgoh, wgii, crc32 FROM globals";
 constexpr const char* kSelectPreview = "SELECT image, jpeg, crc32 FROM previews";
+/// Since kSinceLandmarks; an image without geometry has no row.
+constexpr const char* kSelectGeometry = "SELECT image, pose, points, crc32 FROM landmarks";
 
 // What is in the current row of such a statement. Each throws Refusal when it does not agree with its checksum, and
 // sqlite::Error or std::exception when it is not even of the right form.
@@ -58,5 +61,7 @@ constexpr const char* kSelectPreview = "SELECT image, jpeg, crc32 FROM previews"
 SiftFeatures siftOf(const sqlite::Statement& row, std::size_t count);
 GlobalFeatures globalOf(const sqlite::Statement& row);
 std::vector<std::uint8_t> previewOf(const sqlite::Statement& row);
+/// `feature_count`: SIFT features of the image.
+ImageGeometry geometryOf(const sqlite::Statement& row, std::size_t feature_count);
 
 }  // namespace visual_localization::map_rows

@@ -11,14 +11,20 @@
 
 #include <zlib.h>
 
+#include "map/little_endian.h"
+#include "map/packed_geometry.h"
+
 namespace visual_localization::map_schema {
 namespace {
 
 constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
 constexpr const char* kMask = "/mask";
+constexpr const char* kGeometryCount = "geometry/images";
+
+static_assert(kPoseBytes + kMaxFeaturesPerImage * landmarkBytes(kMaxFeaturesPerImage) <= kMaxRowBytes);
 
 /// Of every version, in order of name.
-constexpr std::array<Table, 6> kTables{{
+constexpr std::array<Table, 7> kTables{{
     {"features",
      "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL, "
      "crc32 INTEGER NOT NULL)"},
@@ -27,6 +33,10 @@ constexpr std::array<Table, 6> kTables{{
     {"images",
      "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
      "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL)"},
+    {"landmarks",
+     "CREATE TABLE landmarks(image INTEGER PRIMARY KEY, pose BLOB NOT NULL, points BLOB NOT NULL, "
+     "crc32 INTEGER NOT NULL)",
+     kSinceLandmarks},
     {"masks", "CREATE TABLE masks(session INTEGER PRIMARY KEY, bits BLOB NOT NULL)", kSinceCameras},
     {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
     {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
@@ -120,31 +130,12 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
   return sessions;
 }
 
-template <class Unsigned>
-void putLittleEndian(Unsigned value, std::uint8_t* to) {
-  for (std::size_t i = 0; i < sizeof(value); ++i) to[i] = static_cast<std::uint8_t>(value >> (8 * i));
-}
-
-float getFloat(const std::uint8_t* from) {
-  const std::uint32_t bits = std::uint32_t{from[0]} | std::uint32_t{from[1]} << 8U | std::uint32_t{from[2]} << 16U |
-                             std::uint32_t{from[3]} << 24U;
-  float value = 0.0F;
-  std::memcpy(&value, &bits, sizeof(value));
-  return value;
-}
-
 std::uint64_t bitsOf(double value) {
   // SQLite does not keep the sign of zero.
   const double normal = value == 0.0 ? 0.0 : value;
   std::uint64_t bits = 0;
   std::memcpy(&bits, &normal, sizeof(bits));
   return bits;
-}
-
-void putFloat(float value, std::uint8_t* to) {
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, &value, sizeof(bits));
-  putLittleEndian(bits, to);
 }
 
 }  // namespace
@@ -215,7 +206,7 @@ void ImageRow::addTo(Checksum& checksum) const {
   checksum.addRaw(bytes.data(), bytes.size());
 }
 
-ParameterValues toMeta(const MapHeader& header) {
+ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
   SiftConfig sift = header.sift;
   ParameterValues meta = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
   meta["datum/latitude_deg"] = header.datum.latitude_deg;
@@ -224,6 +215,7 @@ ParameterValues toMeta(const MapHeader& header) {
   meta["image/width_px"] = std::int64_t{header.image_size.width};
   meta["image/height_px"] = std::int64_t{header.image_size.height};
   meta["package_version"] = std::string(VISUAL_LOCALIZATION_VERSION);
+  meta[kGeometryCount] = static_cast<std::int64_t>(geometry_count);
   for (std::size_t i = 0; i < header.sessions.size(); ++i) {
     const Session& session = header.sessions[i];
     const std::string key = sessionKey(i);
@@ -236,6 +228,14 @@ ParameterValues toMeta(const MapHeader& header) {
     meta[key + kMask] = crc32Of({bits.data(), bits.size()});
   }
   return meta;
+}
+
+std::size_t takeGeometryCount(ParameterValues& meta, int version) {
+  if (version < kSinceLandmarks) return 0;
+  const auto count = take<std::int64_t>(meta, kGeometryCount);
+  if (count >= 0 && count <= kMaxImages) return static_cast<std::size_t>(count);
+  throw std::runtime_error("meta value '" + std::string(kGeometryCount) + "' = " + std::to_string(count) +
+                           " is not in [0, " + std::to_string(kMaxImages) + "]");
 }
 
 MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {

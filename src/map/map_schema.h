@@ -23,12 +23,14 @@ constexpr std::int64_t kMaxFeaturesPerImage = 1'000'000;
 constexpr std::int64_t kMaxImageSide_px = 32768;
 constexpr std::size_t kHistogramBytes = GlobalFeatures::kSize * sizeof(float);
 constexpr std::size_t kKeypointBytes = 16;
-/// Of the largest row that may be read: the features of one image.
+/// Of the largest row that may be read: the features of one image. Its landmarks are smaller.
 constexpr std::int64_t kMaxRowBytes =
     kMaxFeaturesPerImage * static_cast<std::int64_t>(kKeypointBytes + SiftFeatures::kDescriptorSize) + 4096;
 
 /// From this version on sessions have a camera and a mask.
 constexpr int kSinceCameras = 4;
+/// From this version on images have a geometry.
+constexpr int kSinceLandmarks = 4;
 
 struct Table {
   const char* name;
@@ -73,12 +75,17 @@ struct ImageRow {
   void addTo(Checksum& checksum) const;
 };
 
-/// The header as rows of the table `meta`, without the checksum. Of a mask they hold the checksum of its bits.
-ParameterValues toMeta(const MapHeader& header);
+/// The header as rows of the table `meta`, without the checksum. Of a mask they hold the checksum of its bits, of the
+/// table of landmarks the number of its rows: to count them all of it would have to be read.
+ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count);
+/// Removes from `meta` how many images of a map of this version have a geometry, and returns it. Throws
+/// std::runtime_error when it is missing or not in [0, kMaxImages].
+std::size_t takeGeometryCount(ParameterValues& meta, int version);
 /// Masks as they are stored, by the number of their session.
 using MaskBits = std::map<std::int64_t, std::vector<std::uint8_t>>;
-/// Inverse of toMeta() for a map of this version. Throws std::runtime_error when a value or a mask is missing, unknown,
-/// of the wrong type or out of range, and when a mask does not agree with its checksum.
+/// Inverse of toMeta() for a map of this version, but for what takeGeometryCount() takes. Throws std::runtime_error
+/// when a value or a mask is missing, unknown, of the wrong type or out of range, and when a mask does not agree with
+/// its checksum.
 MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks);
 
 /// One bit a pixel, row by row, the first pixel in the highest bit; the last byte is filled up with zeros.

@@ -2,10 +2,13 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include "base/files.h"
 #include "map/map_schema.h"
+#include "map/packed_geometry.h"
 #include "map/sqlite.h"
 #include "visual_localization/map/map_file.h"
 
@@ -17,6 +20,15 @@ using sqlite::Bytes;
 using sqlite::Statement;
 
 Bytes bytesOf(const std::vector<std::uint8_t>& bytes) { return {bytes.data(), bytes.size()}; }
+
+std::optional<map_schema::PackedGeometry> packedGeometry(std::int64_t id, const TrainingImage& image) {
+  if (!image.geometry) return std::nullopt;
+  try {
+    return map_schema::packGeometry(*image.geometry, image.sift.size());
+  } catch (const std::runtime_error& error) {
+    throw sqlite::Error("image " + std::to_string(id) + ": " + error.what());
+  }
+}
 
 sqlite::Database createTables(const std::string& path) {
   sqlite::Database database = sqlite::Database::create(path);
@@ -52,13 +64,14 @@ class MapWriter::Tables {
   void append(const TrainingImage& image) {
     requireStorable(image);
     looks_->write(static_cast<std::int64_t>(poses_.size()), image);
+    if (image.geometry) ++geometry_count_;
     poses_.add(image, image.sift.size());
   }
 
   void finish(const MapHeader& header) {
     // Behind each other in the file, because they are read together when the map is opened.
     for (std::size_t i = 0; i < poses_.size(); ++i) writePose(i);
-    writeMeta(map_schema::toMeta(header));
+    writeMeta(map_schema::toMeta(header, geometry_count_));
     writeMasks(header.sessions);
     looks_.reset();
     pose_row_.reset();
@@ -74,15 +87,18 @@ class MapWriter::Tables {
     explicit Looks(const sqlite::Database& database)
         : features_(database, "INSERT INTO features VALUES(?,?,?,?)"),
           globals_(database, "INSERT INTO globals VALUES(?,?,?,?)"),
-          previews_(database, "INSERT INTO previews VALUES(?,?,?)") {}
+          previews_(database, "INSERT INTO previews VALUES(?,?,?)"),
+          landmarks_(database, "INSERT INTO landmarks VALUES(?,?,?,?)") {}
 
     void write(std::int64_t id, const TrainingImage& image) {
+      const std::optional<map_schema::PackedGeometry> geometry = packedGeometry(id, image);
       const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(image.sift.keypoints());
       const std::vector<std::uint8_t> wgoh = map_schema::packHistogram(image.global.wgoh);
       const std::vector<std::uint8_t> wgii = map_schema::packHistogram(image.global.wgii);
       writeRow(features_, id, {bytesOf(keypoints), bytesOf(image.sift.descriptors())});
       writeRow(globals_, id, {bytesOf(wgoh), bytesOf(wgii)});
       writeRow(previews_, id, {bytesOf(image.preview_jpeg)});
+      if (geometry) writeRow(landmarks_, id, {bytesOf(geometry->pose), bytesOf(geometry->points)});
     }
 
    private:
@@ -97,6 +113,7 @@ class MapWriter::Tables {
     Statement features_;
     Statement globals_;
     Statement previews_;
+    Statement landmarks_;
   };
 
   void requireStorable(const TrainingImage& image) const {
@@ -156,6 +173,7 @@ class MapWriter::Tables {
   std::unique_ptr<Looks> looks_;
   std::unique_ptr<Statement> pose_row_;
   TrainingPoses poses_;
+  std::size_t geometry_count_ = 0;
   map_schema::Checksum checksum_;
 };
 

@@ -8,6 +8,7 @@
 
 #include "base/angles.h"
 #include "map/feature_store.h"
+#include "map/geometry_check.h"
 #include "map/position_index.h"
 
 namespace visual_localization {
@@ -56,6 +57,18 @@ TrainingPoses checked(const MapHeader& header, TrainingPoses poses) {
   return poses;
 }
 
+const std::vector<TrainingImage>& checked(const std::vector<TrainingImage>& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (!images[i].geometry) continue;
+    try {
+      requireUsable(*images[i].geometry, images[i].sift.size());
+    } catch (const std::runtime_error& error) {
+      refuse(i, error.what());
+    }
+  }
+  return images;
+}
+
 Area boundingBox(const std::vector<Eigen::Vector2d>& positions_m) {
   Area area{positions_m.front(), positions_m.front()};
   for (const Eigen::Vector2d& position : positions_m) {
@@ -93,7 +106,7 @@ TrainingPoses posesOf(const std::vector<TrainingImage>& images) {
 TrainingMap::TrainingMap(MapHeader header, std::vector<TrainingImage> images)
     : header_(std::move(header)),
       frame_(header_.datum),
-      poses_(checked(header_, posesOf(images))),
+      poses_(checked(header_, posesOf(checked(images)))),
       store_(std::make_unique<MemoryFeatureStore>(std::move(images))),
       area_(boundingBox(poses_.positions_m)),
       index_(std::make_unique<const PositionIndex>(poses_.positions_m)) {}
@@ -114,6 +127,10 @@ std::shared_ptr<const GlobalFeatures> TrainingMap::global(std::size_t i) const {
 
 std::vector<std::uint8_t> TrainingMap::preview(std::size_t i) const { return store_->preview(i); }
 
+std::shared_ptr<const ImageGeometry> TrainingMap::geometry(std::size_t i) const { return store_->geometry(i); }
+
+std::size_t TrainingMap::geometryCount() const { return store_->geometryCount(); }
+
 std::size_t TrainingMap::globalsKept() const { return store_->globalsKept(); }
 
 TrainingPose TrainingMap::pose(std::size_t i) const {
@@ -122,7 +139,11 @@ TrainingPose TrainingMap::pose(std::size_t i) const {
 
 TrainingImage TrainingMap::image(std::size_t i) const {
   const TrainingPose taken_at = pose(i);  // GCC 9 and 10 crash at an unnamed one
-  return {taken_at, *store_->sift(i), *store_->global(i), store_->preview(i)};
+  TrainingImage image{taken_at, *store_->sift(i), *store_->global(i), store_->preview(i)};
+  const std::shared_ptr<const ImageGeometry> geometry = store_->geometry(i);
+  // Features that cannot be read count as none, and landmarks belong to features.
+  if (geometry && image.sift.size() == featureCount(i)) image.geometry = *geometry;
+  return image;
 }
 
 Neighbour TrainingMap::nearest(const Eigen::Vector2d& position_m) const { return index_->nearest(position_m); }

@@ -9,6 +9,14 @@
 namespace visual_localization {
 namespace {
 
+/// Landmarks of features that are there; a camera that looks somewhere.
+void requireFitting(const ImageGeometry& geometry, std::size_t features) {
+  if (!geometry.camera.ahead().allFinite() || !geometry.covariance.allFinite()) fuzz::fail("a camera is nowhere");
+  for (const SeenLandmark& landmark : geometry.landmarks) {
+    if (landmark.feature >= features || !landmark.offset_m.allFinite()) fuzz::fail("a landmark that cannot be");
+  }
+}
+
 /// What a localizer asks a map for.
 void use(const TrainingMap& map) {
   constexpr std::size_t kMost = 20;
@@ -16,7 +24,9 @@ void use(const TrainingMap& map) {
     const TrainingImage image = map.image(i);
     if (map.nearest(image.position_m).image >= map.size()) fuzz::fail("an image that there is not");
     if (image.sift.keypoints().size() != image.sift.size()) fuzz::fail("features do not fit together");
+    if (image.geometry) requireFitting(*image.geometry, image.sift.size());
   }
+  if (map.geometryCount() > map.size()) fuzz::fail("more images with landmarks than there are");
   map.nearest(map.area().min_m, 3);
 }
 

@@ -145,12 +145,29 @@ class Editor {
 };
 
 std::string anySql(Random& random) {
-  static const std::array<const char*, 18> kColumns{
-      "images.id",      "images.session",       "images.stamp_ns",    "images.east_m",        "images.north_m",
-      "images.yaw_rad", "images.feature_count", "features.keypoints", "features.descriptors", "features.image",
-      "globals.wgoh",   "globals.wgii",         "previews.jpeg",      "previews.image",       "meta.key",
-      "meta.value",     "masks.session",        "masks.bits"};
-  static const std::array<const char*, 18> kValues{"0",
+  static const std::array<const char*, 22> kColumns{"images.id",
+                                                    "images.session",
+                                                    "images.stamp_ns",
+                                                    "images.east_m",
+                                                    "images.north_m",
+                                                    "images.yaw_rad",
+                                                    "images.feature_count",
+                                                    "features.keypoints",
+                                                    "features.descriptors",
+                                                    "features.image",
+                                                    "globals.wgoh",
+                                                    "globals.wgii",
+                                                    "previews.jpeg",
+                                                    "previews.image",
+                                                    "meta.key",
+                                                    "meta.value",
+                                                    "landmarks.pose",
+                                                    "landmarks.points",
+                                                    "landmarks.image",
+                                                    "landmarks.crc32",
+                                                    "masks.session",
+                                                    "masks.bits"};
+  static const std::array<const char*, 21> kValues{"0",
                                                    "1",
                                                    "-1",
                                                    "9223372036854775807",
@@ -164,11 +181,14 @@ std::string anySql(Random& random) {
                                                    "x''",
                                                    "x'00'",
                                                    "zeroblob(16)",
+                                                   "zeroblob(140)",
+                                                   "zeroblob(20)",
+                                                   "randomblob(40)",
                                                    "zeroblob(512)",
                                                    "zeroblob(100000)",
                                                    "randomblob(128)",
                                                    "1e5"};
-  static const std::array<const char*, 16> kOthers{
+  static const std::array<const char*, 20> kOthers{
       "CREATE VIEW v AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) SELECT i FROM n",
       "CREATE TRIGGER t AFTER INSERT ON images BEGIN DELETE FROM meta; END",
       "CREATE INDEX i ON images(abs(session))",
@@ -182,6 +202,10 @@ std::string anySql(Random& random) {
       "DELETE FROM images WHERE id = (SELECT max(id) FROM images)",
       "DELETE FROM features",
       "DROP TABLE previews",
+      "DELETE FROM landmarks",
+      "INSERT OR REPLACE INTO landmarks SELECT image + 1, pose, points, 0 FROM landmarks",
+      "UPDATE landmarks SET pose = CAST(substr(pose, 1, 56) || randomblob(84) AS BLOB)",
+      "UPDATE landmarks SET points = CAST(points || points AS BLOB)",
       "PRAGMA page_size = 1024; VACUUM",
       "PRAGMA auto_vacuum = FULL; VACUUM",
       "PRAGMA encoding = 'UTF-16'; VACUUM"};
@@ -244,6 +268,8 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
       editor.repairRows("SELECT image, wgoh, wgii FROM globals", 2, "UPDATE globals SET crc32 = ? WHERE image = ?");
       editor.repairRows("SELECT image, jpeg FROM previews", 1, "UPDATE previews SET crc32 = ? WHERE image = ?");
       editor.repairMasks();
+      editor.repairRows("SELECT image, pose, points FROM landmarks", 2,
+                        "UPDATE landmarks SET crc32 = ? WHERE image = ?");
       editor.repairChecksum();
     }
     if (std::vector<std::uint8_t> changed = editor.bytes(); !changed.empty()) bytes = std::move(changed);

@@ -192,6 +192,7 @@ TEST_F(HostileMap, LinesInValuesAreShownInOne) {
 TEST_F(HostileMap, ValuesLargerThanAnyRowAreRefused) {
   for (const char* sql : {"UPDATE features SET keypoints = zeroblob(160000000) WHERE image = 3",
                           "UPDATE previews SET jpeg = zeroblob(160000000) WHERE image = 3",
+                          "UPDATE landmarks SET points = zeroblob(160000000) WHERE image = 4",
                           "UPDATE meta SET value = zeroblob(160000000) WHERE key = 'package_version'"}) {
     restore();
     tamper(sql);
@@ -217,7 +218,7 @@ TEST_F(HostileMap, ASchemaWithoutEndIsRefused) {
       std::string{39, 9, 6, 23, 59, 21, 1, 0} + "index" + name + "meta" + static_cast<char>(rootOf("meta"));
   Pages pages(path_);
   std::string tables = pages.page(1);
-  tables.replace(0, 8 + 2 * 6, tables.substr(100, 8 + 2 * 6));  // of another page, the header stands at its beginning
+  tables.replace(0, 8 + 2 * 7, tables.substr(100, 8 + 2 * 7));  // of another page, the header stands at its beginning
   const std::size_t first = pages.append(tables);
   std::string leaf(kPage, '\0');
   leaf[0] = 13;

@@ -33,7 +33,8 @@ bool same(const TrainingImage& a, const TrainingImage& b) {
          a.sift.descriptors() == b.sift.descriptors() && a.sift.size() == b.sift.size() &&
          (keypoint_bytes == 0 ||
           std::memcmp(a.sift.keypoints().data(), b.sift.keypoints().data(), keypoint_bytes) == 0) &&
-         a.global.wgoh == b.global.wgoh && a.global.wgii == b.global.wgii && a.preview_jpeg == b.preview_jpeg;
+         a.global.wgoh == b.global.wgoh && a.global.wgii == b.global.wgii && a.preview_jpeg == b.preview_jpeg &&
+         test::same(a.geometry, b.geometry);
 }
 
 class LargeMap : public testing::Test {
@@ -76,6 +77,8 @@ class LargeMap : public testing::Test {
       EXPECT_TRUE(sift->empty() || sift->descriptors() == images_[i].sift.descriptors()) << i;
       EXPECT_TRUE(global->wgoh == GlobalFeatures().wgoh || global->wgoh == images_[i].global.wgoh) << i;
       map.preview(i);
+      const auto geometry = map.geometry(i);
+      EXPECT_TRUE(!geometry || test::same(*geometry, images_[i].geometry)) << i;
     }
   }
 
@@ -113,6 +116,10 @@ TEST_F(LargeMap, ServesEightThreads) {
         const std::size_t i = any(random);
         if (map->sift(i)->descriptors() != images_[i].sift.descriptors()) ++wrong;
         if (map->global(i)->wgii != images_[i].global.wgii) ++wrong;
+        if (const auto geometry = map->geometry(i); (geometry != nullptr) != images_[i].geometry.has_value() ||
+                                                    (geometry && !test::same(*geometry, images_[i].geometry))) {
+          ++wrong;
+        }
         if (round % 16 == 0 && map->preview(i) != images_[i].preview_jpeg) ++wrong;
       }
     });
@@ -127,17 +134,48 @@ TEST_F(LargeMap, DamagedFeaturesCountAsNoneAndAreNamedOnce) {
   tamper("DELETE FROM features WHERE image = 5");
   tamper("UPDATE globals SET wgoh = x'00' WHERE image = 6");
   tamper("UPDATE previews SET jpeg = x'00' WHERE image = 7");
+  tamper("UPDATE landmarks SET points = zeroblob(500) WHERE image = 8");
   const auto map = open();
   for (int round = 0; round < 2; ++round) {
     for (const std::size_t i : {3U, 4U, 5U}) EXPECT_TRUE(map->sift(i)->empty()) << i;
     EXPECT_EQ(map->global(6)->wgoh, GlobalFeatures().wgoh);
     EXPECT_TRUE(map->preview(7).empty());
-    EXPECT_TRUE(same(map->image(8), images_[8]));
+    EXPECT_EQ(map->geometry(8), nullptr);
+    EXPECT_FALSE(map->image(4).geometry) << "its features are gone";
+    EXPECT_TRUE(same(map->image(10), images_[10]));
   }
   ASSERT_EQ(warnings_.size(), 1U);
   EXPECT_THAT(warnings_.front(), AllOf(StartsWith(path_), HasSubstr("features of image 3"), HasSubstr("checksum")));
   EXPECT_THROW(checkMap(path_), MapStoreError);
   EXPECT_THROW(open(std::numeric_limits<std::size_t>::max()), MapStoreError) << "read as a whole it is refused";
+}
+
+TEST_F(LargeMap, DamagedLandmarksCountAsNoneAndAreNamedOnce) {
+  tamper("UPDATE landmarks SET points = zeroblob(500) WHERE image = 4");
+  tamper("UPDATE landmarks SET pose = x'00' WHERE image = 5");
+  const auto map = open();
+  EXPECT_EQ(map->geometryCount(), 40U);
+  for (int round = 0; round < 2; ++round) {
+    EXPECT_EQ(map->geometry(3), nullptr) << "it has none";
+    EXPECT_EQ(warnings_.size(), static_cast<std::size_t>(round));
+    EXPECT_EQ(map->geometry(4), nullptr);
+    EXPECT_EQ(map->geometry(5), nullptr);
+    EXPECT_EQ(map->sift(4)->descriptors(), images_[4].sift.descriptors());
+    EXPECT_TRUE(same(map->image(7), images_[7]));
+  }
+  ASSERT_EQ(warnings_.size(), 1U);
+  EXPECT_THAT(warnings_.front(), AllOf(StartsWith(path_), HasSubstr("landmarks of image 4"), HasSubstr("checksum")));
+  EXPECT_THROW(checkMap(path_), MapStoreError);
+}
+
+TEST_F(LargeMap, LandmarksShareTheCache) {
+  const auto map = open(20 * kKilobyte);
+  const auto used = map->geometry(7);
+  EXPECT_EQ(map->geometry(7), used) << "kept";
+  expectAllSame(*map);
+  EXPECT_NE(map->geometry(7), used) << "no longer kept";
+  EXPECT_TRUE(test::same(*used, images_[7].geometry)) << "but still in use";
+  EXPECT_NE(open(0)->geometry(7), nullptr);
 }
 
 TEST_F(LargeMap, AnImageWithOtherThanItsPlacesNumberOfFeaturesCountsAsDamaged) {

@@ -40,12 +40,14 @@ void expectSame(const TrainingMap& a, const TrainingMap& b) {
   EXPECT_EQ(a.header().sift.contrast_threshold, b.header().sift.contrast_threshold);
   EXPECT_EQ(a.header().sift.max_features, b.header().sift.max_features);
   ASSERT_EQ(a.size(), b.size());
+  EXPECT_EQ(a.geometryCount(), b.geometryCount());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a.image(i).stamp_ns, b.image(i).stamp_ns);
     EXPECT_EQ(a.image(i).session, b.image(i).session);
     EXPECT_EQ(a.image(i).position_m, b.image(i).position_m);
     EXPECT_EQ(a.image(i).yaw_rad, b.image(i).yaw_rad);
     EXPECT_EQ(a.image(i).preview_jpeg, b.image(i).preview_jpeg);
+    EXPECT_TRUE(test::same(a.image(i).geometry, b.image(i).geometry)) << i;
     EXPECT_EQ(a.image(i).global.wgoh, b.image(i).global.wgoh);
     EXPECT_EQ(a.image(i).global.wgii, b.image(i).global.wgii);
     EXPECT_EQ(a.image(i).sift.descriptors(), b.image(i).sift.descriptors());
@@ -265,7 +267,7 @@ TEST_F(MapStore, MasksOfAWrongSizeAreRefused) {
   }
 }
 
-TEST_F(MapStore, MapsOfVersion3HaveNoCameras) {
+TEST_F(MapStore, MapsOfVersion3HaveNoCamerasAndNoLandmarks) {
   const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/pages_of_2048.map";
   EXPECT_EQ(originOf(old).schema_version, 3);
   const auto map = loadMap(old);
@@ -273,6 +275,10 @@ TEST_F(MapStore, MapsOfVersion3HaveNoCameras) {
   for (const Session& session : map->header().sessions) {
     EXPECT_FALSE(session.camera);
     EXPECT_TRUE(session.mask.empty());
+  }
+  for (const auto& opened : {map, loadMap(old, {0, [](const std::string& reason) { FAIL() << reason; }})}) {
+    EXPECT_FALSE(opened->hasGeometry());
+    EXPECT_EQ(opened->geometry(0), nullptr);
   }
   EXPECT_NO_THROW(checkMap(old));
   // Saved again it is a map of today.
@@ -283,8 +289,12 @@ TEST_F(MapStore, MapsOfVersion3HaveNoCameras) {
 
 TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
   tamper("PRAGMA user_version = 3");
+  EXPECT_THAT(refusal(path_), HasSubstr("unexpected table 'landmarks'"));
+  tamper("DROP TABLE landmarks");
   EXPECT_THAT(refusal(path_), HasSubstr("unexpected table 'masks'"));
   tamper("DROP TABLE masks");
+  EXPECT_THAT(refusal(path_), HasSubstr("'geometry/images' is unknown"));
+  tamper("DELETE FROM meta WHERE key = 'geometry/images'");
   EXPECT_THAT(refusal(path_), HasSubstr("'session/0/camera/cx' is unknown"));
   tamper("PRAGMA user_version = 4");
   EXPECT_THAT(refusal(path_), HasSubstr("its schema has an unexpected table"));

@@ -31,6 +31,22 @@ TEST(TrainingMap, OneImageIsNearestToEverything) {
   EXPECT_TRUE(map.area().range().isZero());
 }
 
+TEST(TrainingMap, KnowsWhichImagesHaveAGeometry) {
+  std::vector<TrainingImage> images = test::exampleImages(4, 6);
+  EXPECT_FALSE(mapAt({{3.0, 4.0}}).hasGeometry());
+  const TrainingMap map(test::exampleHeader(), images);
+  EXPECT_EQ(map.geometryCount(), 2U);
+  EXPECT_EQ(map.geometry(3), nullptr);
+  ASSERT_NE(map.geometry(2), nullptr);
+  EXPECT_TRUE(test::same(*map.geometry(2), images[2].geometry));
+}
+
+TEST(TrainingMap, RefusesLandmarksOfFeaturesThatAreNotThere) {
+  std::vector<TrainingImage> images = test::exampleImages(4, 6);
+  images[1].geometry->landmarks.back().feature = 6;
+  EXPECT_THROW(TrainingMap(test::exampleHeader(), images), std::invalid_argument);
+}
+
 TEST(TrainingMap, FirstOfEquallyDistantImagesComesFirst) {
   const TrainingMap map = mapAt({{1.0, 0.0}, {-1.0, 0.0}, {0.0, 1.0}, {0.0, -1.0}});
   std::vector<std::size_t> order;

@@ -16,6 +16,7 @@ struct Fix {
   std::int64_t stamp_ns = 0;  ///< nanoseconds since the epoch of the recording
   GeodeticPoint position;     ///< may hold NaN when there is no fix
   bool has_fix = false;       ///< the receiver's own claim
+  double sigma_m = 0.0;       ///< horizontal standard deviation per axis by the receiver's own claim; 0: none
 };
 
 }  // namespace visual_localization

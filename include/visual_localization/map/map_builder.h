@@ -14,23 +14,27 @@
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
+#include "visual_localization/geometry/geometry_config.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 
 class ExtractionPool;
 class ImageSpool;
+struct MapFix;
 struct RawImage;
 
 /// How a recording becomes training images.
 struct MapBuilderConfig {
   double min_spacing_m = 0.0;
+  double spacing_m = 0.0;
   bool prune = true;
   int preview_width_px = 80;
   std::string sift_backend = kNativeSift;
   SiftConfig sift;
   MatchConfig match;
   TrajectoryCleanerConfig trajectory;
+  GeometryConfig geometry;
 
   void declare(ParameterVisitor& visitor);
 };
@@ -41,6 +45,19 @@ struct SessionCamera {
   Mask mask = {};                         ///< features under it are not used; empty: all are
 };
 
+/// What the adjustment of a session came to; all zero when its camera is not calibrated.
+struct SessionLandmarks {
+  std::size_t images = 0;  ///< with a pose and landmarks
+  std::size_t landmarks = 0;
+  std::size_t sightings = 0;             ///< features that show one
+  bool contradicts_calibration = false;  ///< then the session has places only
+  double focal_scale = 1.0;              ///< what the images say the focal length is, as a share of the calibration's
+  double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
+  double mean_shift_m = 0.0;             ///< of these images from the cleaned path
+  double largest_shift_m = 0.0;
+  double far_share = 0.0;  ///< of all images: moved by more than 3 m
+};
+
 /// What one session brought.
 struct SessionImages {
   std::string name;
@@ -48,6 +65,7 @@ struct SessionImages {
   std::vector<Eigen::Vector2d> positions_m;  ///< of those kept
   cv::Size recorded;  ///< size of its first image, pixels; the map's is that of the first session
   SessionCamera camera;
+  SessionLandmarks geometry = {};  ///< complete when the map is built
 };
 
 /// A map is flat: farther from its datum north and lengths are wrong by more than a degree and a part in 8000.
@@ -58,6 +76,7 @@ struct MapBuildReport {
   std::size_t images_kept = 0;
   std::size_t images_without_position = 0;  ///< before the first or after the last believable fix
   std::size_t images_too_close = 0;         ///< nearer than min_spacing_m
+  std::size_t images_thinned = 0;           ///< after the adjustment: nearer than spacing_m
   std::size_t images_disordered = 0;        ///< stamp not after the one before
   std::size_t images_unusable = 0;          ///< could not be decoded, or too small
   std::size_t features_extracted = 0;
@@ -104,16 +123,21 @@ class MapBuilder {
   using Sink = std::function<void(const TrainingImage& image)>;
   void fitCamera(cv::Size recorded);
   void extractWaiting();
-  void prune(const Sink& sink, const Progress& progress);
+  void finish(const Sink& sink, const Progress& progress);
+  void prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress);
+  void addGeometry(const TrainingMap& pruned, const Sink& sink, const Progress& progress);
+  bool hasCalibratedSession() const;
 
   MapBuilderConfig config_;
+  MapBuilderResources resources_;
   MapBuildReport report_;
   std::optional<LocalFrame> frame_;
   MapHeader header_;
   std::unique_ptr<ExtractionPool> extraction_;
   std::vector<RawImage> waiting_;  ///< for extraction
   std::size_t most_waiting_;
-  std::unique_ptr<ImageSpool> spool_;  ///< not pruned yet
+  std::unique_ptr<ImageSpool> spool_;       ///< not pruned yet
+  std::vector<std::vector<MapFix>> fixes_;  ///< of each session
   std::optional<std::int64_t> last_stamp_ns_;
   std::optional<Eigen::Vector2d> last_kept_m_;
 };

@@ -16,6 +16,7 @@
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geo/local_frame.h"
+#include "visual_localization/geometry/image_geometry.h"
 
 namespace visual_localization {
 
@@ -32,9 +33,10 @@ struct TrainingPose {
 
 /// One image of the map: where it was taken and what it looked like.
 struct TrainingImage : TrainingPose {
-  SiftFeatures sift;                       ///< after pruning
-  GlobalFeatures global;                   ///< of the whole image
-  std::vector<std::uint8_t> preview_jpeg;  ///< small grey JPEG for people; may be empty
+  SiftFeatures sift;                           ///< after pruning
+  GlobalFeatures global;                       ///< of the whole image
+  std::vector<std::uint8_t> preview_jpeg;      ///< small grey JPEG for people; may be empty
+  std::optional<ImageGeometry> geometry = {};  ///< none: the camera is not calibrated, or the adjustment left it out
 };
 
 /// Where the images of a map were taken, image by image: 40 bytes each, all that is always in memory of a large map.
@@ -86,10 +88,12 @@ struct Neighbour {
 class TrainingMap {
  public:
   /// A map that is all in memory. Throws std::invalid_argument, in one line, when there is no image, the image size is
-  /// not positive, a position or heading is not finite, a session index is out of range or a camera or mask is not for
-  /// images of the map's size.
+  /// not positive, a position or heading is not finite, a session index is out of range, a camera or mask is not for
+  /// images of the map's size, or a geometry cannot be: numbers that are not finite, a rotation that is not of unit
+  /// length, a covariance that is not symmetric and positive semi-definite, a landmark more than 100 km away, features
+  /// that the image does not have or that are not in order.
   TrainingMap(MapHeader header, std::vector<TrainingImage> images);
-  /// A map whose images' looks are in `store`. Throws like the other one.
+  /// A map whose images' looks are in `store`, which answers for their geometry. Throws like the other one.
   TrainingMap(MapHeader header, TrainingPoses poses, std::unique_ptr<const FeatureStore> store);
   ~TrainingMap();
   TrainingMap(const TrainingMap&) = delete;
@@ -113,9 +117,15 @@ class TrainingMap {
   std::shared_ptr<const SiftFeatures> sift(std::size_t i) const;
   std::shared_ptr<const GlobalFeatures> global(std::size_t i) const;
   std::vector<std::uint8_t> preview(std::size_t i) const;
+  /// Its camera's pose and landmarks; null when it has none. The features of the landmarks are below featureCount(i);
+  /// compare with the size of sift(i), which has none when its own row is damaged.
+  std::shared_ptr<const ImageGeometry> geometry(std::size_t i) const;
+  /// How many images have a geometry, and whether any has; known without reading it.
+  std::size_t geometryCount() const;
+  bool hasGeometry() const { return geometryCount() > 0; }
   /// How many images' global features can be in memory at a time; more than any map has when all of them are.
   std::size_t globalsKept() const;
-  /// Everything about it, copied.
+  /// Everything about it, copied; without geometry when its features cannot be read.
   TrainingImage image(std::size_t i) const;
 
   /// i_M(x) of Kronfeld et al. (journal), Eq. 3: the training image nearest to `position_m`, the first of equals.

@@ -1,0 +1,54 @@
+#include "survey/landmark_survey.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "base/statistics.h"
+#include "map/packed_geometry.h"
+
+namespace visual_localization {
+namespace {
+
+/// Counts different numbers in memory for no more than twice as many.
+class DifferentNumbers {
+ public:
+  void add(std::uint32_t number) {
+    if (numbers_.size() >= most_) most_ = std::max(most_, 2 * count());
+    numbers_.push_back(number);
+  }
+
+  std::size_t count() {
+    std::sort(numbers_.begin(), numbers_.end());
+    numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
+    return numbers_.size();
+  }
+
+ private:
+  std::vector<std::uint32_t> numbers_;
+  std::size_t most_ = std::size_t{1} << 20U;
+};
+
+}  // namespace
+
+LandmarkSurvey landmarkSurvey(const TrainingMap& map, std::size_t most_images) {
+  LandmarkSurvey survey;
+  survey.images = map.geometryCount();
+  if (survey.images == 0) return survey;
+  const std::size_t stride = (map.size() - 1) / most_images + 1;
+  std::vector<std::size_t> counts;
+  DifferentNumbers ids;
+  for (std::size_t i = 0; i < map.size(); i += stride) {
+    const auto geometry = map.geometry(i);
+    if (!geometry) continue;
+    counts.push_back(geometry->landmarks.size());
+    survey.bytes += map_schema::kPoseBytes + counts.back() * map_schema::landmarkBytes(map.featureCount(i));
+    for (const SeenLandmark& landmark : geometry->landmarks) ids.add(landmark.id);
+  }
+  survey.images_read = counts.size();
+  if (!counts.empty()) survey.median = upperMedian(counts);
+  if (stride == 1) survey.landmarks = ids.count();
+  return survey;
+}
+
+}  // namespace visual_localization
