@@ -233,9 +233,15 @@ std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) 
   return methods;
 }
 
+/// As in the papers: recorded images are known by their scores, which say nothing about landmarks.
+MapBuilderConfig placesOnly() {
+  MapBuilderConfig config;
+  config.geometry.enabled = false;
+  return config;
+}
+
 template <class Config>
-Config configured(YamlMap& yaml, const std::string& key) {
-  Config config;
+Config configured(YamlMap& yaml, const std::string& key, Config config = {}) {
   try {
     assignParameters(config, yaml.parameters(key));
   } catch (const ParameterError& error) {
@@ -255,7 +261,7 @@ Experiment parse(YamlMap yaml) {
   experiment.pairs = readPairs(yaml, experiment.rounds);
   if (yaml.text("starts", "all") != "all") experiment.starts = yaml.count("starts", 0, 1, kMostStarts);
   experiment.trace_start = yaml.count("trace_start", 0, 0, kMostStarts);
-  experiment.map = configured<MapBuilderConfig>(yaml, "map_parameters");
+  experiment.map = configured(yaml, "map_parameters", placesOnly());
   experiment.front_end = configured<LocalizerConfig>(yaml, "parameters");
   experiment.methods = readMethods(yaml, experiment.front_end);
   yaml.requireNoMore();

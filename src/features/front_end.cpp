@@ -127,6 +127,13 @@ const GlobalFeatures& FrontEnd::global() {
   return *global_;
 }
 
+const SiftFeatures& FrontEnd::unprunedSift() {
+  const Stopwatch stopwatch;
+  const SiftFeatures& all = unprunedSift(*current_);
+  extract_ms_ += stopwatch.elapsed_ms();
+  return all;
+}
+
 const SiftFeatures& FrontEnd::unprunedSift(Image& image) {
   if (image.has_sift) return image.sift;
   sift_extractor_->extract(image.grey, image.sift);

@@ -102,6 +102,13 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   return result;
 }
 
+void Dpso::attract(const Eigen::Vector2d& position_m) {
+  attractor_m_ = position_m;
+  position_unknown_ = false;
+  bad_images_ = 0;
+  if (tuning_.recovering) endRecovery();
+}
+
 /// The first particles are the quantum ones, the last the high-energy ones, so that a growing quantum share
 /// takes from the standard ones.
 void Dpso::assignKinds() {

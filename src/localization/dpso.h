@@ -20,6 +20,7 @@ class Dpso final : public Tracker {
   /// What has adapted itself to the images stays, unless just that was changed.
   void configure(const TrackerConfig& config) override;
   TrackerEstimate update(const TrackerInput& input) override;
+  void attract(const Eigen::Vector2d& position_m) override;
   const std::vector<Particle>& particles() const override { return particles_; }
   TrackerTuning tuning() const override { return tuning_; }
 

@@ -1,12 +1,24 @@
 #include "visual_localization/localization/localizer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+
 #include "base/time.h"
+#include "localization/pose_verifier.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
+
+double Estimate::sigma_m() const {
+  if (metric) return metric->sigma_m();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(pose.covariance_m2, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
+}
+
+double Estimate::sigmaYaw_rad() const { return metric ? metric->sigmaYaw_rad() : std::sqrt(pose.yaw_variance_rad2); }
 
 Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
     : Localizer(
@@ -25,7 +37,10 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept()),
       tracker_(makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed))),
       choice_(config_.features, config_.hybrid),
-      assessor_(config_.state) {}
+      assessor_(config_.state),
+      verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric)) {}
+
+Localizer::~Localizer() = default;
 
 Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
@@ -38,11 +53,13 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   scores_.startImage(choice_.next(), [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
   sweep_.startImage();
   const TrackerEstimate tracked = tracker_->update({scores_, sweep_});
-  const Evidence evidence = verify(tracked);
+  const std::optional<MetricPose> metric = solvePose(stamp_ns, tracked);
+  Evidence evidence = verify(tracked);
+  if (isMetric()) evidence.verified = metric && metric->confirmed;
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
 
-  last_ = estimateOf(stamp_ns, tracked, evidence, state);
+  last_ = estimateOf(stamp_ns, tracked, metric, evidence, state);
   return answer(stopwatch.elapsed_ms());
 }
 
@@ -52,18 +69,24 @@ bool Localizer::isRepetition(std::int64_t stamp_ns) const {
   return config_.state.frozen_images > 0 || last_->stamp_ns == stamp_ns;
 }
 
-Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const Evidence& evidence,
+Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked,
+                               const std::optional<MetricPose>& metric, const Evidence& evidence,
                                LocalizationState state) {
   Estimate estimate;
   estimate.stamp_ns = stamp_ns;
   estimate.state = state;
   estimate.pose = poseOf(tracked, state);
+  estimate.metric = metric;
+  estimate.source = metric ? PoseSource::kMetric : tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
+  estimate.images_since_metric = verifier_->imagesSince();
   estimate.tracked = tracked;
+  choosePose(stamp_ns, estimate);
   estimate.evidence = evidence;
   estimate.motion_residual_m = assessor_.motionResidual_m();
   estimate.comparisons = scores_.comparisons();
   estimate.swept = scores_.swept();
   estimate.image = image_->report();
+  estimate.image.match_ms += geometry_ms_;
   return estimate;
 }
 
@@ -119,6 +142,55 @@ Evidence Localizer::verify(const TrackerEstimate& tracked) {
   return evidence;
 }
 
+bool Localizer::isMetric() const { return config_.metric.pose_source == "metric" && camera_ && map_->hasGeometry(); }
+
+/// The swarm proposes, geometry disposes: a verified pose is where the next image is searched.
+std::optional<MetricPose> Localizer::solvePose(std::int64_t stamp_ns, const TrackerEstimate& tracked) {
+  geometry_ms_ = 0.0;
+  if (!isMetric()) return std::nullopt;
+  const Stopwatch stopwatch;
+  const double extracted_ms = image_->report().extract_ms;
+  std::optional<MetricPose> pose = verifier_->verify(stamp_ns, *image_, scores_, *camera_);
+  geometry_ms_ = stopwatch.elapsed_ms() - (image_->report().extract_ms - extracted_ms);
+  if (!pose) return pose;
+  const Eigen::Vector2d position_m = pose->camera.position_m.head<2>();
+  tracker_->attract(position_m);
+  if (pose->confirmed && (tracked.position_m - position_m).norm() > config_.state.max_step_m) {
+    tracker_->reset(normallyDistributed(position_m, Eigen::Matrix2d::Identity()));
+  }
+  return pose;
+}
+
+/// The solved pose; without one where the motion so far leads to, if the tracker is not elsewhere; or what the tracker
+/// has.
+void Localizer::choosePose(std::int64_t stamp_ns, Estimate& estimate) const {
+  if (estimate.metric) {
+    estimate.pose = poseOf(*estimate.metric);
+    estimate.source = PoseSource::kMetric;
+    return;
+  }
+  estimate.source = estimate.tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
+  const std::optional<PredictedPose> predicted = isMetric() ? verifier_->predicted(stamp_ns) : std::nullopt;
+  if (!predicted) return;
+  if ((predicted->position_m - estimate.pose.position_m).norm() > config_.state.max_distance_m) return;
+  estimate.pose.position_m = predicted->position_m;
+  estimate.pose.yaw_rad = predicted->yaw_rad;
+  estimate.pose.geodetic = map_->frame().toGeodetic(predicted->position_m);
+  estimate.source = PoseSource::kNone;
+}
+
+/// Map and pose together.
+PoseEstimate Localizer::poseOf(const MetricPose& metric) const {
+  PoseEstimate pose;
+  pose.position_m = metric.camera.position_m.head<2>();
+  pose.yaw_rad = metric.camera.yaw_rad();
+  const MetricPose::Covariance covariance = metric.covariance + metric.map_covariance;
+  pose.covariance_m2 = covariance.topLeftCorner<2, 2>();
+  pose.yaw_variance_rad2 = covariance(5, 5);
+  pose.geodetic = map_->frame().toGeodetic(pose.position_m);
+  return pose;
+}
+
 /// While the images confirm the position the covariance is that of its mode; otherwise that of the whole cloud
 /// about it, so that nothing downstream trusts a guess.
 PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) {
@@ -142,6 +214,7 @@ void Localizer::configure(const LocalizerConfig& config) {
   if (config_.sweep_images != before.sweep_images) sweep_.configure(static_cast<std::size_t>(config_.sweep_images));
   choice_.configure(config_.features, config_.hybrid);
   assessor_.configure(config_.state);
+  verifier_->configure(config_.metric);
   configureTracker(before.tracker);
   last_.reset();
 }
@@ -183,6 +256,7 @@ void Localizer::relocalize(const Prior& prior) {
 void Localizer::forgetEvidence() {
   choice_.reset();
   assessor_.reset();
+  verifier_->reset();
   last_.reset();
 }
 
@@ -190,7 +264,7 @@ LocalizationState Localizer::doubt() {
   const LocalizationState state = assessor_.doubt(tracker_->tuning().recovering);
   if (last_) {
     last_->state = state;
-    last_->pose = poseOf(last_->tracked, state);
+    if (!last_->metric) last_->pose = poseOf(last_->tracked, state);
   }
   return state;
 }

@@ -36,6 +36,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   hybrid.declare(visitor);
   fitness.declare(visitor);
   state.declare(visitor);
+  metric.declare(visitor);
   dpso.declare(visitor);
   pf.declare(visitor);
 }

@@ -66,6 +66,15 @@ TrackerEstimate ParticleFilter::update(const TrackerInput& input) {
 }
 
 /// Low-variance resampling: one random offset, then equal steps through the cumulated weights.
+/// As one more likelihood, as wide as the one beside the recorded path.
+void ParticleFilter::attract(const Eigen::Vector2d& position_m) {
+  const double sigma_m = fitness_config_.distance_sigma_m;
+  for (Particle& particle : particles_) {
+    particle.weight *= std::exp(-0.5 * (particle.position_m - position_m).squaredNorm() / (sigma_m * sigma_m));
+  }
+  normaliseWeights(particles_);
+}
+
 void ParticleFilter::resample() {
   const double step = 1.0 / static_cast<double>(particles_.size());
   const double offset = random_.uniform(0.0, step);

@@ -29,6 +29,7 @@ class ParticleFilter final : public Tracker {
   void reset(const Prior& prior) override;
   void configure(const TrackerConfig& config) override;
   TrackerEstimate update(const TrackerInput& input) override;
+  void attract(const Eigen::Vector2d& position_m) override;
   const std::vector<Particle>& particles() const override { return particles_; }
   TrackerTuning tuning() const override { return {}; }
 

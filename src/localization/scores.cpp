@@ -148,6 +148,7 @@ void Scores::startImage(FeatureKind kind, Compare compare) {
   sift_.clear();
   global_.clear();
   comparisons_ = 0;
+  counted_.clear();
 }
 
 Score Scores::operator[](std::size_t training_image) {
@@ -160,6 +161,27 @@ Score Scores::operator[](std::size_t training_image) {
 
 Score Scores::global(std::size_t training_image) {
   return global_.at(FeatureKind::kGlobal, training_image, compare_).score;
+}
+
+std::vector<std::size_t> Scores::mostSimilar() const {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (const Cache::Entry& entry : (kind_ == FeatureKind::kSift ? sift_ : global_).entries()) {
+    if (entry.counted) order.emplace_back(-entry.score.similarity, entry.training_image);
+  }
+  std::sort(order.begin(), order.end());
+  std::vector<std::size_t> images;
+  for (const auto& [similarity, image] : order) images.push_back(image);
+  return images;
+}
+
+void Scores::count(std::size_t training_image) {
+  const auto& compared = sift_.entries();
+  const bool known = kind_ == FeatureKind::kSift &&
+                     std::any_of(compared.begin(), compared.end(), [training_image](const Cache::Entry& entry) {
+                       return entry.counted && entry.training_image == training_image;
+                     });
+  if (known || std::find(counted_.begin(), counted_.end(), training_image) != counted_.end()) return;
+  counted_.push_back(training_image);
 }
 
 std::size_t Scores::swept() const { return global_.size() - (kind_ == FeatureKind::kGlobal ? comparisons_ : 0); }

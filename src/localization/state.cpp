@@ -138,13 +138,13 @@ LocalizationState StateAssessor::doubt(bool recovering) {
 LocalizationState StateAssessor::update(std::int64_t stamp_ns, const TrackerEstimate& estimate,
                                         const Evidence& evidence) {
   remember(stamp_ns, estimate, evidence);
-  const bool certain = isCertain();
+  const bool certain = evidence.verified.value_or(isCertain());
   ever_confirmed_ = ever_confirmed_ || certain;
   // Matched local features are of a mapped place, even while the position is not certain.
   const bool sees_map = lastConfirms() && evidence.features == FeatureKind::kSift;
   if (certain) unconfirmed_ = 0;
   if (!certain && !evidence.blind && !sees_map) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
-  return stateOf(certain, estimate.tuning.recovering);
+  return stateOf(certain, estimate.tuning.recovering && !evidence.verified.value_or(false));
 }
 
 LocalizationState StateAssessor::stateOf(bool certain, bool recovering) const {

@@ -84,6 +84,8 @@ class FrontEnd {
   void setImage(std::int64_t stamp_ns, const cv::Mat& grey);
   /// SIFT features of the image, pruned.
   const SiftFeatures& sift();
+  /// The same before pruning.
+  const SiftFeatures& unprunedSift();
   /// Global features of the image.
   const GlobalFeatures& global();
 

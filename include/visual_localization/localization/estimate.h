@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/localization/metric_pose.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker.h"
@@ -26,15 +27,23 @@ struct Estimate {
   std::int64_t stamp_ns = 0;  ///< of the image
   LocalizationState state = LocalizationState::kInitializing;
   PoseEstimate pose;
-  TrackerEstimate tracked;         ///< what the tracker believes, and the best match
-  Evidence evidence;               ///< what verification says about it
-  double motion_residual_m = 0.0;  ///< see MotionConsistency; of the last estimates
-  std::size_t comparisons = 0;     ///< distinct training images that particles were compared with
-  std::size_t swept = 0;           ///< distinct training images compared beside these, see MapSweep
-  ImageReport image;               ///< statistics, features, times
-  double update_ms = 0.0;          ///< wall-clock time of all but extraction and comparisons
-  std::size_t repeats = 0;         ///< images in a row, this one included, that repeated the one before
-  bool frozen = false;             ///< too many of them: the camera must be broken
+  TrackerEstimate tracked;                ///< what the tracker believes, and the best match
+  Evidence evidence;                      ///< what verification says about it
+  PoseSource source = PoseSource::kNone;  ///< what `pose` rests on
+  std::optional<MetricPose> metric;       ///< solved from landmarks in this image
+  std::size_t images_since_metric = 0;    ///< 0 when this image has one
+  double motion_residual_m = 0.0;         ///< see MotionConsistency; of the last estimates
+  std::size_t comparisons = 0;            ///< distinct training images that particles were compared with
+  std::size_t swept = 0;                  ///< distinct training images compared beside these, see MapSweep
+  ImageReport image;                      ///< statistics, features, times
+  double update_ms = 0.0;                 ///< wall-clock time of all but extraction and comparisons
+  std::size_t repeats = 0;                ///< images in a row, this one included, that repeated the one before
+  bool frozen = false;                    ///< too many of them: the camera must be broken
+
+  /// Standard deviations of position (the larger one, metres) and heading (radians): in relation to the map when the
+  /// pose is metric, otherwise of everything that is not known.
+  double sigma_m() const;
+  double sigmaYaw_rad() const;
 };
 
 }  // namespace visual_localization

@@ -19,6 +19,8 @@
 
 namespace visual_localization {
 
+class PoseVerifier;
+
 /// One image in, one estimate out: the whole method. The nodelet, the offline programs and the experiments all
 /// run through this class. Not thread-safe.
 class Localizer {
@@ -27,6 +29,7 @@ class Localizer {
   Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config);
   /// The same for images that are not live: `image` knows by itself how each compares with the map.
   Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config, std::shared_ptr<QueryImage> image);
+  ~Localizer();
 
   /// `grey`: 8-bit, one channel, at least 16 x 16; resized to the map's size. Throws std::invalid_argument for
   /// anything else, and then nothing has changed. An image that repeats the one before to the last bit is no new
@@ -74,12 +77,16 @@ class Localizer {
 
   FrontEndConfig frontEndConfig() const;
   bool isRepetition(std::int64_t stamp_ns) const;
-  Estimate estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const Evidence& evidence,
-                      LocalizationState state);
+  Estimate estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tracked, const std::optional<MetricPose>& metric,
+                      const Evidence& evidence, LocalizationState state);
   Estimate lastAgain(std::int64_t stamp_ns, double elapsed_ms);
   Estimate answer(double elapsed_ms);
   bool isFrozen() const;
   Evidence verify(const TrackerEstimate& tracked);
+  bool isMetric() const;
+  std::optional<MetricPose> solvePose(std::int64_t stamp_ns, const TrackerEstimate& tracked);
+  PoseEstimate poseOf(const MetricPose& metric) const;
+  void choosePose(std::int64_t stamp_ns, Estimate& estimate) const;
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
   void configureTracker(const std::string& tracker_before);
   void forgetEvidence();
@@ -94,9 +101,11 @@ class Localizer {
   std::unique_ptr<Tracker> tracker_;
   FeatureChoice choice_;
   StateAssessor assessor_;
+  std::unique_ptr<PoseVerifier> verifier_;
   std::vector<Neighbour> neighbours_;  ///< of the last estimate
   std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again
   Repeats repeats_;
+  double geometry_ms_ = 0.0;  ///< of the last image, without the extraction that it brought about
 };
 
 }  // namespace visual_localization

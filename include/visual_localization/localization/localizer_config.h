@@ -5,6 +5,7 @@
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/localization/metric_pose.h"
 #include "visual_localization/localization/score.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker_config.h"
@@ -28,6 +29,7 @@ struct LocalizerConfig : TrackerConfig {
   SimilarityConfig similarity;
   HybridConfig hybrid;
   StateConfig state;
+  MetricConfig metric;
 
   void declare(ParameterVisitor& visitor);
 };

@@ -102,6 +102,8 @@ class QueryImage {
   virtual ImageReport report() const = 0;
   /// Its SIFT features after pruning, if there was a need for them; null otherwise.
   virtual const SiftFeatures* sift() const = 0;
+  /// All its SIFT features, not pruned, extracted if that has not been done; null when it is known by its scores alone.
+  virtual const SiftFeatures* unprunedSift() { return nullptr; }
   /// Holds from the next image on.
   virtual void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) = 0;
 };
@@ -118,6 +120,7 @@ class LiveImage final : public QueryImage {
   std::size_t siftFeatures() override { return front_end_.sift().size(); }
   ImageReport report() const override;
   const SiftFeatures* sift() const override { return front_end_.siftIfExtracted(); }
+  const SiftFeatures* unprunedSift() override { return &front_end_.unprunedSift(); }
   void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) override;
 
  private:
@@ -144,8 +147,12 @@ class Scores {
   /// The score by global features, whatever particles are compared by.
   Score global(std::size_t training_image);
 
-  /// Distinct training images that particles were compared with: the papers' measure of cost.
-  std::size_t comparisons() const { return comparisons_; }
+  /// The training images that particles were compared with, the most similar first.
+  std::vector<std::size_t> mostSimilar() const;
+  /// A training image that was compared otherwise, by SIFT.
+  void count(std::size_t training_image);
+  /// Distinct training images that particles were compared with, and those counted: the papers' measure of cost.
+  std::size_t comparisons() const { return comparisons_ + counted_.size(); }
   /// Distinct training images compared beside these, by global features: see MapSweep.
   std::size_t swept() const;
 
@@ -161,6 +168,7 @@ class Scores {
     explicit Cache(std::size_t training_images) : entry_of_(training_images) {}
     void clear() { entries_.clear(); }
     std::size_t size() const { return entries_.size(); }
+    const std::vector<Entry>& entries() const { return entries_; }
     Entry& at(FeatureKind kind, std::size_t training_image, const Compare& compare);
 
    private:
@@ -173,6 +181,7 @@ class Scores {
   FeatureKind kind_ = FeatureKind::kSift;
   Compare compare_;
   std::size_t comparisons_ = 0;
+  std::vector<std::size_t> counted_;  ///< beside those of the particles
 };
 
 /// Compares the whole map with the current image by global features, when somebody first asks. It tells a lost robot

@@ -55,6 +55,8 @@ struct Evidence {
   FeatureKind features = FeatureKind::kSift;  ///< by which particles were compared
   double place_ratio = 1.0;                   ///< see MapSweep::ratio; 1 when there was no need to ask
   bool blind = false;                         ///< there is hardly anything to see in the image
+  /// Whether landmarks verify the pose; nothing where map or camera do not allow that. Then it alone decides.
+  std::optional<bool> verified = {};
 };
 
 /// Whether the last estimates follow one motion. A robot moves steadily between a few images; an estimate that jumps

@@ -55,6 +55,8 @@ class Tracker {
   virtual void configure(const TrackerConfig& config) = 0;
   /// One image: moves the particles, scores them, estimates.
   virtual TrackerEstimate update(const TrackerInput& input) = 0;
+  /// A verified position of the last image: the next one is searched around it.
+  virtual void attract(const Eigen::Vector2d& position_m) = 0;
   virtual const std::vector<Particle>& particles() const = 0;
   virtual TrackerTuning tuning() const = 0;
 };

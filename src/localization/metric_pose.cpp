@@ -1,0 +1,66 @@
+#include "visual_localization/localization/metric_pose.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+
+namespace visual_localization {
+namespace {
+
+/// Of the horizontal position.
+double largerSigma_m(const MetricPose::Covariance& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance.topLeftCorner<2, 2>(), Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
+}
+
+double yawSigma_rad(const MetricPose::Covariance& covariance) { return std::sqrt(std::max(0.0, covariance(5, 5))); }
+
+}  // namespace
+
+std::string toString(PoseSource source) {
+  switch (source) {
+    case PoseSource::kNone:
+      return "NONE";
+    case PoseSource::kPlace:
+      return "PLACE";
+    case PoseSource::kMetric:
+      return "METRIC";
+  }
+  return "NONE";
+}
+
+void MetricConfig::declare(ParameterVisitor& visitor) {
+  visitor.choice({"pose_source", "",
+                  "metric: solve the pose from landmarks where the map has them; place: that of "
+                  "training images, as in the papers"},
+                 pose_source, {"metric", "place"});
+  visitor.integer({"metric/training_images", "1", "landmarks are taken from this number of training images"},
+                  training_images, 1, 50);
+  visitor.real({"metric/match_ratio", "1", "largest ratio of the angles to the nearest and second nearest"},
+               match_ratio, 0.1, 1.0);
+  visitor.real({"metric/tolerance", "px", "farthest of an inlier from the projection of its landmark"}, tolerance_px,
+               0.1, 100.0);
+  visitor.real({"metric/keypoint_sigma", "px", "standard deviation of the position of a small SIFT feature"},
+               keypoint_sigma_px, 0.01, 100.0);
+  visitor.integer({"metric/min_inliers", "1", "a pose on fewer landmarks is not believed"}, min_inliers, 6, 10000);
+  visitor.integer({"metric/min_inliers_predicted", "1", "the same where the motion since the last pose predicts it"},
+                  min_inliers_predicted, 6, 10000);
+  visitor.real({"metric/max_sigma", "m", "a pose with a larger standard deviation is not believed"}, max_sigma_m, 0.01,
+               100.0);
+  visitor.real({"metric/max_gap", "s", "the motion predicts poses at most this long after the last one"}, max_gap_s,
+               0.0, 3600.0);
+  visitor.real(
+      {"metric/max_prediction_error", "m", "farthest of a pose from the predicted one, plus half the way since"},
+      max_prediction_error_m, 0.01, 1000.0);
+}
+
+double MetricPose::sigma_m() const { return largerSigma_m(covariance); }
+
+double MetricPose::sigmaYaw_rad() const { return yawSigma_rad(covariance); }
+
+double MetricPose::mapSigma_m() const { return largerSigma_m(map_covariance); }
+
+double MetricPose::mapSigmaYaw_rad() const { return yawSigma_rad(map_covariance); }
+
+}  // namespace visual_localization

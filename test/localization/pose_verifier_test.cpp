@@ -1,0 +1,236 @@
+#include "localization/pose_verifier.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <random>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "test/support/fake_image.h"
+#include "test/support/landmark_world.h"
+#include "visual_localization/features/sift_matcher.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::size_t kFew = 15;  ///< matches: between the default of 12 near a prediction and that of 20 elsewhere
+
+/// A map of a street, its landmarks found by the adjustment of a drive.
+class StreetMap {
+ public:
+  StreetMap() : random_(1), poses_(test::drive({})), world_(test::pointsAlong(poses_, 6.0, random_)) {
+    const test::RecordedDrive drive = test::record(poses_, world_, 0.1, random_);
+    const UnadjustedSession session = drive.unadjusted();
+    SessionGeometry geometry = adjustSession(session, {}, 0, 1);
+    std::vector<TrainingImage> images(poses_.size());
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      images[i].stamp_ns = session.images[i].stamp_ns;
+      images[i].sift = *drive.views[i];
+      images[i].geometry = std::move(geometry.images[i]);
+      images[i].position_m = images[i].geometry->camera.position_m.head<2>();
+      images[i].yaw_rad = images[i].geometry->camera.yaw_rad();
+    }
+    MapHeader header;
+    header.datum = {48.5, 9.0, 400.0};
+    header.image_size = camera_.size();
+    header.sessions = {{"street", camera_}};
+    map_ = std::make_shared<const TrainingMap>(header, std::move(images));
+  }
+
+  const TrainingMap& map() const { return *map_; }
+  const CameraModel& camera() const { return camera_; }
+
+  /// A place beside that of training image `i`: `by_m` in its camera's frame.
+  CameraPose trueNear(std::size_t i, const Eigen::Vector3d& by_m) const { return moved(poses_[i].camera, by_m); }
+  /// The same place where the map has it, which is not quite the truth: nobody can know better.
+  CameraPose mappedNear(std::size_t i, const Eigen::Vector3d& by_m) const {
+    return moved(map_->geometry(i)->camera, by_m);
+  }
+  SiftFeatures seenFrom(const CameraPose& pose) {
+    return test::viewOf(world_, camera_, pose, test::kKeypointSigma_px, random_).features;
+  }
+  /// Only the first few features that show landmarks of training image `i`.
+  SiftFeatures fewSeenFrom(const CameraPose& pose, std::size_t i, std::size_t count = kFew) {
+    const SiftFeatures all = seenFrom(pose);
+    std::vector<std::size_t> landmarks;
+    for (const SeenLandmark& landmark : map_->geometry(i)->landmarks) landmarks.push_back(landmark.feature);
+    std::vector<std::size_t> chosen;
+    for (const FeatureMatch& match : matchSymmetric(all, map_->sift(i)->subset(landmarks), 0.5)) {
+      if (chosen.size() < count) chosen.push_back(match.a);
+    }
+    return all.subset(chosen);
+  }
+
+ private:
+  static CameraPose moved(const CameraPose& pose, const Eigen::Vector3d& by_m) {
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY()));
+    return {pose.rotation * turn, pose.position_m + pose.rotation * by_m};
+  }
+
+  CameraModel camera_ = test::streetCamera();
+  std::mt19937 random_;
+  std::vector<test::DrivenPose> poses_;
+  std::vector<test::WorldPoint> world_;
+  std::shared_ptr<const TrainingMap> map_;
+};
+
+/// Known by its features.
+class SeenImage final : public test::FakeImage {
+ public:
+  SeenImage(const TrainingMap& map, SiftFeatures features) : map_(map), features_(std::move(features)) {}
+  Score compare(FeatureKind, std::size_t i) override {
+    return SiftSimilarity({}, {}).compare(features_, *map_.sift(i));
+  }
+  const SiftFeatures* unprunedSift() override { return &features_; }
+
+ private:
+  const TrainingMap& map_;
+  SiftFeatures features_;
+};
+
+class PoseVerifierTest : public testing::Test {
+ protected:
+  /// After particles compared the image with these training images.
+  std::optional<MetricPose> verify(double time_s, const SiftFeatures& features,
+                                   const std::vector<std::size_t>& compared) {
+    SeenImage image(street_.map(), features);
+    scores_.startImage(FeatureKind::kSift,
+                       [&image](FeatureKind kind, std::size_t i) { return image.compare(kind, i); });
+    for (const std::size_t i : compared) scores_[i];
+    return verifier_.verify(static_cast<std::int64_t>(time_s * kSecond_ns), image, scores_, street_.camera());
+  }
+  /// An image with all features from beside training image `i`.
+  std::optional<MetricPose> verifyNear(double time_s, std::size_t i) {
+    return verify(time_s, street_.seenFrom(street_.trueNear(i, kBeside_m)), {i - 1, i, i + 1});
+  }
+  /// Of the position, metres.
+  double error_m(const MetricPose& pose, std::size_t i) const {
+    return (pose.camera.position_m - street_.mappedNear(i, kBeside_m).position_m).norm();
+  }
+
+  const Eigen::Vector3d kBeside_m{0.3, -0.1, 0.4};
+  StreetMap street_;
+  Scores scores_{street_.map().size()};
+  PoseVerifier verifier_{street_.map(), {}};
+};
+
+TEST_F(PoseVerifierTest, FindsThePoseToCentimetres) {
+  for (const std::size_t i : {3, 14, 22, 40}) {
+    verifier_.reset();
+    const auto pose = verifyNear(0.0, i);
+    ASSERT_TRUE(pose) << i;
+    EXPECT_LT(pose->sigma_m(), 0.1) << i;
+    EXPECT_LT(error_m(*pose, i), 4.0 * pose->sigma_m() + 0.02) << i;
+    const CameraPose expected = street_.mappedNear(i, kBeside_m);
+    EXPECT_LT(pose->camera.rotation.angularDistance(expected.rotation), 0.005) << i;
+    EXPECT_LT(pose->reprojection_px, 1.5) << i;
+    EXPECT_GT(pose->map_covariance(0, 0), 0.0) << i;
+    EXPECT_EQ(verifier_.imagesSince(), 0U) << i;
+  }
+}
+
+TEST_F(PoseVerifierTest, CountsTheTrainingImagesWhoseLandmarksItUses) {
+  ASSERT_TRUE(verify(0.0, street_.seenFrom(street_.trueNear(14, kBeside_m)), {14}));
+  EXPECT_EQ(scores_.comparisons(), static_cast<std::size_t>(MetricConfig().training_images))
+      << "one of them by particles";
+}
+
+TEST_F(PoseVerifierTest, FindsNothingWhereNothingMatches) {
+  std::mt19937 random(99);
+  const auto poses = test::drive({});
+  const auto elsewhere = test::pointsAlong(poses, 6.0, random);
+  const auto view = test::viewOf(elsewhere, street_.camera(), poses[10].camera, 0.3, random);
+  EXPECT_FALSE(verify(0.0, view.features, {9, 10, 11, 30}));
+  EXPECT_FALSE(verify(1.0, SiftFeatures(), {9, 10, 11, 30}));
+  EXPECT_EQ(verifier_.imagesSince(), 2U);
+}
+
+TEST_F(PoseVerifierTest, FindsNothingBeforeParticlesHaveComparedAnything) {
+  EXPECT_FALSE(verify(0.0, street_.seenFrom(street_.trueNear(14, kBeside_m)), {}));
+}
+
+TEST_F(PoseVerifierTest, FollowsTheMotionWithoutParticles) {
+  ASSERT_TRUE(verifyNear(0.0, 10));
+  for (std::size_t i = 11; i < 20; ++i) {
+    const auto features = street_.seenFrom(street_.trueNear(i, kBeside_m));
+    const auto pose = verify(static_cast<double>(i - 10), features, {});
+    ASSERT_TRUE(pose) << i;
+    EXPECT_TRUE(pose->confirmed) << i;
+    EXPECT_LT(error_m(*pose, i), 4.0 * pose->sigma_m() + 0.02) << i;
+  }
+}
+
+TEST_F(PoseVerifierTest, FindsThePoseAfterAKidnapping) {
+  ASSERT_TRUE(verifyNear(0.0, 5));
+  ASSERT_TRUE(verifyNear(1.0, 6));
+  const auto features = street_.seenFrom(street_.trueNear(38, kBeside_m));
+  const auto pose = verify(2.0, features, {5, 6, 7, 8, 38, 20});
+  ASSERT_TRUE(pose);
+  EXPECT_LT(error_m(*pose, 38), 4.0 * pose->sigma_m() + 0.02);
+}
+
+TEST_F(PoseVerifierTest, AsksForFewerInliersNearThePrediction) {
+  const auto few = street_.fewSeenFrom(street_.trueNear(11, kBeside_m), 11);
+  ASSERT_EQ(few.size(), kFew);
+  EXPECT_FALSE(verify(0.0, few, {10, 11, 12})) << "nothing predicts it";
+  ASSERT_TRUE(verifyNear(1.0, 10));
+  const auto pose = verify(2.0, few, {10, 11, 12});
+  ASSERT_TRUE(pose);
+  EXPECT_TRUE(pose->confirmed);
+  EXPECT_LE(pose->inliers, kFew);
+  EXPECT_LT(error_m(*pose, 11), 4.0 * pose->sigma_m() + 0.02);
+}
+
+// Four metres ahead of the last pose, of which no motion is known; two are allowed.
+TEST_F(PoseVerifierTest, AsksForMoreInliersFarFromThePrediction) {
+  ASSERT_TRUE(verifyNear(0.0, 6));
+  const auto few = street_.fewSeenFrom(street_.trueNear(10, kBeside_m), 6);
+  EXPECT_FALSE(verify(1.0, few, {9, 10, 11}));
+  EXPECT_TRUE(verifyNear(1.0, 10)) << "with all features it is believed";
+  MetricConfig config;
+  config.max_prediction_error_m = 5.0;
+  verifier_.configure(config);
+  verifier_.reset();
+  ASSERT_TRUE(verifyNear(2.0, 6));
+  EXPECT_TRUE(verify(3.0, few, {9, 10, 11})) << "only the distance was wrong";
+}
+
+TEST_F(PoseVerifierTest, PredictsForSomeSecondsOnly) {
+  ASSERT_TRUE(verifyNear(0.0, 10));
+  const auto few = street_.fewSeenFrom(street_.trueNear(10, kBeside_m), 10);
+  EXPECT_TRUE(verify(4.9, few, {10}));
+  EXPECT_FALSE(verify(10.0, few, {10})) << "5 s after the last pose nothing is predicted any more";
+}
+
+TEST_F(PoseVerifierTest, ForgetsTheMotionOnReset) {
+  ASSERT_TRUE(verifyNear(0.0, 10));
+  const auto few = street_.fewSeenFrom(street_.trueNear(10, kBeside_m), 10);
+  EXPECT_TRUE(verify(1.0, few, {10}));
+  verifier_.reset();
+  EXPECT_FALSE(verify(2.0, few, {10}));
+}
+
+// Between 20 and 40 inliers a pose counts, but what follows must agree.
+TEST_F(PoseVerifierTest, ConfirmsAPoseByTheNextOne) {
+  const auto first = verify(0.0, street_.fewSeenFrom(street_.trueNear(10, kBeside_m), 10, 30), {10});
+  ASSERT_TRUE(first);
+  EXPECT_FALSE(first->confirmed);
+  const auto second = verify(1.0, street_.fewSeenFrom(street_.trueNear(11, kBeside_m), 11, 30), {11});
+  ASSERT_TRUE(second);
+  EXPECT_TRUE(second->confirmed);
+}
+
+TEST_F(PoseVerifierTest, DoesNotBelieveWhatIsTooUncertain) {
+  MetricConfig config;
+  config.max_sigma_m = 1e-4;
+  verifier_.configure(config);
+  EXPECT_FALSE(verifyNear(0.0, 14));
+  verifier_.configure({});
+  EXPECT_TRUE(verifyNear(1.0, 14));
+}
+
+}  // namespace
+}  // namespace visual_localization
