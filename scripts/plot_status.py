@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Plots what a localizer says about itself: state, similarity, place ratio, comparisons, sigma and latency over time.
+"""Plots what a localizer says about itself: state, inliers, similarity, place ratio, comparisons, cloud and latency.
 
 Of a running localizer in a window that renews itself, or in a picture (--output FILE.png) that is written every few
 seconds, for machines without a display; of a recorded status topic with --bag. For machines without rqt.
@@ -21,7 +21,7 @@ import numpy as np
 
 COLOURS = {'NO_MAP': '#505050', 'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e',
            'RECOVERING': '#d62728', 'OFF_MAP': '#9467bd'}
-FIGURES = ('best_similarity', 'place_ratio', 'comparisons', 'sigma_x', 'sigma_y', 'extract_ms', 'match_ms',
+FIGURES = ('inliers', 'best_similarity', 'place_ratio', 'comparisons', 'sigma_x', 'sigma_y', 'extract_ms', 'match_ms',
            'update_ms', 'latency_ms')
 BLUE, ORANGE, GREEN, GREY = '#1f77b4', '#e08214', '#4d9221', '#404040'
 
@@ -42,7 +42,8 @@ class History:
     def add(self, status) -> None:
         """One more status; begins anew when time goes back, as it does when a bag is played again."""
         answers_an_image = status.best_image >= 0
-        row = {name: float(getattr(status, name)) if answers_an_image else math.nan for name in FIGURES}
+        # A bag of an older version has no inliers.
+        row = {name: float(getattr(status, name, math.nan)) if answers_an_image else math.nan for name in FIGURES}
         row['stamp'] = status.header.stamp.to_sec()
         with self._lock:
             if self._rows and row['stamp'] < self._rows[-1]['stamp']:
@@ -78,8 +79,8 @@ class Plot:
         import matplotlib.pyplot as plt  # after the backend has been chosen
         plt.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False,
                              'axes.edgecolor': '#909090', 'axes.titlelocation': 'left', 'axes.titlesize': 9})
-        self.figure, axes = plt.subplots(6, 1, sharex=True, figsize=(10, 7.6),
-                                         gridspec_kw={'height_ratios': [.35, 1, 1, 1, 1, 1], 'hspace': .38,
+        self.figure, axes = plt.subplots(7, 1, sharex=True, figsize=(10, 8.8),
+                                         gridspec_kw={'height_ratios': [.35, 1, 1, 1, 1, 1, 1], 'hspace': .38,
                                                       'left': .055, 'right': .985, 'top': .93, 'bottom': .06})
         self._band, self._panels = axes[0], axes[1:]
         self._title = title
@@ -136,12 +137,14 @@ class Plot:
 
     def _draw_panels(self, columns: Dict[str, np.ndarray]) -> None:
         seconds = columns['seconds']
-        similarity, place, comparisons, sigma, times = self._panels
+        inliers, similarity, place, comparisons, sigma, times = self._panels
 
         def line(axes, name: str, colour: str, label: Optional[str] = None) -> None:
             marker = '.' if seconds.size < 2 else None
             axes.plot(seconds, columns[name], color=colour, linewidth=1.2, label=label, marker=marker)
 
+        line(inliers, 'inliers', BLUE)
+        inliers.set_title('landmarks that agree with the pose: 0 where it is not metric')
         line(similarity, 'best_similarity', BLUE)
         similarity.set_title('similarity of the best training image')
         line(place, 'place_ratio', BLUE)
@@ -155,7 +158,7 @@ class Plot:
         times.stackplot(seconds, *stages, labels=('extract', 'match', 'update'), colors=(BLUE, ORANGE, GREEN), alpha=.7)
         line(times, 'latency_ms', GREY, 'latency')
         times.set_title('time per image [ms]')
-        for axes in (similarity, comparisons, sigma, times):
+        for axes in (inliers, similarity, comparisons, sigma, times):
             axes.set_ylim(bottom=0)
         # Single outliers must not press the rest flat.
         place.set_ylim(min(.95, self._quantile(columns['place_ratio'], .05, 1.0)) - .005, 1.005)

@@ -35,11 +35,13 @@ class Track:
         self.comparisons = self._column(rows, 'comparisons')
         self.milliseconds = sum(self._column(rows, name) for name in ('extract_ms', 'match_ms', 'update_ms'))
         self.states = np.array([row['state'] for row in rows])
+        self.sources = np.array([row.get('source', '') for row in rows])  # not in tracks of older versions
+        self.inliers, self.sigma = self._column(rows, 'inliers'), self._column(rows, 'sigma_m')
         self.true_east, self.true_north = self._truth(rows)
 
     @staticmethod
     def _column(rows: List[Dict[str, str]], name: str) -> np.ndarray:
-        return np.array([float(row[name] or 'nan') for row in rows])
+        return np.array([float(row.get(name) or 'nan') for row in rows])
 
     def _truth(self, rows: List[Dict[str, str]]) -> Tuple[np.ndarray, np.ndarray]:
         """The exact positions in the map frame, which one image with both pose and fix ties to the ellipsoid."""
@@ -119,11 +121,25 @@ def summary(track: Track) -> List[str]:
         tracking = track.error[(track.states == 'TRACKING') & np.isfinite(track.error)]
         if tracking.size:
             lines.append(f'  while tracking mean {tracking.mean():.2f} m, median {np.median(tracking):.2f} m')
+    lines += metric_summary(track)
     lines.append(f'comparisons      {np.nanmean(track.comparisons):.1f} per image')
     lines.append(f'time             {np.nanmean(track.milliseconds):.1f} ms per image')
     shares = [(state, 100 * np.mean(track.states == state)) for state in STATES]
     lines.append('states           ' + ', '.join(f'{state} {share:.1f} %' for state, share in shares if share))
     return lines
+
+
+def metric_summary(track: Track) -> List[str]:
+    """How many poses were solved from landmarks and how good they are; nothing in a map of places."""
+    metric = track.sources == 'METRIC'
+    if not metric.any():
+        return []
+    judged = track.error[metric & np.isfinite(track.error)]
+    error = f', error median {np.median(judged):.2f} m, 95 % within {np.quantile(judged, .95):.2f} m' \
+        if judged.size else ''
+    return [f'metric poses     {100 * metric.mean():.1f} % of the answers{error}',
+            f'                 median of {np.median(track.inliers[metric]):.0f} inliers, sigma '
+            f'{np.median(track.sigma[metric]):.2f} m']
 
 
 def failure(track: Track, max_median_error_m: float) -> Optional[str]:

@@ -68,13 +68,25 @@ std::string latencyText(double latency_ms) {
   return format("%.0f ms", latency_ms > -kSmallLag_ms ? std::max(0.0, latency_ms) : latency_ms);
 }
 
+std::string inliersText(const LocalizationStatus& status) {
+  const bool is_metric = status.source == LocalizationStatus::METRIC;
+  return status.source_name + (is_metric ? ", " + std::to_string(status.inliers) : "");
+}
+
+std::string sigmaText(const LocalizationStatus& status) {
+  constexpr double kDegreesPerRadian = 180.0 / M_PI;
+  return format("%.2f m, ", status.sigma_position) + format("%.1f deg", status.sigma_heading * kDegreesPerRadian);
+}
+
 std::vector<Row> rowsOf(const LocalizationStatus& now) {
   std::vector<Row> rows{
+      {"inliers", inliersText(now), [](const auto& s) { return static_cast<double>(s.inliers); }},
+      {"sigma", sigmaText(now), [](const auto& s) { return s.sigma_position; }},
       {"similarity", format("%.2f", now.best_similarity), [](const auto& s) { return s.best_similarity; }},
       {"place ratio", format("%.3f", now.place_ratio), [](const auto& s) { return s.place_ratio; }},
       {"images compared", std::to_string(now.comparisons),
        [](const auto& s) { return static_cast<double>(s.comparisons); }},
-      {"sigma x, y", format("%.1f, ", now.sigma_x) + format("%.1f m", now.sigma_y),
+      {"cloud x, y", format("%.1f, ", now.sigma_x) + format("%.1f m", now.sigma_y),
        [](const auto& s) { return std::hypot(s.sigma_x, s.sigma_y); }},
       {"latency", latencyText(now.latency_ms), [](const auto& s) { return std::max(0.0, s.latency_ms); }},
   };
@@ -156,7 +168,7 @@ void Dashboard::add(const LocalizationStatus& status) {
 
 cv::Mat Dashboard::draw() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  constexpr int kRows = 5;
+  constexpr int kRows = 7;
   cv::Mat canvas(kHeader + kRows * kRow + kBand + 10, kWidth, CV_8UC3, kBackground);
   if (statuses_.empty()) return canvas;
   drawHeader(canvas, statuses_.back());

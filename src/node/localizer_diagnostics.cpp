@@ -15,6 +15,8 @@ constexpr double kBright = 235.0;
 constexpr double kLowContrast = 8.0;
 constexpr double kStretched = 0.05;
 
+constexpr double kDegreesPerRadian = 180.0 / M_PI;
+
 const char* guessAt(const ImageStatistics& image) {
   if (image.mean_grey < kDark) return ": dark or covered?";
   if (image.mean_grey > kBright) return ": overexposed?";
@@ -49,6 +51,20 @@ std::string stretched(const ImageStatistics& image) {
 }
 
 using diagnostic_msgs::DiagnosticStatus;
+
+/// What the pose rests on, and how well it is known.
+void addPose(const Estimate& estimate, diagnostic_updater::DiagnosticStatusWrapper& status) {
+  status.add("Source of the pose", toString(estimate.source));
+  status.addf("Sigma of position (m), heading (deg)", "%.2f, %.2f", estimate.sigma_m(),
+              estimate.sigmaYaw_rad() * kDegreesPerRadian);
+  if (!estimate.evidence.verified) return;  // landmarks are not used
+  status.add("Images since the last metric pose", estimate.images_since_metric);
+  if (!estimate.metric) return;
+  status.add("Inliers", estimate.metric->inliers);
+  status.addf("Reprojection error (px)", "%.2f", estimate.metric->reprojection_px);
+  status.addf("Sigma of the map: position (m), heading (deg)", "%.2f, %.2f", estimate.metric->mapSigma_m(),
+              estimate.metric->mapSigmaYaw_rad() * kDegreesPerRadian);
+}
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -147,6 +163,7 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
   status.summary(state == LocalizationState::kTracking ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
                  toString(state));
   if (!estimate_) return;
+  addPose(*estimate_, status);
   status.add("Best similarity", estimate_->tracked.best.similarity);
   status.add("Matched features", estimate_->tracked.best.matches);
   status.addf("Median scale ratio", "%.2f", estimate_->tracked.best.scale);

@@ -61,6 +61,8 @@ void LocalizerPublisher::publishState(LocalizationState state, const ImageCounts
 void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts& counts) {
   const double latency_ms = latencyOf(image);
   const Estimate& estimate = image.result.estimate;
+  if (map_.lock() != image.result.map) transform_.forgetPose();
+  map_ = image.result.map;
   const std_msgs::Header header = headerOf(config_.global_frame_id, image.header.stamp);
   if (!estimate.frozen) publishPose(estimate, header);
   publishParticles(image.result.particles, header);
@@ -77,7 +79,7 @@ void LocalizerPublisher::publishPose(const Estimate& estimate, const std_msgs::H
 
 void LocalizerPublisher::publishTransform(const Estimate& estimate, const ros::Time& stamp) {
   if (estimate.frozen) return diagnostics_.transformMissing("the camera is frozen");  // the pose is an old one
-  const std::string missing = transform_.publish(estimate.pose, stamp);
+  const std::string missing = transform_.publish(estimate, stamp);
   diagnostics_.transformMissing(missing);
   if (!missing.empty()) log_.warn("no transform", "No transform broadcast: " + missing);
 }

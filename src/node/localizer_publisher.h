@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,7 @@ class LocalizerPublisher : public ImageOutput {
   LocalizerDiagnostics& diagnostics_;
   ThrottledLog& log_;
   TransformPublisher transform_;
+  std::weak_ptr<const TrainingMap> map_;  ///< of the last image
   image_transport::ImageTransport image_transport_;
   ros::Publisher pose_;
   ros::Publisher fix_;

@@ -13,13 +13,57 @@ namespace visual_localization {
 namespace {
 
 constexpr std::size_t kRow = 6;              ///< of a pose's covariance: x, y, z and three rotations
-constexpr double kUnknownAltitude_m2 = 1e6;  ///< the map is flat and knows no height
+constexpr double kUnknownAltitude_m2 = 1e6;  ///< the map knows heights, but not above which level
+// Added to a metric covariance, so that it can always be inverted; far below what images allow.
+constexpr double kLeastPositionSigma_m = 1e-3;
+constexpr double kLeastRotationSigma_rad = 1e-4;
 
 geometry_msgs::Pose poseOf(const Eigen::Vector2d& position_m, double yaw_rad) {
   geometry_msgs::Pose pose;
   pose.position.x = position_m.x();
   pose.position.y = position_m.y();
   pose.orientation = quaternionFromYaw(yaw_rad);
+  return pose;
+}
+
+/// Of a metric pose, map included; symmetric to the last bit.
+MetricPose::Covariance fullCovariance(const MetricPose& metric) {
+  MetricPose::Covariance covariance = metric.covariance + metric.map_covariance;
+  covariance = (0.5 * (covariance + covariance.transpose())).eval();
+  covariance.diagonal().head<3>().array() += kLeastPositionSigma_m * kLeastPositionSigma_m;
+  covariance.diagonal().tail<3>().array() += kLeastRotationSigma_rad * kLeastRotationSigma_rad;
+  return covariance;
+}
+
+Eigen::Matrix2d positionCovariance(const Estimate& estimate) {
+  if (estimate.metric) return fullCovariance(*estimate.metric).topLeftCorner<2, 2>();
+  return estimate.pose.covariance_m2;
+}
+
+bool isFinite(const MetricPose& metric) {
+  return metric.camera.position_m.allFinite() && metric.camera.rotation.coeffs().allFinite() &&
+         fullCovariance(metric).allFinite() && std::isfinite(metric.reprojection_px);
+}
+
+geometry_msgs::PoseWithCovariance withCovariance(const MetricPose& metric) {
+  geometry_msgs::PoseWithCovariance pose;
+  pose.pose.position.x = metric.camera.position_m.x();
+  pose.pose.position.y = metric.camera.position_m.y();
+  pose.pose.position.z = metric.camera.position_m.z();
+  pose.pose.orientation = bodyRotation(metric.camera);
+  Eigen::Map<MetricPose::Covariance>(pose.covariance.data()) = fullCovariance(metric);  // symmetric: rows are columns
+  return pose;
+}
+
+geometry_msgs::PoseWithCovariance withCovariance(const PoseEstimate& estimate) {
+  geometry_msgs::PoseWithCovariance pose;
+  pose.pose = poseOf(estimate.position_m, estimate.yaw_rad);
+  const Eigen::Matrix2d& covariance = estimate.covariance_m2;
+  pose.covariance[0] = covariance(0, 0);
+  pose.covariance[1] = covariance(0, 1);
+  pose.covariance[kRow] = covariance(1, 0);
+  pose.covariance[kRow + 1] = covariance(1, 1);
+  pose.covariance[5 * kRow + 5] = estimate.yaw_variance_rad2;
   return pose;
 }
 
@@ -94,6 +138,21 @@ visualization_msgs::Marker emptyHeadings(int session, const std::string& frame_i
   return marker;
 }
 
+/// What the pose rests on, and how well it is known. Sigmas stay 0 in a status that answers no image.
+void addSource(const Estimate& estimate, LocalizationStatus& message) {
+  message.source = static_cast<std::uint8_t>(estimate.source);
+  message.source_name = toString(estimate.source);
+  message.images_since_metric = count(estimate.images_since_metric);
+  if (message.best_image < 0) return;
+  message.sigma_position = estimate.sigma_m();
+  message.sigma_heading = estimate.sigmaYaw_rad();
+  if (!estimate.metric) return;
+  message.inliers = count(estimate.metric->inliers);
+  message.reprojection = estimate.metric->reprojection_px;
+  message.map_sigma_position = estimate.metric->mapSigma_m();
+  message.map_sigma_heading = estimate.metric->mapSigmaYaw_rad();
+}
+
 }  // namespace
 
 geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad) {
@@ -103,13 +162,26 @@ geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad) {
   return rotation;
 }
 
+geometry_msgs::Quaternion bodyRotation(const CameraPose& camera) {
+  Eigen::Matrix3d body_in_camera;  // columns: ahead, left and up in the optical frame
+  body_in_camera << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
+  const Eigen::Quaterniond body_in_map = (camera.rotation * Eigen::Quaterniond(body_in_camera)).normalized();
+  geometry_msgs::Quaternion rotation;
+  rotation.x = body_in_map.x();
+  rotation.y = body_in_map.y();
+  rotation.z = body_in_map.z();
+  rotation.w = body_in_map.w();
+  return rotation;
+}
+
 bool isFinite(const Estimate& estimate) {
   const PoseEstimate& pose = estimate.pose;
   return pose.position_m.allFinite() && pose.covariance_m2.allFinite() && std::isfinite(pose.yaw_rad) &&
          std::isfinite(pose.yaw_variance_rad2) && std::isfinite(pose.geodetic.latitude_deg) &&
          std::isfinite(pose.geodetic.longitude_deg) && std::isfinite(pose.geodetic.altitude_m) &&
          std::isfinite(estimate.tracked.best.similarity) && estimate.tracked.spread_m.allFinite() &&
-         std::isfinite(estimate.evidence.place_ratio) && std::isfinite(estimate.motion_residual_m);
+         std::isfinite(estimate.evidence.place_ratio) && std::isfinite(estimate.motion_residual_m) &&
+         (!estimate.metric || isFinite(*estimate.metric));
 }
 
 bool isFinite(const Particle& particle) {
@@ -119,13 +191,7 @@ bool isFinite(const Particle& particle) {
 geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header) {
   geometry_msgs::PoseWithCovarianceStamped message;
   message.header = header;
-  message.pose.pose = poseOf(estimate.pose.position_m, estimate.pose.yaw_rad);
-  const Eigen::Matrix2d& covariance = estimate.pose.covariance_m2;
-  message.pose.covariance[0] = covariance(0, 0);
-  message.pose.covariance[1] = covariance(0, 1);
-  message.pose.covariance[kRow] = covariance(1, 0);
-  message.pose.covariance[kRow + 1] = covariance(1, 1);
-  message.pose.covariance[5 * kRow + 5] = estimate.pose.yaw_variance_rad2;
+  message.pose = estimate.metric ? withCovariance(*estimate.metric) : withCovariance(estimate.pose);
   return message;
 }
 
@@ -137,7 +203,7 @@ sensor_msgs::NavSatFix toFix(const Estimate& estimate, const std_msgs::Header& h
   message.latitude = estimate.pose.geodetic.latitude_deg;
   message.longitude = estimate.pose.geodetic.longitude_deg;
   message.altitude = estimate.pose.geodetic.altitude_m;
-  const Eigen::Matrix2d& covariance = estimate.pose.covariance_m2;
+  const Eigen::Matrix2d covariance = positionCovariance(estimate);
   message.position_covariance = {
       covariance(0, 0), covariance(0, 1), 0.0, covariance(1, 0), covariance(1, 1), 0.0, 0.0, 0.0, kUnknownAltitude_m2};
   message.position_covariance_type = sensor_msgs::NavSatFix::COVARIANCE_TYPE_APPROXIMATED;
@@ -169,6 +235,7 @@ LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& he
   message.extract_ms = estimate.image.extract_ms;
   message.match_ms = estimate.image.match_ms;
   message.update_ms = estimate.update_ms;
+  addSource(estimate, message);
   return message;
 }
 

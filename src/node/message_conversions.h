@@ -27,11 +27,17 @@ geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad);
 bool isFinite(const Estimate& estimate);
 bool isFinite(const Particle& particle);
 
-/// Position, heading and their covariance; height, roll and pitch are zero. `header`: map frame.
+/// camera_in_map with the axes of a robot that looks along the camera (REP 103): x ahead, y left, z up. Its yaw is the
+/// camera's heading, roll and pitch are those of the camera against the horizon.
+geometry_msgs::Quaternion bodyRotation(const CameraPose& camera);
+
+/// A metric pose: that of the camera, with the covariance of all 6 axes (x, y, z, rotation about x, y, z of the map),
+/// map included. Otherwise position, heading and their covariance; height, roll and pitch are zero. `header`: map
+/// frame.
 geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header);
 
-/// The same position as latitude and longitude. No fix while the position is unknown or lost. `header`: frame of the
-/// robot, as for a GPS receiver.
+/// The same position as latitude and longitude; the map knows no altitude. No fix while the position is unknown or
+/// lost. `header`: frame of the robot, as for a GPS receiver.
 sensor_msgs::NavSatFix toFix(const Estimate& estimate, const std_msgs::Header& header);
 
 /// Everything but latency and counts of images, which only the node knows.

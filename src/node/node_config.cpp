@@ -68,6 +68,9 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
                mask_file);
   visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf", kAtStartOnly},
                  tf_mode, {"none", "map_to_odom", "map_to_base"});
+  visitor.flag({"tf_metric_only", "",
+                "where landmarks can verify poses, only METRIC ones while TRACKING move the robot on tf", kAtStartOnly},
+               tf_metric_only);
   visitor.real({"transform_tolerance", "s", "added to the image stamp in the stamp of the transform"},
                transform_tolerance_s, 0.0, 60.0);
   visitor.real({"image_timeout", "s",

@@ -28,6 +28,12 @@ tf2::Transform odomInMap(const tf2::Transform& base_in_map, const tf2::Transform
   return base_in_map * base_in_odom.inverse();
 }
 
+bool movesRobot(const Estimate& estimate, bool metric_only) {
+  const bool is_verifiable = estimate.evidence.verified.has_value();
+  if (!metric_only || !is_verifiable) return true;
+  return estimate.source == PoseSource::kMetric && estimate.state == LocalizationState::kTracking;
+}
+
 TransformPublisher::TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node)
     : config_(config), tolerance_s_(config.transform_tolerance_s) {
   if (config_.tf_mode == "map_to_odom") listener_ = std::make_unique<tf2_ros::TransformListener>(buffer_, node);
@@ -36,20 +42,35 @@ TransformPublisher::TransformPublisher(const NodeConfig& config, const ros::Node
 void TransformPublisher::forget() {
   buffer_.clear();
   last_stamp_ = ros::Time();
+  forgetPose();
 }
 
-std::string TransformPublisher::publish(const PoseEstimate& pose, const ros::Time& stamp) {
+std::string TransformPublisher::publish(const Estimate& estimate, const ros::Time& stamp) {
   if (config_.tf_mode == "none") return {};
   if (stamp == last_stamp_) return last_reason_;  // tf2 complains about a second transform for the same stamp
   last_stamp_ = stamp;
+  last_reason_ = movesRobot(estimate, config_.tf_metric_only) ? move(estimate.pose, stamp) : hold(stamp);
+  return last_reason_;
+}
+
+std::string TransformPublisher::move(const PoseEstimate& pose, const ros::Time& stamp) {
   if (config_.tf_mode == "map_to_base") {
     broadcast(baseInMap(pose), config_.base_frame_id, stamp);
     return {};
   }
-  last_reason_.clear();
-  const auto base_in_odom = baseInOdom(stamp, last_reason_);
-  if (base_in_odom) broadcast(odomInMap(baseInMap(pose), *base_in_odom), config_.odom_frame_id, stamp);
-  return last_reason_;
+  std::string reason;
+  const auto base_in_odom = baseInOdom(stamp, reason);
+  if (!base_in_odom) return reason;
+  odom_in_map_ = odomInMap(baseInMap(pose), *base_in_odom);
+  broadcast(*odom_in_map_, config_.odom_frame_id, stamp);
+  return {};
+}
+
+/// Without odometry nobody knows where the robot has gone since.
+std::string TransformPublisher::hold(const ros::Time& stamp) {
+  if (!odom_in_map_) return "no metric pose while tracking (tf_metric_only)";
+  broadcast(*odom_in_map_, config_.odom_frame_id, stamp);
+  return {};
 }
 
 std::optional<tf2::Transform> TransformPublisher::baseInOdom(const ros::Time& stamp, std::string& reason) const {

@@ -60,6 +60,21 @@ TEST(Dashboard, ShowsNoFiguresOfAStatusThatAnswersNoImage) {
   EXPECT_EQ(cv::norm(left_half, silent(cv::Rect(0, 0, silent.cols / 2, silent.rows))), 0.0);
 }
 
+TEST(Dashboard, ShowsWhatThePoseRestsOn) {
+  Dashboard place;
+  Dashboard metric;
+  LocalizationStatus status = statusOf(LocalizationStatus::TRACKING);
+  status.source_name = "PLACE";
+  place.add(status);
+  status.source = LocalizationStatus::METRIC;
+  status.source_name = "METRIC";
+  status.inliers = 120;
+  metric.add(status);
+  const cv::Mat first = place.draw();
+  const cv::Rect row(0, first.rows / 6, first.cols / 2, first.rows / 6);  // below the header
+  EXPECT_GT(cv::norm(first(row), metric.draw()(row)), 0.0);
+}
+
 TEST(Dashboard, StatesDifferInColour) {
   for (std::uint8_t a = 0; a < 6; ++a) {
     for (std::uint8_t b = 0; b < a; ++b) EXPECT_GT(cv::norm(colourOfState(a), colourOfState(b)), 40.0);
@@ -82,6 +97,7 @@ TEST(Dashboard, ShowsOddFiguresWithoutFailing) {
   LocalizationStatus status = statusOf(LocalizationStatus::TRACKING, 0.0);
   for (const double odd :
        {-1.0, 0.0, 1e300, -1e300, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    status.sigma_position = status.sigma_heading = odd;
     status.latency_ms = status.sigma_x = status.best_similarity = status.place_ratio = odd;
     status.comparisons = std::numeric_limits<std::uint32_t>::max();
     dashboard.add(status);

@@ -1,8 +1,10 @@
 #include "node/message_conversions.h"
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
+#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
 
@@ -36,6 +38,37 @@ Estimate someEstimate() {
   estimate.update_ms = 1.5;
   return estimate;
 }
+
+/// A camera that looks north, 10 degrees downwards.
+Estimate metricEstimate() {
+  Estimate estimate = someEstimate();
+  estimate.source = PoseSource::kMetric;
+  MetricPose metric;
+  metric.camera.position_m = {12.5, -3.25, 1.5};
+  metric.camera.rotation = Eigen::AngleAxisd(-10.0 * M_PI / 180.0, Eigen::Vector3d::UnitX()) * levelCamera(0.5 * M_PI);
+  metric.covariance.diagonal() << 0.0009, 0.0004, 0.0016, 1e-5, 2e-5, 3e-5;
+  metric.covariance(0, 5) = metric.covariance(5, 0) = 1e-5;
+  metric.map_covariance.diagonal() << 0.04, 0.04, 0.09, 1e-6, 1e-6, 4e-6;
+  metric.inliers = 87;
+  metric.reprojection_px = 0.75;
+  estimate.metric = metric;
+  return estimate;
+}
+
+/// Any single number of a metric pose that is not finite must be seen.
+std::vector<std::function<double&(MetricPose&)>> numbersOf() {
+  return {[](MetricPose& pose) -> double& { return pose.camera.position_m.z(); },
+          [](MetricPose& pose) -> double& { return pose.camera.rotation.w(); },
+          [](MetricPose& pose) -> double& { return pose.covariance(2, 4); },
+          [](MetricPose& pose) -> double& { return pose.map_covariance(5, 5); },
+          [](MetricPose& pose) -> double& { return pose.reprojection_px; }};
+}
+
+Eigen::Matrix3d matrixOf(const geometry_msgs::Quaternion& rotation) {
+  return Eigen::Quaterniond(rotation.w, rotation.x, rotation.y, rotation.z).toRotationMatrix();
+}
+
+using Covariance = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
 std::vector<Particle> twoParticles() {
   Particle moving;
@@ -72,6 +105,56 @@ TEST(MessageConversions, PoseHoldsPositionHeadingAndCovariance) {
   EXPECT_EQ(message.pose.covariance[35], 0.04);
 }
 
+TEST(MessageConversions, ALevelCameraIsARobotThatLooksTheSameWay) {
+  for (const double yaw_rad : {0.0, 0.5 * M_PI, -2.0, M_PI}) {
+    const Eigen::Matrix3d body = matrixOf(bodyRotation({levelCamera(yaw_rad), {}}));
+    EXPECT_LT((body - matrixOf(quaternionFromYaw(yaw_rad))).norm(), 1e-12) << yaw_rad;
+  }
+}
+
+TEST(MessageConversions, ATiltedCameraKeepsItsHeadingAndShowsItsTilt) {
+  const Estimate estimate = metricEstimate();
+  const Eigen::Matrix3d body = matrixOf(toPose(estimate, header()).pose.pose.orientation);
+  const Eigen::Vector3d ahead = body.col(0);
+  EXPECT_LT((ahead - estimate.metric->camera.ahead()).norm(), 1e-12);
+  EXPECT_NEAR(std::atan2(ahead.y(), ahead.x()), 0.5 * M_PI, 1e-12);
+  EXPECT_NEAR(std::asin(ahead.z()), -10.0 * M_PI / 180.0, 1e-12);  // nose down
+  EXPECT_NEAR(body(2, 1), 0.0, 1e-12);                             // left stays level
+  EXPECT_GT(body(2, 2), 0.0);                                      // and up is up
+}
+
+TEST(MessageConversions, AMetricPoseHasItsHeightAndTheCovarianceOfPoseAndMap) {
+  const Estimate estimate = metricEstimate();
+  const auto message = toPose(estimate, header());
+  EXPECT_EQ(message.pose.pose.position.x, 12.5);
+  EXPECT_EQ(message.pose.pose.position.y, -3.25);
+  EXPECT_EQ(message.pose.pose.position.z, 1.5);
+  const Covariance covariance = Eigen::Map<const Covariance>(message.pose.covariance.data());
+  const Covariance expected = estimate.metric->covariance + estimate.metric->map_covariance;
+  EXPECT_LT((covariance - expected).cwiseAbs().maxCoeff(), 2e-6);  // the floors: 1 mm, 0.1 mrad
+  EXPECT_EQ(covariance(0, 5), 1e-5);
+}
+
+TEST(MessageConversions, AMetricCovarianceCanBeInvertedWhateverComes) {
+  Estimate estimate = metricEstimate();
+  estimate.metric->covariance.setZero();
+  estimate.metric->map_covariance.setZero();
+  estimate.metric->covariance(0, 1) = 1e-9;  // rounding: not symmetric
+  const auto message = toPose(estimate, header());
+  const Covariance covariance = Eigen::Map<const Covariance>(message.pose.covariance.data());
+  EXPECT_EQ((covariance - covariance.transpose()).norm(), 0.0);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Covariance>(covariance).eigenvalues().minCoeff(), 0.0);
+}
+
+TEST(MessageConversions, TheFixOfAMetricPoseHasItsCovariance) {
+  const auto pose = toPose(metricEstimate(), header());
+  const auto fix = toFix(metricEstimate(), header());
+  EXPECT_EQ(fix.position_covariance[0], pose.pose.covariance[0]);
+  EXPECT_EQ(fix.position_covariance[1], pose.pose.covariance[1]);
+  EXPECT_EQ(fix.position_covariance[4], pose.pose.covariance[7]);
+  EXPECT_GE(fix.position_covariance[8], 1e6);  // the altitude stays unknown
+}
+
 TEST(MessageConversions, FixIsTheSameEstimateInDegrees) {
   const auto message = toFix(someEstimate(), header());
   EXPECT_EQ(message.latitude, 48.5);
@@ -104,7 +187,35 @@ TEST(MessageConversions, StatusNamesTheStateAndTheEvidence) {
 }
 
 TEST(MessageConversions, StatusWithoutComparisonHasNoBestImage) {
-  EXPECT_EQ(toStatus(Estimate{}, header()).best_image, -1);
+  const auto message = toStatus(Estimate{}, header());
+  EXPECT_EQ(message.best_image, -1);
+  EXPECT_EQ(message.source_name, "NONE");
+  EXPECT_EQ(message.sigma_position, 0.0);
+}
+
+TEST(MessageConversions, StatusTellsTheImageFromTheMapInAMetricPose) {
+  const auto message = toStatus(metricEstimate(), header());
+  EXPECT_EQ(message.source, LocalizationStatus::METRIC);
+  EXPECT_EQ(message.source_name, "METRIC");
+  EXPECT_EQ(message.inliers, 87U);
+  EXPECT_EQ(message.reprojection, 0.75);
+  EXPECT_NEAR(message.sigma_position, 0.03, 1e-12);
+  EXPECT_NEAR(message.sigma_heading, std::sqrt(3e-5), 1e-12);
+  EXPECT_NEAR(message.map_sigma_position, 0.2, 1e-12);
+  EXPECT_NEAR(message.map_sigma_heading, 0.002, 1e-12);
+}
+
+TEST(MessageConversions, StatusOfAPlaceHasTheWholeSigmaAndNoneOfTheMap) {
+  Estimate estimate = someEstimate();
+  estimate.source = PoseSource::kPlace;
+  estimate.images_since_metric = 4;
+  const auto message = toStatus(estimate, header());
+  EXPECT_EQ(message.source_name, "PLACE");
+  EXPECT_EQ(message.inliers, 0U);
+  EXPECT_NEAR(message.sigma_position, std::sqrt(2.5 + std::sqrt(2.5)), 1e-12);  // of the larger eigenvalue
+  EXPECT_NEAR(message.sigma_heading, 0.2, 1e-12);
+  EXPECT_EQ(message.map_sigma_position, 0.0);
+  EXPECT_EQ(message.images_since_metric, 4U);
 }
 
 TEST(MessageConversions, StatesAndKindsHaveTheNumbersOfTheMessages) {
@@ -113,6 +224,9 @@ TEST(MessageConversions, StatesAndKindsHaveTheNumbersOfTheMessages) {
   EXPECT_EQ(static_cast<int>(LocalizationState::kTracking), LocalizationStatus::TRACKING);
   EXPECT_EQ(static_cast<int>(LocalizationState::kUncertain), LocalizationStatus::UNCERTAIN);
   EXPECT_EQ(static_cast<int>(LocalizationState::kRecovering), LocalizationStatus::RECOVERING);
+  EXPECT_EQ(static_cast<int>(PoseSource::kNone), LocalizationStatus::NONE);
+  EXPECT_EQ(static_cast<int>(PoseSource::kPlace), LocalizationStatus::PLACE);
+  EXPECT_EQ(static_cast<int>(PoseSource::kMetric), LocalizationStatus::METRIC);
   EXPECT_EQ(static_cast<int>(FeatureKind::kSift), LocalizationStatus::SIFT);
   EXPECT_EQ(static_cast<int>(FeatureKind::kGlobal), LocalizationStatus::GLOBAL);
   EXPECT_EQ(static_cast<int>(ParticleKind::kStandard), SwarmParticle::STANDARD);
@@ -168,6 +282,17 @@ TEST(MessageConversions, WhatIsNotFiniteIsSeen) {
     Particle particle;
     particle.weight = bad;
     EXPECT_FALSE(isFinite(particle));
+  }
+}
+
+TEST(MessageConversions, WhatIsNotFiniteInAMetricPoseIsSeen) {
+  EXPECT_TRUE(isFinite(metricEstimate()));
+  for (const auto& number : numbersOf()) {
+    for (const double bad : {kNan, kInfinity, -kInfinity}) {
+      Estimate estimate = metricEstimate();
+      number(*estimate.metric) = bad;
+      EXPECT_FALSE(isFinite(estimate));
+    }
   }
 }
 

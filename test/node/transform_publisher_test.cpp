@@ -25,5 +25,30 @@ TEST(OdomInMap, AtTheStartOfOdometryItIsTheRobot) {
   EXPECT_NEAR(odom_in_map.getOrigin().y(), 6.0, 1e-12);
 }
 
+Estimate estimateOf(PoseSource source, LocalizationState state, std::optional<bool> verified) {
+  Estimate estimate;
+  estimate.source = source;
+  estimate.state = state;
+  estimate.evidence.verified = verified;
+  return estimate;
+}
+
+TEST(MovesRobot, OnlyAVerifiedPoseDoesWhereLandmarksCanVerifyIt) {
+  constexpr bool kMetricOnly = true;
+  using State = LocalizationState;
+  EXPECT_TRUE(movesRobot(estimateOf(PoseSource::kMetric, State::kTracking, true), kMetricOnly));
+  EXPECT_FALSE(movesRobot(estimateOf(PoseSource::kPlace, State::kTracking, false), kMetricOnly));
+  for (const State state : {State::kInitializing, State::kUncertain, State::kRecovering, State::kOffMap}) {
+    EXPECT_FALSE(movesRobot(estimateOf(PoseSource::kMetric, state, false), kMetricOnly)) << toString(state);
+  }
+}
+
+TEST(MovesRobot, EveryPoseDoesInAMapOfPlacesAndWhenAsked) {
+  for (const auto state : {LocalizationState::kTracking, LocalizationState::kRecovering}) {
+    EXPECT_TRUE(movesRobot(estimateOf(PoseSource::kPlace, state, std::nullopt), true));
+    EXPECT_TRUE(movesRobot(estimateOf(PoseSource::kPlace, state, false), false));
+  }
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import unittest
 
+import numpy as np
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -22,6 +23,7 @@ from visual_localization.msg import LocalizationStatus, Swarm
 
 PLOT_STATUS = pathlib.Path(__file__).resolve().parents[2] / 'scripts' / 'plot_status.py'
 NEAR_M = 5.0
+METRIC_M = 0.5  # twice the median error that 0.2 m per axis, the map's own, leave
 MOST = 0.8
 
 
@@ -54,6 +56,7 @@ class ReplayTest(unittest.TestCase):
             player.stop()
         self.check_errors()
         self.check_poses()
+        self.check_metric_poses()
         self.check_particles()
         self.check_map_and_pictures()
         self.check_diagnostics()
@@ -78,6 +81,25 @@ class ReplayTest(unittest.TestCase):
             numbers = [pose.pose.pose.position.x, pose.pose.pose.position.y, pose.pose.pose.orientation.z,
                        pose.pose.pose.orientation.w] + list(pose.pose.covariance)
             self.assertTrue(all(math.isfinite(number) for number in numbers))
+
+    def check_metric_poses(self):
+        statuses = {status.header.stamp: status for status in self.localizer.status.messages()}
+        poses = [(pose, statuses[pose.header.stamp]) for pose in self.topics['pose'].messages()
+                 if pose.header.stamp in statuses]
+        metric = [(pose, status) for pose, status in poses if status.source == LocalizationStatus.METRIC]
+        fixes = {fix.header.stamp: fix for fix in self.localizer.fix.messages()}
+        errors = fixture.errors_m([fixes[pose.header.stamp] for pose, _ in metric], fixture.truth_of(self.bag))
+        self.assertGreater(len(metric), 0.5 * len(poses))
+        print('%d of %d poses are metric, median error %.2f m' % (
+            len(metric), len(poses), sorted(errors)[len(errors) // 2]))
+        self.assertLess(sorted(errors)[len(errors) // 2], METRIC_M)
+        for pose, status in metric:
+            covariance = np.reshape(pose.pose.covariance, (6, 6))
+            self.assertTrue((np.linalg.eigvalsh(covariance) > 0.0).all())
+            self.assertGreaterEqual(covariance[0, 0] + covariance[1, 1], .999 * status.map_sigma_position ** 2)
+            self.assertEqual(status.source_name, 'METRIC')
+            self.assertGreater(status.inliers, 5)
+            self.assertEqual(status.images_since_metric, 0)
 
     def check_particles(self):
         swarm = self.topics['swarm'].last()

@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
-"""Transforms: with odometry map, odom and base agree with the pose; without odometry nothing is broadcast."""
+"""Transforms: with odometry map, odom and base agree with a metric pose, and no other pose moves the robot; without
+odometry nothing is broadcast."""
 import itertools
 import math
 import sys
 import unittest
 
+import cv2
+import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
@@ -12,13 +15,21 @@ from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
 
 import localizer_fixture as fixture
+from visual_localization.msg import LocalizationStatus
 
 DEADLINE_S = 30.0
 TOLERANCE_S = 0.1
 
 
 def yaw_of(rotation):
-    return 2.0 * math.atan2(rotation.z, rotation.w)
+    x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def dark_image():
+    image = CompressedImage(format='png')
+    image.data = cv2.imencode('.png', np.zeros((240, 320), np.uint8))[1].tobytes()
+    return image
 
 
 def base_in_odom(stamp, x, y, yaw):
@@ -45,34 +56,53 @@ class TfTest(unittest.TestCase):
             fixture.wait_for(publisher.get_num_connections, DEADLINE_S, 'a subscriber')
         self.images = itertools.cycle(fixture.images_of(rospy.get_param('~bag'), count=20))
 
-    def show_image(self, odometry=None):
-        """Shows images, with odometry of the same stamp if given, until there is a pose for one."""
+    def show(self, images, sources, odometry=None):
+        """Shows images, with odometry of the same stamp if given, until there is such a pose for one."""
         def seen():
-            image = next(self.images)
+            image = next(images)
             stamp = image.header.stamp = rospy.Time.now()
             if odometry:
                 self.odometry.publish(TFMessage([base_in_odom(stamp, *odometry)]))
             self.camera.publish(image)
             rospy.sleep(0.3)
+            if not any(s.header.stamp == stamp and s.source_name in sources for s in self.localizer.status.messages()):
+                return []
             return [pose for pose in self.poses.messages() if pose.header.stamp == stamp]
-        return fixture.wait_for(seen, DEADLINE_S, 'the pose of an image')[0]
+        return fixture.wait_for(seen, DEADLINE_S, 'a pose that is ' + ' or '.join(sources))[0]
+
+    def show_metric(self, odometry=None):
+        self.localizer.status.clear()
+        pose = self.show(self.images, ('METRIC',), odometry)
+        while self.localizer.status.last().state != LocalizationStatus.TRACKING:
+            pose = self.show(self.images, ('METRIC',), odometry)
+        return pose
+
+    def show_dark(self, odometry=None):
+        return self.show(iter(dark_image, None), ('NONE', 'PLACE'), odometry)
+
+    def transform_with(self, pose):
+        stamp = pose.header.stamp + rospy.Duration(TOLERANCE_S)
+        return fixture.wait_for(lambda: [t for t in self.from_map() if t.header.stamp == stamp], DEADLINE_S,
+                                'the transform of an image')[0]
 
     def from_map(self):
         return [t for message in self.transforms.messages() for t in message.transforms if t.header.frame_id == 'map']
 
-    def test_1_without_odometry_nothing_is_broadcast(self):
-        for _ in range(3):
-            self.show_image()
+    def test_1_before_the_first_metric_pose_nothing_is_broadcast(self):
+        self.show_dark((3.0, -2.0, 0.7))
+        self.assertEqual(self.from_map(), [])
+        self.assertIn('no metric pose', self.diagnostics.wait_for('transform', self.diagnostics.WARN, DEADLINE_S))
+
+    def test_2_without_odometry_nothing_is_broadcast(self):
+        self.show_metric()
         self.assertEqual(self.from_map(), [])
         message = self.diagnostics.wait_for('transform', self.diagnostics.WARN, DEADLINE_S)
         self.assertIn('no transform from odom to base_link', message)
 
-    def test_2_with_odometry_the_chain_leads_to_the_pose(self):
+    def test_3_with_odometry_the_chain_leads_to_the_pose(self):
         odometry = (3.0, -2.0, 0.7)
-        pose = self.show_image(odometry)
-        stamp = pose.header.stamp + rospy.Duration(TOLERANCE_S)
-        transform = fixture.wait_for(lambda: [t for t in self.from_map() if t.header.stamp == stamp], DEADLINE_S,
-                                     'the transform of an image')[0]
+        pose = self.show_metric(odometry)
+        transform = self.transform_with(pose)
         self.assertEqual(transform.child_frame_id, 'odom')
         yaw = yaw_of(transform.transform.rotation)
         x, y, base_yaw = odometry
@@ -82,6 +112,12 @@ class TfTest(unittest.TestCase):
                                pose.pose.pose.position.y, places=6)
         self.assertAlmostEqual(math.cos(yaw + base_yaw - yaw_of(pose.pose.pose.orientation)), 1.0, places=6)
         self.diagnostics.wait_for('transform', self.diagnostics.OK, DEADLINE_S)
+
+    def test_4_other_poses_leave_it_to_odometry(self):
+        before = self.transform_with(self.show_metric((3.0, -2.0, 0.7)))
+        after = self.transform_with(self.show_dark((4.0, -2.0, 0.7)))
+        self.assertEqual(after.child_frame_id, 'odom')
+        self.assertEqual(after.transform, before.transform)
 
 
 if __name__ == '__main__':
