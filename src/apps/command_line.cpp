@@ -75,7 +75,9 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   declareCamera(app, options, "the camera_info beside the image topic");
   app.add_option("--config", options.config, "Parameters, YAML (see config/map_builder.yaml)");
   app.add_option("--min-spacing", options.min_spacing_m,
-                 "Metres between training images of a session (parameter 'map/min_spacing')");
+                 "Metres between training images of a session, before the adjustment (parameter 'map/min_spacing')");
+  app.add_option("--spacing", options.spacing_m,
+                 "Metres between training images that are kept after the adjustment (parameter 'map/spacing')");
   app.add_option("--threads", options.threads, "Threads for extraction; the map does not depend on it")
       ->check(CLI::Range(std::size_t{1}, kMostThreads))
       ->capture_default_str();
@@ -104,6 +106,7 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
   app.add_option("--config", options.config, "Parameters, YAML (see config/localizer.yaml)");
   app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
   app.add_option("--features", options.features, "Features (parameter 'features')");
+  app.add_option("--pose-source", options.pose_source, "'metric' or 'place' (parameter 'pose_source')");
   app.add_option("--particles", options.particles, "Number of particles of the tracker");
   app.add_option("--seed", options.seed, "Seed of the random generator (parameter 'seed')");
   app.add_option("--map-cache-mb", options.map_cache_mb,

@@ -25,6 +25,7 @@ struct MapBuilderOptions {
   std::string camera_info;
   std::string mask;
   std::optional<double> min_spacing_m;
+  std::optional<double> spacing_m;
   std::size_t threads = allCores();
   std::optional<std::string> sift_backend;
 };
@@ -45,6 +46,7 @@ struct LocalizeOptions {
   std::string config;
   std::string tracker;
   std::string features;
+  std::string pose_source;
   std::string image_topic = "/stereo/left/image_raw";
   std::string truth_topic;
   std::string camera_info;

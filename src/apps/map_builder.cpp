@@ -44,6 +44,7 @@ MapBuilderConfig readConfig(const MapBuilderOptions& options) {
     }
   }
   if (options.min_spacing_m) overrideWith(config, "--min-spacing", "map/min_spacing", *options.min_spacing_m);
+  if (options.spacing_m) overrideWith(config, "--spacing", "map/spacing", *options.spacing_m);
   if (options.sift_backend) overrideWith(config, "--sift-backend", "map/sift_backend", *options.sift_backend);
   return config;
 }
@@ -144,6 +145,24 @@ void printCamera(const SessionImages& session, const MapBuilderOptions& options)
   std::cout << '\n';
 }
 
+void printGeometry(const SessionImages& session) {
+  const SessionLandmarks& geometry = session.geometry;
+  if (!session.camera.model) return;
+  if (geometry.contradicts_calibration) {
+    std::cout << session.name << ": the images contradict the calibration (they ask for "
+              << 100.0 * geometry.focal_scale << " % of its focal length and move " << 100.0 * geometry.far_share
+              << " % of the images by more than 3 m): a map of places\n";
+    return;
+  }
+  std::cout << session.name << ": " << geometry.images << " of " << session.kept
+            << " images with landmarks: " << geometry.landmarks << " landmarks, " << geometry.sightings
+            << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
+            << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "
+            << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
+            << " % of the calibration's\n"
+            << std::setprecision(1);
+}
+
 /// What one session brought, and whether its images were distorted to fit.
 void printImages(const SessionImages& session, cv::Size in_map) {
   std::cout << session.name << ": " << session.kept << " images";
@@ -171,9 +190,11 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
   std::cout << std::fixed << std::setprecision(1);
   for (const SessionImages& session : report.session_images) printCamera(session, options);
   for (const PlottedSession& session : sessions) printFixes(session);
+  for (const SessionImages& session : report.session_images) printGeometry(session);
   if (sessions.size() > 1) printSessionImages(report.session_images);
-  std::cout << "images: " << report.images_kept << " kept, " << report.images_without_position << " without position, "
-            << report.images_too_close << " too close, " << report.images_disordered << " out of order, "
+  std::cout << "images: " << (report.images_kept - report.images_thinned) << " kept, " << report.images_without_position
+            << " without position, " << report.images_too_close << " too close, " << report.images_thinned
+            << " left out after the adjustment, " << report.images_disordered << " out of order, "
             << report.images_unusable << " unusable\n";
   const double dropped = report.features_extracted == 0 ? 0.0
                                                         : 100.0 - 100.0 * static_cast<double>(report.features_kept) /
@@ -197,9 +218,9 @@ void printSummary(const MapBuilderOptions& options, const MapBuildReport& report
     fixes += session.verdicts.size();
     gaps += session.gaps_closed;
   }
-  std::cout << options.output << ": " << report.images_kept << " images, " << fixesKept(report) << " of " << fixes
-            << " fixes, " << gaps << " gaps closed, features " << report.features_extracted << " -> "
-            << report.features_kept << ", "
+  std::cout << options.output << ": " << (report.images_kept - report.images_thinned) << " images, "
+            << fixesKept(report) << " of " << fixes << " fixes, " << gaps << " gaps closed, features "
+            << report.features_extracted << " -> " << report.features_kept << ", "
             << humanSize(static_cast<double>(std::filesystem::file_size(options.output))) << ", " << seconds << " s\n";
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "survey/ambiguous_places.h"
+#include "survey/landmark_survey.h"
 #include "survey/map_survey.h"
 #include "visual_localization/map/training_map.h"
 
@@ -13,6 +14,7 @@ namespace visual_localization::apps {
 struct MapFindings {
   SurveyConfig config;
   MapSurvey survey;
+  LandmarkSurvey landmarks;
   std::optional<AmbiguousPlaces> ambiguity;  ///< only if it was checked
 };
 

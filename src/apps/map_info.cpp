@@ -1,4 +1,6 @@
+#include <filesystem>
 #include <iostream>
+#include <limits>
 #include <string>
 
 #include "apps/app_support.h"
@@ -16,6 +18,13 @@ AmbiguousPlaces lookForAmbiguousPlaces(const TrainingMap& map) {
   return findAmbiguousPlaces(map, {}, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
 }
 
+/// How many images to look at for landmarks: all where that is asked for or they are in memory.
+std::size_t mostImages(const MapInfoOptions& options) {
+  constexpr std::size_t kMostOfALargeMap = 2000;
+  const bool in_memory = std::filesystem::file_size(options.map) <= MapLoading().cache_bytes;
+  return options.check || in_memory ? std::numeric_limits<std::size_t>::max() : kMostOfALargeMap;
+}
+
 void showMap(const MapInfoOptions& options) {
   if (!options.geojson.empty()) requireNoInput("--export-geojson", options.geojson, {options.map});
   if (!options.csv.empty()) requireNoInput("--export-csv", options.csv, {options.map});
@@ -24,6 +33,7 @@ void showMap(const MapInfoOptions& options) {
   MapFindings findings;
   findings.config.few_features = options.few_features;
   findings.survey = survey(*map, findings.config);
+  findings.landmarks = landmarkSurvey(*map, mostImages(options));
   if (options.ambiguity) findings.ambiguity = lookForAmbiguousPlaces(*map);
   printMapReport(std::cout, options.map, *map, findings);
   if (options.check) std::cout << "\ncheck:       ok\n";

@@ -111,6 +111,21 @@ void printFeatures(std::ostream& out, const TrainingMap& map) {
       << most << '\n';
 }
 
+void printLandmarks(std::ostream& out, const TrainingMap& map, const LandmarkSurvey& survey) {
+  out << key("landmarks");
+  if (survey.images == 0) {
+    out << "none: the map recognises places, but measures no poses\n";
+    return;
+  }
+  const auto count = [](std::size_t images) { return static_cast<double>(images); };
+  out << "in " << survey.images << " of " << map.size() << " images ("
+      << percent(count(survey.images), count(map.size())) << "), ";
+  if (survey.landmarks) out << *survey.landmarks << " different ones, ";
+  out << "per image median " << survey.median << "; " << humanSize(count(survey.bytes));
+  if (!survey.landmarks) out << " in the " << survey.images_read << " images looked at (--check: all)";
+  out << '\n';
+}
+
 void printSessions(std::ostream& out, const TrainingMap& map, const MapSurvey& survey) {
   out << '\n' << key("sessions") << survey.sessions.size() << "; times are UTC\n";
   const std::size_t shown = std::min(survey.sessions.size(), kMostSessions);
@@ -270,6 +285,7 @@ void printAmbiguity(std::ostream& out, const TrainingMap& map, const AmbiguousPl
 void printMapReport(std::ostream& out, const std::string& path, const TrainingMap& map, const MapFindings& findings) {
   printFile(out, path, map);
   printFeatures(out, map);
+  printLandmarks(out, map, findings.landmarks);
   printSessions(out, map, findings.survey);
   printCameras(out, map);
   printCoverage(out, map, findings.survey);

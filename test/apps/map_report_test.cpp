@@ -29,6 +29,36 @@ std::string reportOf(const AmbiguousPlaces& places) {
   return text.str();
 }
 
+/// The line about landmarks of 20 images of which 13 have 10 each, when so many images are looked at.
+std::string landmarksOf(std::size_t most_images, bool any = true) {
+  const test::TemporaryFolder folder;
+  std::vector<TrainingImage> images = test::exampleImages(20);
+  for (TrainingImage& image : images) {
+    if (!any) image.geometry.reset();
+    if (!image.geometry) continue;
+    std::uint32_t id = 0;
+    for (SeenLandmark& landmark : image.geometry->landmarks) landmark.id = 100 + id++;
+  }
+  const TrainingMap map(test::exampleHeader(), images);
+  const std::string path = folder / "a.map";
+  saveMap(map, path);
+  MapFindings findings;
+  findings.survey = survey(map, findings.config);
+  findings.landmarks = landmarkSurvey(map, most_images);
+  std::ostringstream text;
+  printMapReport(text, path, map, findings);
+  const std::size_t begin = text.str().find("landmarks:");
+  return text.str().substr(begin, text.str().find('\n', begin) - begin);
+}
+
+TEST(MapReport, CountsLandmarks) {
+  EXPECT_EQ(landmarksOf(20), "landmarks:   in 13 of 20 images (65 %), 10 different ones, per image median 10; 4.4 kB");
+  EXPECT_EQ(landmarksOf(5),
+            "landmarks:   in 13 of 20 images (65 %), per image median 10; 1.0 kB in the 3 images looked "
+            "at (--check: all)");
+  EXPECT_THAT(landmarksOf(20, false), HasSubstr("landmarks:   none"));
+}
+
 /// Of the first session, which has images 0 to 9.
 Stretch stretch(std::size_t first, std::size_t last) { return {0, first, last, last - first + 1, 1.0, 20, 0}; }
 

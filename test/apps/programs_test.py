@@ -12,7 +12,7 @@ from program_runner import PROGRAMS, ProgramTest, run
 
 MAP, DRIVE, CONFIG, CALIBRATION = (Path(argument) for argument in sys.argv[2:6])
 HEADER = ('stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,'
-          'extract_ms,match_ms,update_ms,swept').split(',')
+          'extract_ms,match_ms,update_ms,source,inliers,reprojection_px,sigma_m,sigma_yaw_rad,swept').split(',')
 TIMES = ('extract_ms', 'match_ms', 'update_ms')
 
 
@@ -39,11 +39,18 @@ class ProgramsTest(ProgramTest):
         self.assertEqual(len(rows), 403)
         for row in rows:
             for name in HEADER:
-                if name not in ('state', 'features'):
+                if name not in ('state', 'features', 'source'):
                     self.assertTrue(math.isfinite(float(row[name])), row)
         self.assertGreater(sum(row['state'] == 'TRACKING' for row in rows), 0.8 * len(rows))
+        self.assertGreater(sum(row['source'] == 'METRIC' for row in rows), 0.9 * len(rows))
         error = float(self.output.split('mean ')[1].split(' m')[0])
-        self.assertLess(error, 3.0)
+        self.assertLess(error, 0.5)
+
+    def test_pose_source_chooses_between_landmarks_and_places(self):
+        rows = self.localize('--pose-source', 'place', '--config', CONFIG)
+        self.assertEqual({row['source'] for row in rows} - {'PLACE', 'NONE'}, set())
+        self.assert_refused(run('localize', '--map', MAP, '--bag', DRIVE, '--output', self.folder / 'no.csv',
+                                '--pose-source', 'gps'), 2, 'pose_source')
 
     def test_same_seed_gives_the_same_track_another_seed_another_one(self):
         def positions(rows):
