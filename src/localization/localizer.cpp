@@ -77,7 +77,6 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.state = state;
   estimate.pose = poseOf(tracked, state);
   estimate.metric = metric;
-  estimate.source = metric ? PoseSource::kMetric : tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
   estimate.images_since_metric = verifier_->imagesSince();
   estimate.tracked = tracked;
   choosePose(stamp_ns, estimate);
