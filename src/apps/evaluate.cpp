@@ -1,5 +1,6 @@
 // Repeats the papers' experiments on recordings: every method on every pair of recordings, from every start image.
 
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "apps/app_support.h"
 #include "apps/command_line.h"
 #include "base/files.h"
+#include "base/text.h"
 #include "evaluation/evaluator.h"
 #include "evaluation/experiment.h"
 #include "evaluation/result_folder.h"
@@ -29,15 +31,29 @@ std::string bagPath(const EvaluateOptions& options, const RoundSpec& round) {
   return (folder / round.bag).string();
 }
 
-/// What besides the configuration decides about the results: the bags, by their sizes, and this version.
+/// Of small files, to notice that one was edited (FNV-1a, 64 bits).
+std::string fingerprintOf(const std::string& path) {
+  std::uint64_t hash = 14695981039346656037U;
+  for (const char c : readFile(path)) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  return std::to_string(hash);
+}
+
+/// What besides the configuration decides about the results: the bags, by their sizes, the files beside them, and this
+/// version.
 std::string provenanceOf(const Experiment& experiment, const EvaluateOptions& options) {
-  std::string text = std::string("what,value\npackage_version,") + VISUAL_LOCALIZATION_VERSION + "\n";
+  std::string text = std::string("what,value\npackage_version,") + VISUAL_LOCALIZATION_VERSION + "\nunit_format," +
+                     std::to_string(kUnitFormat) + "\n";
   for (const RoundSpec& round : experiment.rounds) {
     std::error_code error;
     const auto size = fs::file_size(bagPath(options, round), error);
     if (error)
       throw BagError(bagPath(options, round) + ": recording " + round.name + " cannot be read: " + error.message());
     text += "bytes of " + round.name + "," + std::to_string(size) + "\n";
+    for (const std::string& file : {round.camera_info, round.poses}) {
+      if (file.empty()) continue;
+      text +=
+          csvField(file) + " of " + round.name + "," + fingerprintOf(besideBag(bagPath(options, round), file)) + "\n";
+    }
   }
   return text;
 }
@@ -60,7 +76,11 @@ void runExperiment(const Experiment& experiment, const ResultFolder& results, co
   const RoundSource source{
       [&](const RoundSpec& round) { return recordMap(bagPath(options, round), round, experiment.map); },
       [&](const RoundSpec& round) {
-        return recordDrive(bagPath(options, round), round, experiment.map, experiment.front_end);
+        return recordDrive(bagPath(options, round), round, experiment.map, experiment.front_end,
+                           experiment.solvesPoses());
+      },
+      [&](const RoundSpec& round, const TrainingMap& map) {
+        return trueMapPoses(bagPath(options, round), round, experiment.map, map);
       }};
   cv::setNumThreads(1);  // the threads are spread over recordings and runs
   StageBars bars;

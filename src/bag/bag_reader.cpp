@@ -251,9 +251,13 @@ std::optional<CameraModel> BagReader::camera(const std::string& image_topic) con
   });
 }
 
+bool BagReader::hasFixes(const std::string& topic) const {
+  return withBag(path_, [&] { return topicsOf<sensor_msgs::NavSatFix>(*file_).count(topic) != 0; });
+}
+
 std::vector<Fix> BagReader::fixes(const std::string& topic) const {
   return withBag(path_, [&] {
-    if (topicsOf<sensor_msgs::NavSatFix>(*file_).count(topic) == 0) {
+    if (!hasFixes(topic)) {
       throw BagError(path_ + ": no fix topic '" + topic +
                      "'; fix topics in this bag: " + listTopics<sensor_msgs::NavSatFix>(*file_));
     }

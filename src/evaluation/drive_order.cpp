@@ -15,6 +15,30 @@ void requireIndex(const std::string& name, std::size_t index, std::size_t images
                               std::to_string(images - 1));
 }
 
+std::vector<std::size_t> outsideGap(std::size_t images, double gap) {
+  constexpr double kBegin = 0.35;
+  const auto shareOfMap = [images](double part) {
+    return static_cast<std::size_t>(std::lround(part * static_cast<double>(images)));
+  };
+  const std::size_t begin = shareOfMap(kBegin);
+  const std::size_t end = begin + (gap > 0.0 ? shareOfMap(gap) : 0);
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < images; ++i) {
+    if (i < begin || i >= end) kept.push_back(i);
+  }
+  return kept;
+}
+
+std::vector<std::size_t> spaced(const TrainingMap& map, const std::vector<std::size_t>& images, double spacing_m) {
+  std::vector<std::size_t> kept;
+  for (const std::size_t i : images) {
+    const bool follows = !kept.empty() && map.pose(kept.back()).session == map.pose(i).session;
+    if (follows && (map.position_m(i) - map.position_m(kept.back())).norm() < spacing_m) continue;
+    kept.push_back(i);
+  }
+  return kept;
+}
+
 }  // namespace
 
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start,
@@ -59,18 +83,11 @@ std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_
   return starts;
 }
 
-PartialMap withGap(std::shared_ptr<const TrainingMap> map, double share) {
-  constexpr double kBegin = 0.35;
-  if (share <= 0.0) return {std::move(map), {}};
-  const auto shareOfMap = [&map](double part) {
-    return static_cast<std::size_t>(std::lround(part * static_cast<double>(map->size())));
-  };
-  const std::size_t begin = shareOfMap(kBegin);
-  const std::size_t end = begin + shareOfMap(share);
+PartialMap partOf(std::shared_ptr<const TrainingMap> map, double gap, double spacing_m) {
+  if (gap <= 0.0 && spacing_m <= 0.0) return {std::move(map), {}};
   PartialMap partial;
   std::vector<TrainingImage> kept;
-  for (std::size_t i = 0; i < map->size(); ++i) {
-    if (i >= begin && i < end) continue;
+  for (const std::size_t i : spaced(*map, outsideGap(map->size(), gap), spacing_m)) {
     kept.push_back(map->image(i));
     partial.images.push_back(i);
   }

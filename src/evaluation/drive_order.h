@@ -40,7 +40,8 @@ struct PartialMap {
   std::vector<std::size_t> images;  ///< index in the whole map of each image that is left; empty when all are
 };
 
-/// Leaves out `share` of the images, beginning with image 0.35 * size; all stay when it is 0. At least one stays.
-PartialMap withGap(std::shared_ptr<const TrainingMap> map, double share);
+/// Leaves out the share `gap` of the images, beginning with image 0.35 * size, and then those nearer than `spacing_m`
+/// to the last kept one of their session, as map/spacing does; all stay when both are 0. At least one stays.
+PartialMap partOf(std::shared_ptr<const TrainingMap> map, double gap, double spacing_m = 0.0);
 
 }  // namespace visual_localization

@@ -53,10 +53,12 @@ class Evaluation {
         tasks.size(), threads_,
         [&](std::size_t i) {
           const auto [round, is_map] = tasks[i];
+          const RoundSpec& spec = experiment_.rounds[round];
           if (is_map) {
-            rounds_[round].map = source_.map(experiment_.rounds[round]);
+            rounds_[round].map = source_.map(spec);
+            if (source_.map_truth) rounds_[round].map_truth = source_.map_truth(spec, *rounds_[round].map);
           } else {
-            rounds_[round].drive = source_.drive(experiment_.rounds[round]);
+            rounds_[round].drive = source_.drive(spec);
           }
         },
         [&](std::size_t done, std::size_t total) { progress_("reading rounds", done, total); });
@@ -80,10 +82,11 @@ class Evaluation {
     const ScoreTable table(drive, *map, experiment_.front_end.match, threads_);
     const StageCosts costs{drive.sift_ms, drive.global_ms, table.siftCompare_ms(), table.globalCompare_ms()};
     for (const std::size_t method : missingMethods(pair)) {
-      const PartialMap partial = withGap(map, experiment_.methods[method].map_gap);
-      const RunContext context{partial, drive, table, experiment_.closed};
-      results_.save(pair, method,
-                    summariseRuns(runMethod(context, experiment_.methods[method], startsOf(pair)), costs));
+      const MethodSpec& how = experiment_.methods[method];
+      const PartialMap partial = partOf(map, how.map_gap, how.map_spacing_m);
+      const RunContext context{partial, drive, table, experiment_.closed,
+                               mapErrors(partial, rounds_[spec.map].map_truth, drive)};
+      results_.save(pair, method, summariseRuns(runMethod(context, how, startsOf(pair)), costs));
     }
   }
 

@@ -2,7 +2,10 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "evaluation/experiment.h"
 #include "evaluation/result_folder.h"
@@ -22,6 +25,8 @@ struct Shard {
 struct RoundSource {
   std::function<std::shared_ptr<const TrainingMap>(const RoundSpec&)> map;
   std::function<std::shared_ptr<const Drive>(const RoundSpec&)> drive;
+  /// True poses of the images of a round's map; may be missing, and its answer empty, when nothing is known.
+  std::function<std::vector<std::optional<TruePose>>(const RoundSpec&, const TrainingMap&)> map_truth = {};
 };
 
 /// Says how far a stage of the work is.

@@ -4,27 +4,15 @@
 #include <set>
 
 #include "base/text.h"
+#include "evaluation/experiment_methods.h"
 #include "parameters/yaml_map.h"
 
 namespace visual_localization {
 namespace {
 
 using parameters::YamlMap;
-using Setting = std::pair<std::string, std::string>;
 
-constexpr double kSlowest = 1.0 / 64.0;
-constexpr double kFastest = 64.0;
 constexpr std::size_t kMostStarts = 1000000;
-constexpr std::size_t kMostCombinations = 10000;
-constexpr std::size_t kMostMethods = 10000;
-constexpr std::size_t kLongestName = 1000;
-
-/// A name for tables and messages.
-std::string readName(YamlMap& yaml, const std::string& key) {
-  std::string name = yaml.text(key);
-  if (name.empty() || name.find('\n') != std::string::npos) yaml.refuse(key, "must be a name of one line");
-  return name;
-}
 
 std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   std::vector<RoundSpec> rounds;
@@ -32,6 +20,7 @@ std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   common.image_topic = yaml.text("image_topic", "/stereo/left/image_raw");
   common.fix_topic = yaml.text("fix_topic", "/gps/fix");
   common.truth_topic = yaml.text("truth_topic", common.fix_topic);
+  common.camera_info = yaml.text("camera_info", "");
   std::set<std::string> names;
   for (YamlMap& bag : yaml.maps("bags")) {
     RoundSpec round;
@@ -41,6 +30,8 @@ std::vector<RoundSpec> readRounds(YamlMap& yaml) {
     round.image_topic = bag.text("image_topic", common.image_topic);
     round.fix_topic = bag.text("fix_topic", common.fix_topic);
     round.truth_topic = bag.text("truth_topic", common.truth_topic);
+    round.camera_info = bag.text("camera_info", common.camera_info);
+    round.poses = bag.text("poses", "");
     bag.requireNoMore();
     const bool usable = !round.name.empty() && round.name.find_first_of("/ ,\"\n") == std::string::npos;
     if (!usable) bag.refuse("name", "= '" + round.name + "' must be a name without slash, comma, quote or space");
@@ -86,154 +77,7 @@ std::vector<PairSpec> readPairs(YamlMap& yaml, const std::vector<RoundSpec>& rou
   return pairs;
 }
 
-using Sweep = std::vector<std::pair<std::string, std::vector<std::string>>>;
-
-/// What a method's entry sweeps over; not what it sets as well.
-Sweep readSweep(YamlMap& yaml, const ParameterValues& parameters) {
-  Sweep sweep = yaml.sweep("sweep");
-  std::size_t combinations = 1;
-  for (const auto& [key, values] : sweep) {
-    if (parameters.count(key) != 0 || (key == "speed" && yaml.has(key))) {
-      yaml.refuse("sweep/" + key, "is set for this method already");
-    }
-    combinations *= values.size();
-    if (combinations > kMostCombinations) {
-      yaml.refuse("sweep", "has more than " + std::to_string(kMostCombinations) + " combinations");
-    }
-  }
-  return sweep;
-}
-
-/// All combinations of the sweep's values, the last key changing fastest; one empty combination without a sweep.
-std::vector<std::vector<Setting>> combinationsOf(const Sweep& sweep) {
-  std::vector<std::vector<Setting>> combinations{{}};
-  for (const auto& [key, values] : sweep) {
-    std::vector<std::vector<Setting>> longer;
-    for (const auto& combination : combinations) {
-      for (const std::string& value : values) {
-        longer.push_back(combination);
-        longer.back().emplace_back(key, value);
-      }
-    }
-    combinations = std::move(longer);
-  }
-  return combinations;
-}
-
-/// The name of a method with the sweep's values in it.
-std::string withValues(std::string name, const std::vector<Setting>& settings, const YamlMap& yaml) {
-  for (const auto& [key, value] : settings) {
-    const std::string placeholder = "{" + key + "}";
-    for (auto at = name.find(placeholder); at != std::string::npos; at = name.find(placeholder, at + value.size())) {
-      name.replace(at, placeholder.size(), value);
-      if (name.size() > kLongestName) yaml.refuse("name", "= '" + name.substr(0, 100) + "...' becomes too long");
-    }
-  }
-  return name;
-}
-
-bool concernsFrontEnd(const std::string& parameter) {
-  return parameter.rfind("match/", 0) == 0 || parameter == "prune" || parameter == "max_image_gap" ||
-         parameter == "sift_backend";
-}
-
-/// What the entry of one method says before the sweep's values are filled in.
-struct MethodEntry {
-  std::string name;
-  MethodSpec method;
-  ParameterValues parameters;
-};
-
-void applyParameters(MethodEntry& entry, const YamlMap& yaml) {
-  for (const auto& [key, value] : entry.parameters) {
-    if (concernsFrontEnd(key)) yaml.refuse("parameters", "'" + key + "' holds for all methods: set it at the top");
-    entry.method.settings.emplace_back(key, parameters::toString(value));
-  }
-  try {
-    if (entry.method.isTracker()) {
-      entry.parameters["tracker"] = entry.method.tracker;
-      assignParameters(entry.method.localizer, entry.parameters);
-    } else {
-      assignParameters(entry.method.recogniser, entry.parameters);
-    }
-  } catch (const ParameterError& error) {
-    yaml.refuse("parameters", std::string("of '") + entry.method.name + "': " + error.what());
-  }
-}
-
-MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const YamlMap& yaml) {
-  MethodSpec& method = entry.method;
-  method.name = withValues(entry.name, swept, yaml);
-  for (const auto& [key, value] : swept) {
-    if (key != "speed") {
-      entry.parameters[key] = parameters::parseScalar(value);
-      continue;
-    }
-    const ParameterValue speed = parameters::parseScalar(value);
-    const auto* whole = std::get_if<std::int64_t>(&speed);
-    const auto* real = std::get_if<double>(&speed);
-    method.speed = whole != nullptr ? static_cast<double>(*whole) : real != nullptr ? *real : 0.0;
-    if (!(method.speed >= kSlowest && method.speed <= kFastest)) {
-      yaml.refuse("sweep", "speed = " + value + " must be a number in [1/64, 64]");
-    }
-  }
-  method.settings = {{"tracker", method.tracker},
-                     {"features", method.localizer.features},
-                     {"speed", parameters::toString(method.speed)},
-                     {"kidnapped", method.kidnapped ? "true" : "false"},
-                     {"map_gap", parameters::toString(method.map_gap)},
-                     {"covered", parameters::toString(method.covered)}};
-  applyParameters(entry, yaml);
-  return method;
-}
-
-std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
-  MethodEntry entry;
-  entry.name = readName(yaml, "name");
-  entry.method.localizer = base;
-  entry.method.tracker = yaml.text("tracker", base.tracker);
-  const std::vector<std::string>& recognisers = placeRecogniserNames();
-  const bool is_recogniser =
-      std::find(recognisers.begin(), recognisers.end(), entry.method.tracker) != recognisers.end();
-  try {
-    ParameterValues chosen{{"features", yaml.text("features", base.features)}};
-    if (!is_recogniser) chosen["tracker"] = entry.method.tracker;
-    assignParameters(entry.method.localizer, chosen);
-  } catch (const ParameterError& error) {
-    yaml.refuse("name",
-                "'" + entry.name + "': " + error.what() + " (beside the trackers: " + joined(recognisers) + ")");
-  }
-  if (is_recogniser && entry.method.localizer.features == "hybrid") {
-    yaml.refuse("features", "= hybrid needs a tracker's cloud, and '" + entry.method.tracker + "' has none");
-  }
-  entry.method.speed = yaml.real("speed", 1.0, kSlowest, kFastest);
-  entry.method.kidnapped = yaml.flag("kidnapped", false);
-  entry.method.map_gap = yaml.real("map_gap", 0.0, 0.0, 0.6);
-  entry.method.covered = yaml.real("covered", 0.0, 0.0, 0.5);
-  entry.parameters = yaml.parameters("parameters");
-  std::vector<MethodSpec> methods;
-  for (const auto& swept : combinationsOf(readSweep(yaml, entry.parameters)))
-    methods.push_back(completed(entry, swept, yaml));
-  yaml.requireNoMore();
-  return methods;
-}
-
-std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) {
-  std::vector<MethodSpec> methods;
-  std::set<std::string> names;
-  for (YamlMap& entry : yaml.maps("methods")) {
-    for (MethodSpec& method : readMethod(entry, base)) {
-      if (!names.insert(method.name).second) entry.refuse("name", "= '" + method.name + "' appears twice");
-      methods.push_back(std::move(method));
-    }
-    if (methods.size() > kMostMethods) {
-      yaml.refuse("methods", "and their sweeps are more than " + std::to_string(kMostMethods) + " methods");
-    }
-  }
-  return methods;
-}
-
-/// As in the papers: recorded images are known by their scores, which say nothing about landmarks.
+/// As in the papers, unless the experiment says otherwise.
 MapBuilderConfig placesOnly() {
   MapBuilderConfig config;
   config.geometry.enabled = false;
@@ -278,6 +122,12 @@ Experiment parse(YamlMap yaml) {
 bool MethodSpec::isTracker() const {
   const std::vector<std::string>& recognisers = placeRecogniserNames();
   return std::find(recognisers.begin(), recognisers.end(), tracker) == recognisers.end();
+}
+
+bool Experiment::solvesPoses() const {
+  return map.geometry.enabled && std::any_of(methods.begin(), methods.end(), [](const MethodSpec& method) {
+           return method.isTracker() && method.localizer.metric.pose_source == "metric";
+         });
 }
 
 Experiment parseExperiment(const std::string& yaml, const std::string& path) {

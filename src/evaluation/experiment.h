@@ -19,6 +19,8 @@ struct RoundSpec {
   std::string image_topic;
   std::string fix_topic;    ///< what a map of this round gets its positions from
   std::string truth_topic;  ///< what estimates are judged by; if it is the fix topic, its cleaned positions
+  std::string camera_info;  ///< calibration, a file beside the bag; empty: the bag's camera_info
+  std::string poses;        ///< true poses of the camera, a file beside the bag; empty: not known
 };
 
 /// One round becomes the map, another one is driven. Indices into Experiment::rounds.
@@ -33,10 +35,11 @@ struct MethodSpec {
   std::string tracker;        ///< "dpso", ... or a name of placeRecogniserNames()
   LocalizerConfig localizer;  ///< its `features` hold for place recognisers too
   PlaceRecogniserConfig recogniser;
-  double speed = 1.0;      ///< simulated speed: images of the drive per step
-  bool kidnapped = false;  ///< carried to the other side of the drive after half of the run
-  double map_gap = 0.0;    ///< share of the map's images that are left out
-  double covered = 0.0;    ///< share of the run, after its half, during which something covers the camera
+  double speed = 1.0;          ///< simulated speed: images of the drive per step
+  bool kidnapped = false;      ///< carried to the other side of the drive after half of the run
+  double map_gap = 0.0;        ///< share of the map's images that are left out
+  double map_spacing_m = 0.0;  ///< training images nearer than this to the last one are left out
+  double covered = 0.0;        ///< share of the run, after its half, during which something covers the camera
   std::vector<std::pair<std::string, std::string>> settings;  ///< all of the above that the experiment sets, as text
 
   bool isTracker() const;
@@ -53,6 +56,9 @@ struct Experiment {
   MapBuilderConfig map;
   LocalizerConfig front_end;  ///< extraction, pruning and matching, the same for all methods
   std::vector<MethodSpec> methods;
+
+  /// Whether a method solves poses from landmarks: then drives need all their features.
+  bool solvesPoses() const;
 };
 
 /// The experiment that the text of a YAML file describes; `path` is for messages. Throws ParameterError, in one line

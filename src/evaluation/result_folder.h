@@ -51,8 +51,8 @@ class ResultFolder {
 /// them is damaged. Returns how many were copied.
 std::size_t mergeResults(const ResultFolder& from, const ResultFolder& to, const Experiment& experiment);
 
-/// Writes summary.csv, pairs.csv, methods.csv, steps.csv and traces.csv of a complete experiment into its folder.
-/// Throws ResultError naming the first result that is missing.
+/// Writes summary.csv, pairs.csv, methods.csv, steps.csv, traces.csv and trajectories/ of a complete experiment into
+/// its folder. Throws ResultError naming the first result that is missing.
 void writeResultTables(const Experiment& experiment, const ResultFolder& results);
 
 }  // namespace visual_localization

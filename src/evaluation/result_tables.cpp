@@ -8,6 +8,7 @@
 #include "base/statistics.h"
 #include "base/text.h"
 #include "evaluation/result_folder.h"
+#include "evaluation/trajectory_files.h"
 
 namespace visual_localization {
 namespace {
@@ -15,7 +16,10 @@ namespace {
 const char* const kMeasures =
     "runs,mean_err_m,std_err_m,comparisons_per_image,ms_per_image,sift_share,median_err_m,within_5m,steps_to_localise,"
     "steps_to_relocalise,recall_at_p99,extract_ms,match_ms,update_ms,tracking_share,wrong_tracking,lost_precision,"
-    "lost_recall,off_map_precision,off_map_recall";
+    "lost_recall,off_map_precision,off_map_recall,heading_err_deg,wrong_1m_share,wrong_5m_share,inside_95_share,"
+    "metric_share,p95_err_m,recall_025m_2deg,recall_05m_5deg,recall_5m_10deg,nees,relative_err_m,relative_p95_err_m,"
+    "relative_heading_err_deg,relative_recall_025m_2deg,relative_recall_05m_5deg,relative_recall_5m_10deg,"
+    "relative_nees";
 
 constexpr int kDigits = 6;
 
@@ -70,16 +74,19 @@ std::size_t judgedOf(const UnitResult& unit) {
 }
 
 /// Mean of a figure over the pairs that have a true position; NaN without any.
-double meanOfPairs(const std::vector<UnitResult>& units, double UnitResult::*figure) {
+double meanOfPairs(const std::vector<UnitResult>& units, double UnitResult::*figure,
+                   std::size_t (*imagesOf)(const UnitResult&) = judgedOf) {
   double sum = 0.0;
   double judged = 0.0;
   for (const UnitResult& unit : units) {
-    if (judgedOf(unit) == 0) continue;
+    if (imagesOf(unit) == 0) continue;
     sum += unit.*figure;
     judged += 1.0;
   }
   return sum / judged;
 }
+
+std::size_t relativeOf(const UnitResult& unit) { return unit.poses.relative.positions; }
 
 /// A field for a number, empty when it is unknown.
 struct Known {
@@ -87,6 +94,24 @@ struct Known {
 };
 std::ostream& operator<<(std::ostream& out, Known known) {
   return std::isnan(known.number) ? out : out << known.number;
+}
+
+/// What the poses of a method on several pairs come to, with a comma before each.
+std::string poseMeasuresOf(const std::vector<UnitResult>& units) {
+  PoseFigures poses;
+  for (const UnitResult& unit : units) poses += unit.poses;
+  const PoseErrors& absolute = poses.absolute;
+  const PoseErrors& relative = poses.relative;
+  std::ostringstream out = numberStream(kDigits);
+  for (const double figure :
+       {absolute.meanHeading_deg(), poses.wrong1mShare(), poses.wrong5mShare(), absolute.insideShare(),
+        poses.metricShare(), meanOfPairs(units, &UnitResult::p95_err_m), absolute.recall(0), absolute.recall(1),
+        absolute.recall(2), absolute.meanNees(), relative.meanPosition_m(),
+        meanOfPairs(units, &UnitResult::p95_relative_err_m, relativeOf), relative.meanHeading_deg(), relative.recall(0),
+        relative.recall(1), relative.recall(2), relative.meanNees()}) {
+    out << ',' << Known{figure};
+  }
+  return out.str();
 }
 
 /// One method on several pairs.
@@ -119,7 +144,7 @@ std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
                              trust.offMapPrecision(), trust.offMapRecall()}) {
     out << ',' << Known{share};
   }
-  return out.str();
+  return out.str() + poseMeasuresOf(units);
 }
 
 using Groups = std::pair<std::string, std::string>;
@@ -183,6 +208,7 @@ void writeGroupTables(const Experiment& experiment, const ResultFolder& results)
 void writePairTables(const Experiment& experiment, const ResultFolder& results) {
   std::ostringstream measures = table(std::string("train_round,test_round,train_group,test_group,method,") + kMeasures);
   std::ostringstream traces = table(std::string("train_round,test_round,method,") + kTraceColumns);
+  TrajectoryFiles trajectories(results.path());
   for (std::size_t pair = 0; pair < experiment.pairs.size(); ++pair) {
     const RoundSpec& map = experiment.rounds[experiment.pairs[pair].map];
     const RoundSpec& drive = experiment.rounds[experiment.pairs[pair].drive];
@@ -194,6 +220,7 @@ void writePairTables(const Experiment& experiment, const ResultFolder& results) 
                << '\n';
       const std::string prefix = csvField(map.name) + ',' + csvField(drive.name) + ',' + csvField(spec.name) + ',';
       for (const std::string& row : unit.trace) traces << prefix << row << '\n';
+      trajectories.write(spec.name, map.name, drive.name, unit);
     }
   }
   writeFile(results.path() + "/pairs.csv", measures.str());

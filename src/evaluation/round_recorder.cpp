@@ -1,21 +1,37 @@
 #include "evaluation/round_recorder.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "base/files.h"
 #include "base/time.h"
+#include "ros/camera_info.h"
+#include "visual_localization/camera/mask.h"
 #include "visual_localization/features/front_end.h"
 
 namespace visual_localization {
 namespace {
 
-using Truth = std::function<std::optional<GeodeticPoint>(std::int64_t stamp_ns)>;
+using Truth = std::function<std::optional<TruePose>(std::int64_t stamp_ns)>;
 
-/// True positions at any time. The topic that maps are made from is no better than a map: it is cleaned like one.
+/// The true poses of a recording in the frame of its true positions; none when it has no file of them.
+Trajectory truePoses(const BagReader& bag, const RoundSpec& recording, const Trajectory& positions) {
+  if (recording.poses.empty()) return {};
+  const std::string path = besideBag(bag.path(), recording.poses);
+  const Trajectory poses = readPoses(path);
+  try {
+    return movedOnto(positions, poses);
+  } catch (const std::runtime_error& error) {
+    throw FileError(path + ": " + error.what() + " (" + recording.truth_topic + " in " + bag.path() + ")");
+  }
+}
+
+/// True poses at any time. The topic that maps are made from is no better than a map: it is cleaned like one.
 Truth truthOf(const BagReader& bag, const RoundSpec& recording, const TrajectoryCleanerConfig& config) {
   const std::vector<Fix> fixes = bag.fixes(recording.truth_topic);
   const auto first =
@@ -27,11 +43,20 @@ Truth truthOf(const BagReader& bag, const RoundSpec& recording, const Trajectory
   Trajectory trajectory = recording.truth_topic == recording.fix_topic
                               ? cleanTrajectory(fixes, frame, config).trajectory
                               : trueTrajectory(bag, recording.truth_topic, frame);
-  return [frame, trajectory = std::move(trajectory)](std::int64_t stamp_ns) -> std::optional<GeodeticPoint> {
+  Trajectory poses = truePoses(bag, recording, trajectory);
+  return [frame, trajectory = std::move(trajectory),
+          poses = std::move(poses)](std::int64_t stamp_ns) -> std::optional<TruePose> {
+    if (const auto pose = poses.at(stamp_ns)) return TruePose{frame.toGeodetic(pose->position_m), pose->yaw_rad};
     const std::optional<TrajectoryPoint> point = trajectory.at(stamp_ns);
     if (!point) return std::nullopt;
-    return frame.toGeodetic(point->position_m);
+    return TruePose{frame.toGeodetic(point->position_m)};
   };
+}
+
+/// The camera of a recording, for its images as they are recorded.
+std::optional<CameraModel> cameraOf(const BagReader& bag, const RoundSpec& recording) {
+  if (recording.camera_info.empty()) return bag.camera(recording.image_topic);
+  return readCameraFile(besideBag(bag.path(), recording.camera_info));
 }
 
 /// The images of a recording with their stamps, without those that cannot be used.
@@ -53,9 +78,11 @@ void forEachImage(const BagReader& bag, const std::string& topic,
 /// Sees images and adds them to a drive.
 class DriveRecorder {
  public:
-  DriveRecorder(const SiftConfig& sift, const LocalizerConfig& config) : sift_(sift), config_(config) {}
+  /// `for_poses`: keeps features that are not pruned.
+  DriveRecorder(const SiftConfig& sift, const LocalizerConfig& config, bool for_poses)
+      : sift_(sift), config_(config), for_poses_(for_poses) {}
 
-  void add(std::int64_t stamp_ns, const cv::Mat& grey, const std::optional<GeodeticPoint>& truth) {
+  void add(std::int64_t stamp_ns, const cv::Mat& grey, const std::optional<TruePose>& truth) {
     if (!front_end_) {
       drive_.image_size = grey.size();
       MapHeader like_the_map;
@@ -65,11 +92,12 @@ class DriveRecorder {
     }
     front_end_->setImage(stamp_ns, grey);
     const CpuStopwatch sift_watch;
-    DriveImage image{stamp_ns, truth, front_end_->sift(), {}};
+    DriveImage image{stamp_ns, truth, front_end_->sift(), {}, {}};
     drive_.sift_ms += sift_watch.elapsed_ms();
     const CpuStopwatch global_watch;
     image.global = front_end_->global();
     drive_.global_ms += global_watch.elapsed_ms();
+    if (for_poses_) image.unpruned = front_end_->unprunedSift();
     drive_.images.push_back(std::move(image));
   }
 
@@ -83,11 +111,16 @@ class DriveRecorder {
  private:
   SiftConfig sift_;
   LocalizerConfig config_;
+  bool for_poses_;
   std::optional<FrontEnd> front_end_;
   Drive drive_;
 };
 
 }  // namespace
+
+std::string besideBag(const std::string& bag, const std::string& file) {
+  return (std::filesystem::path(bag).parent_path() / file).string();
+}
 
 Trajectory trueTrajectory(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
   std::vector<TrajectoryPoint> points;
@@ -105,24 +138,34 @@ std::shared_ptr<const TrainingMap> recordMap(const std::string& path, const Roun
   const BagReader bag(path);
   MapBuilder builder(config);
   const std::vector<Fix> fixes = bag.fixes(recording.fix_topic);
+  const std::optional<CameraModel> camera = cameraOf(bag, recording);
+  if (config.geometry.enabled && !camera) {
+    throw BagError(path + ": the camera of " + recording.name + " is not calibrated (no " +
+                   cameraInfoTopic(recording.image_topic) +
+                   "): name its camera_info, or set geometry/enabled to false for places only");
+  }
   try {
-    builder.beginSession(recording.name, fixes, {bag.camera(recording.image_topic), {}});
+    builder.beginSession(recording.name, fixes, {camera, {}});
     forEachImage(bag, recording.image_topic, [&builder](std::int64_t stamp_ns, const cv::Mat& grey) {
       if (builder.wants(stamp_ns)) builder.addImage(stamp_ns, grey);
     });
     return builder.build();
   } catch (const BagError&) {
     throw;
+  } catch (const CameraError& error) {
+    throw BagError(path + ": " + recording.image_topic + ": " + error.what());
   } catch (const std::runtime_error& error) {
     throw BagError(path + ": " + recording.fix_topic + ": " + error.what());
   }
 }
 
 std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpec& recording,
-                                         const MapBuilderConfig& map, const LocalizerConfig& front_end) {
+                                         const MapBuilderConfig& map, const LocalizerConfig& front_end,
+                                         bool for_poses) {
   const BagReader bag(path);
   const Truth truth = truthOf(bag, recording, map.trajectory);
-  DriveRecorder recorder(map.sift, front_end);
+  const std::optional<CameraModel> camera = for_poses ? cameraOf(bag, recording) : std::nullopt;
+  DriveRecorder recorder(map.sift, front_end, for_poses);
   forEachImage(bag, recording.image_topic,
                [&](std::int64_t stamp_ns, const cv::Mat& grey) { recorder.add(stamp_ns, grey, truth(stamp_ns)); });
   auto drive = std::make_shared<Drive>(recorder.finish());
@@ -130,7 +173,23 @@ std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpe
   const bool judged = std::any_of(drive->images.begin(), drive->images.end(),
                                   [](const DriveImage& image) { return image.truth.has_value(); });
   if (!judged) throw BagError(path + ": no image has a true position on " + recording.truth_topic);
+  try {
+    if (camera) drive->camera = fittedTo(drive->image_size, *camera);
+  } catch (const CameraError& error) {
+    throw BagError(path + ": " + recording.image_topic + ": " + error.what());
+  }
   return drive;
+}
+
+std::vector<std::optional<TruePose>> trueMapPoses(const std::string& path, const RoundSpec& recording,
+                                                  const MapBuilderConfig& config, const TrainingMap& map) {
+  if (recording.poses.empty() && recording.truth_topic == recording.fix_topic) return {};
+  const BagReader bag(path);
+  if (recording.poses.empty() && !bag.hasFixes(recording.truth_topic)) return {};
+  const Truth truth = truthOf(bag, recording, config.trajectory);
+  std::vector<std::optional<TruePose>> poses;
+  for (std::size_t i = 0; i < map.size(); ++i) poses.push_back(truth(map.pose(i).stamp_ns));
+  return poses;
 }
 
 }  // namespace visual_localization

@@ -7,6 +7,7 @@
 
 #include "base/time.h"
 #include "evaluation/drive_order.h"
+#include "evaluation/pose_judge.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
@@ -39,9 +40,12 @@ LocalizerConfig seeded(LocalizerConfig config, std::uint32_t seed) {
 /// A tracker, run by the localizer that runs on the robot.
 class TrackerContestant final : public Contestant {
  public:
+  /// `camera`: of the drive; none: that of the map.
   TrackerContestant(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config,
-                    std::shared_ptr<RecordedImage> image)
-      : similarity_(config.similarity), localizer_(std::move(map), config, std::move(image)) {}
+                    std::shared_ptr<RecordedImage> image, const std::optional<CameraModel>& camera)
+      : similarity_(config.similarity), localizer_(std::move(map), config, std::move(image)) {
+    if (camera) localizer_.setCamera(*camera);
+  }
 
   Verdict process(std::int64_t stamp_ns) override {
     const Estimate estimate = localizer_.process(stamp_ns, cv::Mat());
@@ -116,13 +120,17 @@ std::size_t stepsUntilRight(const std::vector<StepRecord>& steps, std::size_t be
 class ExtractionCounter {
  public:
   void add(const RecordedImage& image, RunRecord& record) {
-    const bool sift = image.siftComparisons() > 0;
+    const bool compared = image.siftComparisons() > 0;
     // Pruning needs the SIFT features of the image before; a hybrid that comes from global features has none yet.
-    if (sift) record.sift_extractions += first_ || previous_had_sift_ ? 1 : 2;
+    if (compared) {
+      record.sift_extractions += first_ || previous_had_sift_ ? 1 : 2;
+    } else if (image.poseWasAsked()) {
+      ++record.sift_extractions;  // not pruned
+    }
     if (image.globalComparisons() > 0) ++record.global_extractions;
     record.sift_comparisons += image.siftComparisons();
     record.global_comparisons += image.globalComparisons();
-    previous_had_sift_ = sift;
+    previous_had_sift_ = compared || image.poseWasAsked();
     first_ = false;
   }
 
@@ -132,11 +140,25 @@ class ExtractionCounter {
 };
 
 /// Compares the verdict with the truth, if that is known.
-void judge(const DriveImage& image, const TrainingMap& map, const Verdict& verdict, StepRecord& step) {
+void judge(const DriveImage& image, const TrainingMap& map, const std::optional<MapError>& map_error,
+           const Verdict& verdict, StepRecord& step) {
   if (!image.truth) return;
-  const Eigen::Vector2d truth_m = map.frame().toEastNorth(*image.truth);
+  const Eigen::Vector2d truth_m = map.frame().toEastNorth(image.truth->position);
   step.error_m = static_cast<float>((verdict.position_m - truth_m).norm());
   step.off_map = map.nearest(truth_m).distance_m > kOffMap_m;
+  if (map_error) {
+    step.relative.position_m = static_cast<float>((verdict.position_m - truth_m - map_error->position_m).norm());
+  }
+  if (verdict.estimate) judgePose(*verdict.estimate, truth_m, image.truth->yaw_rad, map_error, step);
+}
+
+TraceRecord traced(std::size_t index, const DriveImage& image, const TrainingMap& map, double diversity_m,
+                   const Estimate& estimate) {
+  TraceRecord trace{index, diversity_m, estimate};
+  if (!image.truth) return trace;
+  trace.truth_m = map.frame().toEastNorth(image.truth->position);
+  trace.true_yaw_rad = image.truth->yaw_rad;
+  return trace;
 }
 
 /// Different for every run, the same whenever it is repeated; a seed of the localizer, which is not negative.
@@ -145,13 +167,14 @@ std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
   return (static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start)) & kLargest;
 }
 
-/// `seed` makes the runs of one method differ. `closed`: the route is a loop.
-std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::shared_ptr<const TrainingMap> map,
-                                           std::uint32_t seed, bool closed, std::shared_ptr<RecordedImage> image) {
+/// `seed` makes the runs of one method differ.
+std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::uint32_t seed, const RunContext& context,
+                                           std::shared_ptr<RecordedImage> image) {
   if (!method.isTracker()) {
-    return std::make_unique<RecogniserContestant>(std::move(map), method, closed, std::move(image));
+    return std::make_unique<RecogniserContestant>(context.map.map, method, context.closed, std::move(image));
   }
-  return std::make_unique<TrackerContestant>(std::move(map), seeded(method.localizer, seed), std::move(image));
+  return std::make_unique<TrackerContestant>(context.map.map, seeded(method.localizer, seed), std::move(image),
+                                             context.drive.camera);
 }
 
 }  // namespace
@@ -159,7 +182,7 @@ std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::shared
 RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace) {
   const auto image = std::make_shared<RecordedImage>(context.table, context.map.images, method.localizer.match,
                                                      method.localizer.similarity);
-  const auto contestant = makeContestant(method, context.map.map, seedOf(method, start), context.closed, image);
+  const auto contestant = makeContestant(method, seedOf(method, start), context, image);
   const std::vector<std::size_t> order =
       imageOrder(context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped});
   RunRecord record;
@@ -170,7 +193,7 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
       covered_from + static_cast<std::size_t>(method.covered * static_cast<double>(order.size()));
   for (std::size_t i = 0; i < order.size(); ++i) {
     const DriveImage& shown = context.drive.images[order[i]];
-    image->show(order[i], i >= covered_from && i < covered_until);
+    image->show(order[i], i >= covered_from && i < covered_until, shown.unpruned ? &*shown.unpruned : nullptr);
     const CpuStopwatch stopwatch;
     const Verdict verdict = contestant->process(shown.stamp_ns);
     record.method_ms += stopwatch.elapsed_ms();
@@ -179,10 +202,16 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
     step.confidence = static_cast<float>(verdict.confidence);
     step.comparisons = static_cast<std::uint32_t>(verdict.comparisons);
     step.sift = verdict.features == FeatureKind::kSift;
-    if (verdict.estimate) step.state = verdict.estimate->state;
-    judge(shown, *context.map.map, verdict, step);
+    if (verdict.estimate) {
+      step.state = verdict.estimate->state;
+      step.source = verdict.estimate->source;
+    }
+    const TrainingMap& map = *context.map.map;
+    judge(shown, map, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]], verdict, step);
     record.steps.push_back(step);
-    if (trace && verdict.estimate) record.trace.push_back({order[i], contestant->diversity_m(), *verdict.estimate});
+    if (trace && verdict.estimate) {
+      record.trace.push_back(traced(order[i], shown, map, contestant->diversity_m(), *verdict.estimate));
+    }
   }
   const std::size_t half = method.kidnapped ? order.size() / 2 : order.size();
   record.steps_to_localise = stepsUntilRight(record.steps, 0, half);

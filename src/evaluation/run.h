@@ -9,6 +9,7 @@
 
 #include "evaluation/drive_order.h"
 #include "evaluation/experiment.h"
+#include "evaluation/map_error.h"
 #include "evaluation/score_table.h"
 #include "visual_localization/localization/estimate.h"
 
@@ -19,6 +20,14 @@ constexpr double kRight_m = 5.0;
 /// A robot farther than this from all training images is off the map.
 constexpr double kOffMap_m = 10.0;
 
+/// How far an estimate is from a truth; NaN: not known.
+struct StepErrors {
+  float position_m = std::numeric_limits<float>::quiet_NaN();
+  float heading_deg = std::numeric_limits<float>::quiet_NaN();
+  /// Squared error of the position in units of the covariance that comes with it; of estimates that claim one.
+  float nees = std::numeric_limits<float>::quiet_NaN();
+};
+
 /// What happened at one step of a run.
 struct StepRecord {
   float error_m = std::numeric_limits<float>::quiet_NaN();  ///< NaN when the image has no true position
@@ -27,6 +36,10 @@ struct StepRecord {
   bool sift = false;                                    ///< compared by SIFT features
   LocalizationState state = LocalizationState::kNoMap;  ///< what a tracker's localizer says; others say nothing
   bool off_map = false;                                 ///< the true position is farther than kOffMap_m from the map
+  PoseSource source = PoseSource::kNone;                ///< what a tracker's pose rests on
+  float heading_err_deg = std::numeric_limits<float>::quiet_NaN();  ///< NaN without a true heading or an estimate of it
+  float nees = std::numeric_limits<float>::quiet_NaN();  ///< by the published covariance; METRIC or TRACKING only
+  StepErrors relative = {};  ///< to the map, NEES by the covariance of METRIC poses in relation to it
 };
 
 /// A closer look at one step, for the track of a single run.
@@ -34,6 +47,8 @@ struct TraceRecord {
   std::size_t image = 0;
   double diversity_m = 0.0;
   Estimate estimate;
+  std::optional<Eigen::Vector2d> truth_m = {};  ///< map frame
+  std::optional<double> true_yaw_rad = {};
 };
 
 /// One run of one method over one drive.
@@ -56,6 +71,7 @@ struct RunContext {
   const Drive& drive;
   const ScoreTable& table;  ///< of the whole map
   bool closed = true;
+  std::vector<std::optional<MapError>> map_errors = {};  ///< of each image of the drive; empty when nothing is known
 };
 
 /// Drives from image `start` on (protocol of Kronfeld et al. (journal), section 6).

@@ -51,11 +51,18 @@ RecordedImage::RecordedImage(const ScoreTable& table, const std::vector<std::siz
                              const MatchConfig& match, const SimilarityConfig& similarity)
     : table_(table), training_images_(training_images), sift_(match, similarity), global_(similarity) {}
 
-void RecordedImage::show(std::size_t drive_image, bool covered) {
+void RecordedImage::show(std::size_t drive_image, bool covered, const SiftFeatures* unpruned) {
   drive_image_ = drive_image;
   covered_ = covered;
+  unpruned_ = unpruned;
+  pose_was_asked_ = false;
   sift_comparisons_ = 0;
   global_comparisons_ = 0;
+}
+
+const SiftFeatures* RecordedImage::unprunedSift() {
+  pose_was_asked_ = true;
+  return covered_ ? nullptr : unpruned_;
 }
 
 void RecordedImage::configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) {

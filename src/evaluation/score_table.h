@@ -8,9 +8,10 @@
 
 #include <opencv2/core.hpp>
 
+#include "evaluation/true_pose.h"
+#include "visual_localization/camera/camera_model.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
-#include "visual_localization/geo/geodetic_point.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/map/training_map.h"
 
@@ -19,22 +20,25 @@ namespace visual_localization {
 /// One image of a drive, as the front end of the localizer sees it.
 struct DriveImage {
   std::int64_t stamp_ns = 0;
-  std::optional<GeodeticPoint> truth;  ///< absent when it has no true position
-  SiftFeatures sift;                   ///< pruned by the image recorded before it
+  std::optional<TruePose> truth;  ///< absent when it has no true position
+  SiftFeatures sift;              ///< pruned by the image recorded before it
   GlobalFeatures global;
+  std::optional<SiftFeatures> unpruned;  ///< all its SIFT features; only kept for methods that solve poses
 };
 
 /// A recorded round as images to localise.
 struct Drive {
   std::vector<DriveImage> images;
-  cv::Size image_size;     ///< pixels
-  double sift_ms = 0.0;    ///< mean time to extract and prune the SIFT features of an image
-  double global_ms = 0.0;  ///< mean time to extract its global features
+  cv::Size image_size;                ///< pixels
+  std::optional<CameraModel> camera;  ///< for images of this size; none: not calibrated, or not asked for
+  double sift_ms = 0.0;               ///< mean time to extract and prune the SIFT features of an image
+  double global_ms = 0.0;             ///< mean time to extract its global features
 };
 
 /// A recorded round in the roles it plays in an experiment; a role it does not play is empty.
 struct RecordedRound {
   std::shared_ptr<const TrainingMap> map;
+  std::vector<std::optional<TruePose>> map_truth;  ///< of the images of the map; empty when nothing is known
   std::shared_ptr<const Drive> drive;
 };
 
@@ -76,12 +80,15 @@ class RecordedImage final : public QueryImage {
   RecordedImage(const ScoreTable& table, const std::vector<std::size_t>& training_images, const MatchConfig& match,
                 const SimilarityConfig& similarity);
 
-  /// The next image. `covered`: nothing can be seen in it.
-  void show(std::size_t drive_image, bool covered);
+  /// The next image. `covered`: nothing can be seen in it. `unpruned`: all its SIFT features, which must outlive it;
+  /// null when they were not kept.
+  void show(std::size_t drive_image, bool covered, const SiftFeatures* unpruned = nullptr);
   /// Similarities to all training images.
   void row(FeatureKind kind, std::vector<double>& similarities);
   std::size_t siftComparisons() const { return sift_comparisons_; }
   std::size_t globalComparisons() const { return global_comparisons_; }
+  /// Whether a live image would have extracted SIFT features for its pose.
+  bool poseWasAsked() const { return pose_was_asked_; }
 
   /// There are no pixels: show() says what comes.
   void set(std::int64_t, const cv::Mat&) override {}
@@ -91,6 +98,7 @@ class RecordedImage final : public QueryImage {
   std::size_t siftFeatures() override { return covered_ ? 0 : table_.siftFeatures(drive_image_); }
   ImageReport report() const override { return {}; }
   const SiftFeatures* sift() const override { return nullptr; }
+  const SiftFeatures* unprunedSift() override;
   void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) override;
 
  private:
@@ -103,6 +111,8 @@ class RecordedImage final : public QueryImage {
   GlobalSimilarity global_;
   std::size_t drive_image_ = 0;
   bool covered_ = false;
+  const SiftFeatures* unpruned_ = nullptr;
+  bool pose_was_asked_ = false;
   std::size_t sift_comparisons_ = 0;
   std::size_t global_comparisons_ = 0;
 };

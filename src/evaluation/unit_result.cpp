@@ -3,17 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <locale>
 #include <sstream>
-#include <stdexcept>
+#include <utility>
 
+#include "base/statistics.h"
 #include "base/text.h"
 #include "evaluation/metrics.h"
+#include "evaluation/pose_judge.h"
 
 namespace visual_localization {
 namespace {
 
 constexpr double kPrecision = 0.99;
+constexpr double kMost = 0.95;
 
 std::ostringstream numbers() { return numberStream(std::numeric_limits<double>::digits10); }
 
@@ -56,6 +58,19 @@ void add(const StepRecord& step, StepSums& sums) {
   sums.err_m += static_cast<double>(step.error_m);
 }
 
+TracedPose tracedPose(const TraceRecord& trace) {
+  TracedPose pose{tumLine(trace.estimate), ""};
+  if (trace.truth_m) pose.truth = tumLine(trace.estimate.stamp_ns, *trace.truth_m, trace.true_yaw_rad.value_or(0.0));
+  return pose;
+}
+
+/// 0 of none.
+double mostOf(std::vector<double> errors_m) {
+  if (errors_m.empty()) return 0.0;
+  std::sort(errors_m.begin(), errors_m.end());
+  return quantile(errors_m, kMost);
+}
+
 std::string traceRow(const RunRecord& run, std::size_t step) {
   const TraceRecord& trace = run.trace[step];
   const Estimate& estimate = trace.estimate;
@@ -74,80 +89,6 @@ std::string traceRow(const RunRecord& run, std::size_t step) {
   return out.str();
 }
 
-/// Reads lines of a section until an empty one.
-class SectionReader {
- public:
-  explicit SectionReader(const std::string& text) : in_(text) {}
-
-  void expect(const std::string& title) {
-    std::string line;
-    if (!std::getline(in_, line) || line != title) throw std::runtime_error("section '" + title + "' is missing");
-  }
-  bool next(std::string& line) {
-    if (!std::getline(in_, line)) throw std::runtime_error("is cut off");
-    return !line.empty();
-  }
-  bool atEnd() { return in_.peek() == std::istringstream::traits_type::eof(); }
-
- private:
-  std::istringstream in_;
-};
-
-/// The numbers of one line, in the order in which they were written.
-class NumberReader {
- public:
-  explicit NumberReader(const std::string& line) : in_(line) { in_.imbue(std::locale::classic()); }
-
-  template <class Number>
-  NumberReader& operator>>(Number& number) {
-    const bool follows = first_ || in_.get() == ',';
-    first_ = false;
-    if (!follows || !(in_ >> number)) refuse();
-    return *this;
-  }
-  void finish() {
-    if (in_.get() != std::istringstream::traits_type::eof()) refuse();
-  }
-
- private:
-  [[noreturn]] static void refuse() { throw std::runtime_error("has a line that is no list of numbers"); }
-
-  std::istringstream in_;
-  bool first_ = true;
-};
-
-void read(const std::string& line, RunFigures& run) {
-  NumberReader numbers(line);
-  numbers >> run.start >> run.images >> run.judged >> run.mean_err_m >> run.within_5m >> run.comparisons_per_image >>
-      run.sift_share >> run.steps_to_localise >> run.steps_to_relocalise >> run.extract_ms >> run.match_ms >>
-      run.update_ms;
-  numbers.finish();
-}
-
-void read(const std::string& line, StepSums& step) {
-  NumberReader numbers(line);
-  numbers >> step.runs >> step.judged >> step.err_m >> step.comparisons >> step.sift;
-  numbers.finish();
-}
-
-std::ptrdiff_t fieldsOf(const std::string& row) { return std::count(row.begin(), row.end(), ',') + 1; }
-
-/// Runs and steps count the same images, each in its own way: where a line is lost, they disagree.
-void requireConsistent(const UnitResult& unit) {
-  if (unit.runs.empty()) throw std::runtime_error("has no run");
-  std::size_t images = 0;
-  std::size_t judged = 0;
-  for (const RunFigures& run : unit.runs) {
-    images += run.images;
-    judged += run.judged;
-  }
-  for (const StepSums& step : unit.steps) {
-    images -= step.runs;
-    judged -= step.judged;
-  }
-  if (images != 0 || judged != 0) throw std::runtime_error("has runs and steps that do not fit together");
-}
-
 }  // namespace
 
 const char* const kTraceColumns =
@@ -157,6 +98,7 @@ const char* const kTraceColumns =
 UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& costs) {
   UnitResult unit;
   std::vector<double> errors_m;
+  std::vector<double> relative_m;
   std::vector<Decision> decisions;
   for (const RunRecord& run : runs) {
     unit.runs.push_back(figuresOf(run, costs));
@@ -165,67 +107,21 @@ UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& c
       const StepRecord& step = run.steps[i];
       add(step, unit.steps[i]);
       unit.trust.add(step);
+      unit.poses.add(step);
+      if (!std::isnan(step.relative.position_m)) relative_m.push_back(static_cast<double>(step.relative.position_m));
       if (std::isnan(step.error_m)) continue;
       errors_m.push_back(static_cast<double>(step.error_m));
       decisions.push_back({static_cast<double>(step.confidence), errors_m.back() < kRight_m});
     }
-    for (std::size_t i = 0; i < run.trace.size(); ++i) unit.trace.push_back(traceRow(run, i));
+    for (std::size_t i = 0; i < run.trace.size(); ++i) {
+      unit.trace.push_back(traceRow(run, i));
+      unit.trajectory.push_back(tracedPose(run.trace[i]));
+    }
   }
+  unit.p95_err_m = mostOf(errors_m);
+  unit.p95_relative_err_m = mostOf(std::move(relative_m));
   unit.median_err_m = summarise(std::move(errors_m)).median_m;
   unit.recall_at_p99 = recallAtPrecision(std::move(decisions), kPrecision);
-  return unit;
-}
-
-std::string serialise(const UnitResult& unit) {
-  std::ostringstream out = numbers();
-  out << "runs\n";
-  for (const RunFigures& run : unit.runs) {
-    out << run.start << ',' << run.images << ',' << run.judged << ',' << run.mean_err_m << ',' << run.within_5m << ','
-        << run.comparisons_per_image << ',' << run.sift_share << ',' << run.steps_to_localise << ','
-        << run.steps_to_relocalise << ',' << run.extract_ms << ',' << run.match_ms << ',' << run.update_ms << '\n';
-  }
-  out << "\nsteps\n";
-  for (const StepSums& step : unit.steps) {
-    out << step.runs << ',' << step.judged << ',' << step.err_m << ',' << step.comparisons << ',' << step.sift << '\n';
-  }
-  out << "\ntrace\n";
-  for (const std::string& row : unit.trace) out << row << '\n';
-  const Trust& trust = unit.trust;
-  out << "\ntrust\n"
-      << trust.tracking_right << ',' << trust.tracking_wrong << ',' << trust.lost_right << ',' << trust.lost_wrong
-      << ',' << trust.off_map_right << ',' << trust.off_map_wrong << ',' << trust.off_map_missed << '\n';
-  out << "\nall\n" << unit.median_err_m << ',' << unit.recall_at_p99 << "\n\n";
-  return out.str();
-}
-
-UnitResult parseUnit(const std::string& text) {
-  UnitResult unit;
-  SectionReader sections(text);
-  std::string line;
-  sections.expect("runs");
-  while (sections.next(line)) read(line, unit.runs.emplace_back());
-  sections.expect("steps");
-  while (sections.next(line)) read(line, unit.steps.emplace_back());
-  sections.expect("trace");
-  while (sections.next(line)) {
-    if (fieldsOf(line) != fieldsOf(kTraceColumns)) throw std::runtime_error("has a line of a trace that is not whole");
-    unit.trace.push_back(line);
-  }
-  sections.expect("trust");
-  sections.next(line);
-  Trust& trust = unit.trust;
-  NumberReader trusted(line);
-  trusted >> trust.tracking_right >> trust.tracking_wrong >> trust.lost_right >> trust.lost_wrong >>
-      trust.off_map_right >> trust.off_map_wrong >> trust.off_map_missed;
-  trusted.finish();
-  if (sections.next(line)) throw std::runtime_error("has more than one line of trust");
-  sections.expect("all");
-  sections.next(line);
-  NumberReader all(line);
-  all >> unit.median_err_m >> unit.recall_at_p99;
-  all.finish();
-  if (sections.next(line) || !sections.atEnd()) throw std::runtime_error("goes on behind its end");
-  requireConsistent(unit);
   return unit;
 }
 

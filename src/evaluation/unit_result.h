@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluation/metrics.h"
+#include "evaluation/pose_figures.h"
 #include "evaluation/run.h"
 
 namespace visual_localization {
@@ -43,14 +44,27 @@ struct StepSums {
   std::size_t sift = 0;
 };
 
+/// One image of the traced run of a tracker, as lines of TUM trajectories.
+struct TracedPose {
+  std::string estimate;
+  std::string truth;  ///< empty when it is not known
+};
+
+/// Of the text of a UnitResult: goes up whenever older results cannot be read any more.
+constexpr int kUnitFormat = 2;
+
 /// One method on one pair of rounds: the unit of work that is stored and resumed.
 struct UnitResult {
   std::vector<RunFigures> runs;
   std::vector<StepSums> steps;
   Trust trust;
-  std::vector<std::string> trace;  ///< rows of traces.csv from its column `start` on
-  double median_err_m = 0.0;       ///< over all images of all runs
-  double recall_at_p99 = 0.0;      ///< share of the images answered rightly when 99 % of the answers are right
+  PoseFigures poses;
+  std::vector<std::string> trace;      ///< rows of traces.csv from its column `start` on
+  std::vector<TracedPose> trajectory;  ///< of the same images
+  double median_err_m = 0.0;           ///< over all images of all runs
+  double recall_at_p99 = 0.0;          ///< share of the images answered rightly when 99 % of the answers are right
+  double p95_err_m = 0.0;              ///< 95 % of the images are not farther from the truth
+  double p95_relative_err_m = 0.0;     ///< the same in relation to the map; 0 when nothing is known of that
 };
 
 /// Sums up the runs of one method on one pair.

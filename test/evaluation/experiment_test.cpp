@@ -83,6 +83,57 @@ TEST(Experiment, ASweepGivesAMethodForEveryCombination) {
   EXPECT_EQ(parseExperiment(yaml, "e.yaml").methods[3].speed, 2.5);
 }
 
+TEST(Experiment, PlacesOnlyUnlessTheFileAsksForLandmarks) {
+  EXPECT_FALSE(test::smallExperiment().map.geometry.enabled);
+  EXPECT_FALSE(test::smallExperiment().solvesPoses());
+  const auto with = [](const std::string& parameters) {
+    return parseExperiment(
+        test::smallYamlWith("starts: 3", "starts: 3\nmap_parameters: {geometry/enabled: true}") + parameters, "e.yaml");
+  };
+  EXPECT_TRUE(with("").solvesPoses());
+  const std::string places =
+      "  - {name: p, tracker: dpso, parameters: {pose_source: place}}\n"
+      "  - {name: m, tracker: dpso, parameters: {pose_source: metric}}\n";
+  EXPECT_EQ(with(places).methods[3].localizer.metric.pose_source, "place");
+  EXPECT_EQ(with(places).methods[4].localizer.metric.pose_source, "metric");
+  const std::string yaml = test::smallYamlWith("starts: 3", "starts: 3\nmap_parameters: {geometry/enabled: true}");
+  std::string all_places = yaml;
+  const std::string common = "parameters: {recovery: paper}";
+  all_places.replace(all_places.find(common), common.size(), "parameters: {recovery: paper, pose_source: place}");
+  EXPECT_FALSE(parseExperiment(all_places, "e.yaml").solvesPoses());
+}
+
+TEST(Experiment, RoundsMayHaveACalibrationAndTruePoses) {
+  const std::string yaml = test::smallYamlWith("bag: a1.bag", "bag: a1.bag, camera_info: own.yaml, poses: a1.csv");
+  const std::string common = std::string(yaml).replace(yaml.find("rounds:\n"), 8, "rounds:\n  camera_info: all.yaml\n");
+  const Experiment experiment = parseExperiment(common, "e.yaml");
+  EXPECT_EQ(experiment.rounds[0].camera_info, "own.yaml");
+  EXPECT_EQ(experiment.rounds[0].poses, "a1.csv");
+  EXPECT_EQ(experiment.rounds[1].camera_info, "all.yaml");
+  EXPECT_EQ(experiment.rounds[1].poses, "");
+  EXPECT_EQ(test::smallExperiment().rounds[1].camera_info, "");
+}
+
+TEST(Experiment, TheSpacingOfTheMapMayBeSwept) {
+  const std::string yaml =
+      test::smallYamlWith(kBestMethod, "{name: 's {map_spacing}', tracker: dpso, sweep: {map_spacing: [0, 2, 10]}}");
+  const Experiment experiment = parseExperiment(yaml, "e.yaml");
+  ASSERT_EQ(experiment.methods.size(), 5U);
+  EXPECT_EQ(experiment.methods[3].map_spacing_m, 2.0);
+  EXPECT_THAT(experiment.methods[3].settings, ::testing::Contains(Pair("map_spacing", "2")));
+  EXPECT_THAT(experiment.methods[2].settings, Not(::testing::Contains(::testing::Key("map_spacing"))));
+  expectRefused(
+      {{kBestMethod, "{name: x, tracker: dpso, map_spacing: -1}", "'methods[2]/map_spacing' = -1 must be"},
+       {kBestMethod, "{name: x, tracker: dpso, map_spacing: 1, sweep: {map_spacing: [1]}}",
+        "'methods[2]/sweep/map_spacing' is set for this method already"},
+       {kBestMethod, "{name: x, tracker: dpso, sweep: {map_spacing: [x]}}", "map_spacing = x must be a number"},
+       {"bag: a1.bag", "bag: a1.bag, poses: [a]", "'rounds/bags[0]/poses' must be a single value"},
+       {"bag: a1.bag", "bag: a1.bag, camera_info: {a: b}", "'rounds/bags[0]/camera_info' must be a single"},
+       {"bag: a1.bag", "bag: a1.bag, pose: a", "'rounds/bags[0]/pose' is unknown"},
+       {kBestMethod, "{name: x, tracker: dpso, parameters: {pose_source: geometry}}", "pose_source"},
+       {"starts: 3", "starts: 3\nmap_parameters: {geometry/enabled: perhaps}", "geometry/enabled"}});
+}
+
 TEST(Experiment, EveryExperimentThatShipsIsValid) {
   int read = 0;
   for (const auto& file : std::filesystem::directory_iterator(TEST_DATA_DIR "/../../config/evaluation")) {
@@ -140,7 +191,7 @@ TEST(Experiment, RefusesNumbersOutsideTheirRange) {
   expectRefused({{"starts: 3", "trace_start: -1", "'trace_start' = -1 must be an integer in [0, 1000000]"},
                  {kBestMethod, "{name: x, speed: 0}", "'methods[2]/speed' = 0 must be a number in [0.015625, 64]"},
                  {kBestMethod, "{name: x, speed: .nan}", "must be a number in [0.015625, 64]"},
-                 {kBestMethod, "{name: x, sweep: {speed: [1, 65]}}", "speed = 65 must be a number in [1/64, 64]"},
+                 {kBestMethod, "{name: x, sweep: {speed: [1, 65]}}", "speed = 65 must be a number in [0.015625, 64]"},
                  {"dpso/particles: 20", "dpso/particles: 1", "'dpso/particles' = 1 is not allowed: must be an integer"},
                  {"dpso/particles: 20", "dpso/particles: many", "'dpso/particles' = many is not allowed"},
                  {"recovery: paper", "match/ratio_angle: .nan", "e.yaml: 'parameters' parameter 'match/"}});

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "evaluation/result_folder.h"
+#include "evaluation/trajectory_files.h"
 #include "test/evaluation/small_experiment.h"
 
 namespace visual_localization {
@@ -88,6 +89,76 @@ TEST_F(ResultTables, ARunWithoutTruePositionsIsNoPerfectRun) {
     EXPECT_EQ(unknown.at(column), "") << column;
   }
   EXPECT_EQ(unknown.at("runs"), "1");
+}
+
+TEST_F(ResultTables, PosesAreMeansOverTheImagesOfAllPairs) {
+  UnitResult good = test::unitOf(4, 4, 2.0);
+  good.poses.images = 4;
+  good.poses.metric = 3;
+  good.poses.wrong_1m = 2;
+  good.poses.wrong_5m = 1;
+  good.poses.absolute = {4, 8.0, 4, 10.0, {1, 2, 3}, 4, 3, 6.0};
+  good.poses.relative = {2, 1.0, 2, 3.0, {2, 2, 2}, 2, 2, 5.0};
+  good.p95_err_m = 3.0;
+  good.p95_relative_err_m = 0.75;
+  UnitResult bad = test::unitOf(4, 4, 2.0);
+  bad.poses.images = 12;
+  bad.poses.absolute = {12, 0.0, 12, 6.0, {0, 0, 1}, 0, 0, 0.0};
+  bad.p95_err_m = 5.0;
+  results_.save(0, 0, good);
+  results_.save(1, 0, bad);
+  Row row = rowsOf("summary.csv", "swarm").front();
+  const std::map<std::string, std::string> expected{{"heading_err_deg", "1"},
+                                                    {"wrong_1m_share", "0.125"},
+                                                    {"wrong_5m_share", "0.0625"},
+                                                    {"inside_95_share", "0.75"},
+                                                    {"metric_share", "0.1875"},
+                                                    {"p95_err_m", "4"},
+                                                    {"recall_025m_2deg", "0.0625"},
+                                                    {"recall_05m_5deg", "0.125"},
+                                                    {"recall_5m_10deg", "0.25"},
+                                                    {"nees", "1.5"},
+                                                    {"relative_err_m", "0.5"},
+                                                    {"relative_p95_err_m", "0.75"},
+                                                    {"relative_heading_err_deg", "1.5"},
+                                                    {"relative_recall_025m_2deg", "1"},
+                                                    {"relative_nees", "2.5"}};
+  for (const auto& [column, value] : expected) EXPECT_EQ(row[column], value) << column;
+}
+
+TEST_F(ResultTables, MethodsWithoutPosesLeaveTheirFieldsEmpty) {
+  Row row = rowsOf("summary.csv", "best").front();
+  for (const char* column : {"heading_err_deg", "wrong_1m_share", "wrong_5m_share", "inside_95_share", "metric_share",
+                             "recall_5m_10deg", "nees", "relative_err_m", "relative_p95_err_m", "relative_nees"}) {
+    ASSERT_EQ(row.count(column), 1U) << column;
+    EXPECT_EQ(row[column], "") << column;
+  }
+}
+
+TEST_F(ResultTables, TracedRunsBecomeTrajectories) {
+  UnitResult unit = test::unitOf(2, 2, 1.0);
+  unit.trace = {"7,0,7,,,,,,0,1,1,1,1,1,SIFT", "7,1,8,,,,,,0,1,1,1,1,1,SIFT"};
+  unit.trajectory = {{"1.5 1 2 0 0 0 0 1", "1.5 1 2.5 0 0 0 0 1"}, {"2.5 2 2 0 0 0 0 1", ""}};
+  results_.save(0, 0, unit);
+  writeResultTables(test::smallExperiment(), results_);
+  const std::string path = results_.path() + "/trajectories/swarm__a1__b1__7";
+  EXPECT_EQ(test::readAll(path + ".tum"), "1.5 1 2 0 0 0 0 1\n2.5 2 2 0 0 0 0 1\n");
+  EXPECT_EQ(test::readAll(path + ".truth.tum"), "1.5 1 2.5 0 0 0 0 1\n");
+  EXPECT_FALSE(std::filesystem::exists(results_.path() + "/trajectories/best__a1__b1__7.tum"));
+}
+
+TEST(TrajectoryFiles, NamesOfMethodsBecomeDifferentFileNames) {
+  const test::TemporaryFolder folder;
+  TrajectoryFiles files(folder.path());
+  UnitResult unit;
+  unit.trace = {"0,0"};
+  unit.trajectory = {{"first", ""}};
+  files.write("../swarm, 80", "a", "b", unit);
+  unit.trajectory = {{"second", ""}};
+  files.write("../swarm; 80", "a", "b", unit);
+  files.write(std::string(500, 'x'), "a", "b", unit);
+  EXPECT_EQ(test::readAll(folder / "trajectories/.._swarm__80__a__b__0.tum"), "first\n");
+  EXPECT_EQ(test::readAll(folder / "trajectories/.._swarm__80_2__a__b__0.tum"), "second\n");
 }
 
 TEST_F(ResultTables, OnlyTheKidnappedRelocalise) {

@@ -17,21 +17,30 @@ RunRecord runWith(const SyntheticRounds& rounds, double map_gap, double covered)
   method.localizer.dpso.guided_start = false;
   method.map_gap = map_gap;
   method.covered = covered;
-  const PartialMap partial = withGap(rounds.map(), map_gap);
+  const PartialMap partial = partOf(rounds.map(), map_gap);
   return run({partial, *rounds.drive(), table, true}, method, 0, false);
 }
 
 TEST(PartialMap, LeavesOutOnePieceAndRemembersWhoIsWho) {
   const SyntheticRounds rounds(100);
-  const PartialMap whole = withGap(rounds.map(), 0.0);
+  const PartialMap whole = partOf(rounds.map(), 0.0);
   EXPECT_EQ(whole.map, rounds.map());
   EXPECT_TRUE(whole.images.empty());
-  const PartialMap partial = withGap(rounds.map(), 0.2);
+  const PartialMap partial = partOf(rounds.map(), 0.2);
   ASSERT_EQ(partial.map->size(), 80U);
   ASSERT_EQ(partial.images.size(), 80U);
   EXPECT_EQ(partial.images[34], 34U);
   EXPECT_EQ(partial.images[35], 55U);
   EXPECT_EQ(partial.map->image(35).position_m, rounds.map()->image(55).position_m);
+}
+
+TEST(PartialMap, KeepsAnImageEverySoManyMetres) {
+  const auto map = mapAt(street(30, 1.0));
+  const PartialMap spaced = partOf(map, 0.0, 4.5);
+  EXPECT_EQ(spaced.images, (std::vector<std::size_t>{0, 5, 10, 15, 20, 25}));
+  EXPECT_EQ(spaced.map->position_m(2), map->position_m(10));
+  EXPECT_EQ(partOf(map, 0.5, 4.5).images, (std::vector<std::size_t>{0, 5, 10, 26}));
+  EXPECT_EQ(partOf(map, 0.0, 1000.0).images, (std::vector<std::size_t>{0}));
 }
 
 TEST(Run, OffTheMapIsWhereAllImagesAreFar) {

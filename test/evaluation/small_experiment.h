@@ -53,7 +53,7 @@ class SyntheticRounds {
       trained.back().sift = randomFeatures(12, i);
       DriveImage image;
       image.stamp_ns = trained.back().stamp_ns;
-      image.truth = places->frame().toGeodetic(trained.back().position_m);
+      image.truth = TruePose{places->frame().toGeodetic(trained.back().position_m)};
       image.sift = randomFeatures(12, i);
       drive->images.push_back(image);
     }

@@ -24,6 +24,7 @@ RunRecord runWithErrors(std::size_t start, const std::vector<float>& errors_m) {
 UnitResult exampleUnit() {
   RunRecord traced = runWithErrors(3, {1.0F, 9.0F, 2.0F});
   traced.trace.resize(traced.steps.size());
+  traced.trace[0].truth_m = Eigen::Vector2d(7.0, 8.0);
   traced.sift_extractions = 3;
   traced.sift_comparisons = 30;
   traced.method_ms = 0.3;
@@ -71,6 +72,11 @@ TEST(UnitResult, ReadsBackAsItWasWritten) {
   const std::string text = serialise(exampleUnit());
   EXPECT_EQ(serialise(parseUnit(text)), text);
   EXPECT_EQ(parseUnit(text).trace, exampleUnit().trace);
+  const std::vector<TracedPose> trajectory = parseUnit(text).trajectory;
+  ASSERT_EQ(trajectory.size(), 3U);
+  EXPECT_EQ(trajectory[0].truth, "0.000000000 7 8 0 0 0 0 1");
+  EXPECT_EQ(trajectory[1].estimate, "0.000000000 0 0 0 0 0 0 1");
+  EXPECT_EQ(trajectory[1].truth, "");
 }
 
 TEST(UnitResult, RefusesATextThatIsCutOffAnywhere) {
@@ -96,22 +102,29 @@ TEST(UnitResult, RefusesATextThatLostALineOrHasOneTwice) {
 
 TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
   const std::string good =
-      "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\ntrust\n1,2,3,4,5,6,7\n\nall\n2,1\n\n";
+      "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\ntrajectory\n\ntrust\n1,2,3,4,5,6,7\n\n"
+      "poses\n9,8,6,5\n1,2,3,4,5,6,7,8,9,10\n0,0,0,0,0,0,0,0,0,0.5\n\nall\n2,1,3,0\n\n";
   ASSERT_EQ(refusal(good), "accepted");
   const auto with = [&good](const std::string& part, const std::string& replacement) {
     return std::string(good).replace(good.find(part), part.size(), replacement);
   };
   for (const std::string& bad :
        {with("0,1,1,2", "0,x,1,2"), with("0,1,1,2", "0,1,nan,2"), with("0,1,1,2", "0;1,1,2"), with("0,0,0\n", "0,0\n"),
-        with("0,0,0\n", "0,0,0,0\n"), with("7,1\n", "7,1 \n"), with("2,1\n", "2\n"), with("2,1\n", "2,1,3\n"),
-        with("2,1\n", "1e999,1\n"), with("1,2,3,4,5,6,7", "1,2,3,4,5,6"),
+        with("0,0,0\n", "0,0,0,0\n"), with("7,1\n", "7,1 \n"), with("2,1,3,0\n", "2,1,3\n"),
+        with("2,1,3,0\n", "2,1,3,0,4\n"), with("2,1,3,0\n", "1e999,1,3,0\n"), with("9,8,6,5\n", "9,8,6\n"),
+        with("9,10\n", "9\n"), with("0.5\n", "nan\n"), with("1,2,3,4,5,6,7", "1,2,3,4,5,6"),
         with("0,1,1,2", "99999999999999999999999,1,1,2")}) {
     EXPECT_THAT(refusal(bad), HasSubstr("no list of numbers")) << bad;
   }
   EXPECT_THAT(refusal(with("trace\n", "trace\n1,2\n")), HasSubstr("trace that is not whole"));
   EXPECT_THAT(refusal(good + "more"), HasSubstr("behind its end"));
   EXPECT_THAT(refusal(with("1,1,2,7,1\n", "2,1,2,7,1\n")), HasSubstr("do not fit together"));
-  EXPECT_THAT(refusal("runs\n\nsteps\n\ntrace\n\ntrust\n0,0,0,0,0,0,0\n\nall\n0,0\n\n"), HasSubstr("has no run"));
+  EXPECT_THAT(refusal(with("trajectory\n", "trajectory\n1 2 3 4 5 6 7\n")), HasSubstr("trajectory that is not whole"));
+  EXPECT_THAT(refusal(with("trajectory\n", "trajectory\n1 2 3 4 5 6 7 8\n")),
+              HasSubstr("a trajectory that do not fit"));
+  EXPECT_THAT(refusal(with("9,8,6,5\n", "9,8,6,5\n1\n")), HasSubstr("no list of numbers"));
+  EXPECT_THAT(refusal(with("0.5\n", "0.5\n1\n")), HasSubstr("more than three lines of poses"));
+  EXPECT_THAT(refusal(with("0,1,1,2,1,7,1,1,1,0,0,0\n", "")), HasSubstr("has no run"));
   EXPECT_THAT(refusal("something else\n"), HasSubstr("'runs' is missing"));
 }
 

@@ -67,6 +67,9 @@ class BagReader {
   /// naming the fix topics that the bag does have.
   std::vector<Fix> fixes(const std::string& topic) const;
 
+  /// Whether it has such a topic.
+  bool hasFixes(const std::string& topic) const;
+
   /// Calibration of the camera whose images are on `image_topic`, raw or compressed: the sensor_msgs/CameraInfo beside
   /// them, by image_transport's naming. Nothing when the bag has none or the camera is not calibrated. Throws BagError
   /// when the calibration cannot be used, or when it changes within the bag: then it holds for a part of the images.
