@@ -38,6 +38,24 @@ TRUST = (Measure('tracking_share', 'TRACKING [%]', 1, 100),
          Measure('lost_recall', '"lost": recall [%]', 1, 100))
 OFF_MAP = (Measure('off_map_precision', 'OFF_MAP: precision [%]', 1, 100),
            Measure('off_map_recall', 'OFF_MAP: recall [%]', 1, 100))
+POSES = (Measure('metric_share', 'METRIC [%]', 1, 100),
+         Measure('mean_err_m', 'mean error [m]', 2),
+         Measure('p95_err_m', '95 % error [m]', 2),
+         Measure('heading_err_deg', 'heading error [°]', 2),
+         Measure('recall_025m_2deg', '(0.25 m, 2°) [%]', 1, 100),
+         Measure('recall_05m_5deg', '(0.5 m, 5°) [%]', 1, 100),
+         Measure('recall_5m_10deg', '(5 m, 10°) [%]', 1, 100),
+         Measure('wrong_1m_share', 'TRACKING and beyond 1 m [%]', 2, 100),
+         Measure('wrong_5m_share', 'TRACKING and beyond 5 m [%]', 2, 100),
+         Measure('inside_95_share', 'inside the 95 % ellipse [%]', 1, 100),
+         Measure('nees', 'NEES', 2))
+RELATIVE_POSES = (Measure('relative_err_m', 'mean error [m]', 2),
+                  Measure('relative_p95_err_m', '95 % error [m]', 2),
+                  Measure('relative_heading_err_deg', 'heading error [°]', 2),
+                  Measure('relative_recall_025m_2deg', '(0.25 m, 2°) [%]', 1, 100),
+                  Measure('relative_recall_05m_5deg', '(0.5 m, 5°) [%]', 1, 100),
+                  Measure('relative_recall_5m_10deg', '(5 m, 10°) [%]', 1, 100),
+                  Measure('relative_nees', 'NEES', 2))
 ERROR = MAIN[0]
 NOTHING = '–'
 
@@ -225,6 +243,20 @@ def result_tables(results: Results, papers: Papers) -> str:
 def tracking_tables(results: Results) -> str:
     """Measures that the papers do not have."""
     return group_tables(results, Papers(None), TRACKING)
+
+
+def pose_tables(results: Results) -> str:
+    """Recall and what the poses claim; empty without true headings."""
+    if all(outcome.get('heading_err_deg') is None for outcome in results.outcomes):
+        return ''
+    return group_tables(results, Papers(None), POSES)
+
+
+def relative_tables(results: Results) -> str:
+    """The same in relation to the map; empty without true headings of its images."""
+    if all(outcome.get('relative_heading_err_deg') is None for outcome in results.outcomes):
+        return ''
+    return group_tables(results, Papers(None), RELATIVE_POSES)
 
 
 def trust_tables(results: Results) -> str:

@@ -1,5 +1,6 @@
 """`evaluate` as a user meets it, on the first seconds of the recordings that ship."""
 import csv
+import math
 import os
 import re
 import resource
@@ -10,6 +11,9 @@ import tempfile
 import time
 import unittest
 from pathlib import Path
+from typing import Optional
+
+import rosbag
 
 from program_runner import PROGRAMS, ProgramTest, run
 
@@ -29,6 +33,29 @@ def short_sample() -> str:
     yaml = re.sub(r'bag: \S+/(\w+\.bag)', r'bag: \1', yaml)
     lines = [line for line in yaml.splitlines()
              if not line.startswith('  - {name: ') or any(f'name: {name},' in line for name in METHODS)]
+    return '\n'.join(lines) + '\n'
+
+
+CALIBRATION = """image_width: 320
+image_height: 240
+camera_name: left
+camera_matrix: {rows: 3, cols: 3, data: [266.28, 0, 159.5, 0, 266.28, 119.5, 0, 0, 1]}
+distortion_model: plumb_bob
+distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}
+rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}
+projection_matrix: {rows: 3, cols: 4, data: [266.28, 0, 159.5, 0, 0, 266.28, 119.5, 0, 0, 0, 1, 0]}
+"""
+
+
+def true_poses(bag: Path) -> str:
+    """Poses along the true positions, from an origin of their own; the camera looks east."""
+    with rosbag.Bag(str(bag)) as messages:
+        fixes = [message for _, message, _ in messages.read_messages(['/ground_truth/fix'])]
+    lines = ['stamp_ns,east_m,north_m,yaw_rad']
+    for fix in fixes:
+        east = math.radians(fix.longitude - fixes[0].longitude) * 6378137 * math.cos(math.radians(fix.latitude))
+        north = math.radians(fix.latitude - fixes[0].latitude) * 6378137
+        lines.append(f'{fix.header.stamp.to_nsec()},{100 + east:.4f},{north:.4f},0.0')
     return '\n'.join(lines) + '\n'
 
 
@@ -94,6 +121,73 @@ class EvaluateTest(ProgramTest):
         self.assertLess(max(best), 5.0)
         self.assertIn('DPSO-80', (self.whole / 'report.md').read_text(encoding='utf-8'))
         self.assertTrue(list((self.whole / 'figures').glob('*.svg')))
+
+    def metric(self, camera_info: str = CALIBRATION, poses: Optional[str] = None) -> Path:
+        """The short sample with landmarks, a calibration and true poses beside the bags, which are copied."""
+        for bag in self.rounds.glob('*.bag'):
+            (self.folder / bag.name).write_bytes(bag.read_bytes())
+            (self.folder / bag.with_suffix('.csv').name).write_text(poses or true_poses(bag), encoding='utf-8')
+        (self.folder / 'camera.yaml').write_text(camera_info, encoding='utf-8')
+        text = re.sub(r'bag: (\w+)\.bag', r'bag: \1.bag, poses: \1.csv', short_sample())
+        text = text.replace('  bags:', '  camera_info: camera.yaml\n  bags:')
+        text = text.replace('starts: 2', 'starts: 2\nmap_parameters: {geometry/enabled: true}')
+        text = text.replace('\nmethods:', '\nmethods:\n  - {name: places, parameters: {pose_source: place}}')
+        config = self.folder / 'metric.yaml'
+        config.write_text(text, encoding='utf-8')
+        return config
+
+    def evaluate_metric(self, config: Path) -> subprocess.CompletedProcess:
+        """Runs an experiment beside its bags."""
+        return run('evaluate', '--config', config, '--output', self.output)
+
+    def test_poses_are_solved_and_judged(self):
+        result = self.evaluate_metric(self.metric())
+        self.assertEqual((result.returncode, result.stderr), (0, ''))
+        summary = {row['method']: row for row in tables(self.output)['summary.csv']}
+        self.assertGreater(float(summary['DPSO-80']['metric_share']), 0.5)
+        self.assertEqual(float(summary['places']['metric_share']), 0.0)
+        self.assertLess(float(summary['DPSO-80']['relative_err_m']), float(summary['places']['relative_err_m']))
+        self.assertEqual(summary['best single image']['heading_err_deg'], '')
+        report = (self.output / 'report.md').read_text(encoding='utf-8')
+        self.assertIn('## Poses: recall within position and heading', report)
+        trajectory = self.output / 'trajectories' / 'DPSO-80__sunny_1__cloudy_1__0.tum'
+        rows = [[float(number) for number in line.split()] for line in trajectory.read_text().splitlines()]
+        self.assertEqual({len(row) for row in rows}, {8})
+        self.assertEqual(len(rows), len(trajectory.with_suffix('.truth.tum').read_text().splitlines()))
+        self.assertAlmostEqual(sum(number ** 2 for number in rows[0][4:]), 1.0, 6)
+
+    def test_files_beside_the_bags_must_be_right(self):
+        header = 'stamp_ns,east_m,north_m,yaw_rad\n'
+        for camera_info, poses, word in (
+                (CALIBRATION.replace('[266.28, 0, 159.5, 0, 266.28', '[-1, 0, 159.5, 0, 266.28'), None, 'camera.yaml'),
+                (CALIBRATION.replace('height: 240', 'height: 500'), None, 'another shape'),
+                ('words', None, 'camera.yaml'),
+                (CALIBRATION, header + '1,nan,0,0\n', "line 2: east_m = 'nan'"),
+                (CALIBRATION, header + '1,0,0,0\n2,0,0,0\n', '.csv: no pose is from the time')):
+            with self.subTest(word=word):
+                self.assert_refused(self.evaluate_metric(self.metric(camera_info, poses)), 1, word)
+
+    def test_results_bind_the_files_beside_the_bags(self):
+        config = self.metric()
+        for name in ('camera.yaml', 'campus_sunny_1.csv'):
+            with self.subTest(name=name):
+                path = self.folder / name
+                kept = path.read_text(encoding='utf-8')
+                path.unlink()
+                self.assert_refused(self.evaluate_metric(config), 1, name, 'cannot be read')
+                path.write_text(kept, encoding='utf-8')
+        self.assertEqual(self.evaluate_metric(config).returncode, 0)
+        poses = self.folder / 'campus_sunny_1.csv'
+        poses.write_text(poses.read_text(encoding='utf-8').replace(',0.0\n', ',0.1\n'), encoding='utf-8')
+        self.assert_refused(self.evaluate_metric(config), 1, 'provenance.csv differs')
+
+    def test_results_of_another_format_are_refused(self):
+        self.assert_done(self.evaluate('--merge', self.whole))
+        provenance = self.output / 'provenance.csv'
+        text = provenance.read_text(encoding='utf-8')
+        self.assertIn('unit_format,2\n', text)
+        provenance.write_text(text.replace('unit_format,2\n', ''), encoding='utf-8')
+        self.assert_refused(self.evaluate(), 1, 'another version (provenance.csv differs)')
 
     def test_the_report_can_be_drawn_again(self):
         report = (self.whole / 'report.md').read_text(encoding='utf-8')

@@ -157,6 +157,30 @@ class ReportTest(unittest.TestCase):
         self.assertIn('## Discussion\n\nBecause of the light.\n\n- and of *this*\n', text)
         self.assertIn('a paper \\| its Table', text)
 
+    def test_poses_have_tables_of_their_own(self):
+        evaluation = self.evaluation('metric')
+        evaluation.method(OTHER, 'landmarks', .2, 20)
+        evaluation.method(OTHER, 'exhaustive', 2.5, 400)
+        evaluation.write()
+        figures = {'metric_share': .995, 'p95_err_m': .384, 'heading_err_deg': .17, 'recall_025m_2deg': .751,
+                   'recall_05m_5deg': .998, 'recall_5m_10deg': 1, 'wrong_1m_share': .0025, 'wrong_5m_share': 0,
+                   'inside_95_share': .96, 'nees': 1.42}
+        relative = {'relative_err_m': .036, 'relative_heading_err_deg': .04, 'relative_nees': 4.5}
+        write_csv(self.folder / 'summary.csv', [*SUMMARY, *figures, *relative],
+                  [{**evaluation.rows[0], **figures, **relative}, evaluation.rows[1]])
+        text = self.report()
+        self.assertIn('## Poses: recall within position and heading\n\n### sunny → cloudy\n', text)
+        self.assertIn('| landmarks | 99.5 | 0.20 | 0.38 | 0.17 | 75.1 | 99.8 | 100.0 | 0.25 | 0.00 | 96.0 | 1.42 |', text)
+        self.assertIn('| exhaustive | – | 2.50 | – | – | – | – | – | – | – | – | – |', text)
+        self.assertIn('## Poses in relation to the map\n', text)
+        self.assertIn('| landmarks | 0.04 | 0.04 | 4.50 |', text)
+
+    def test_places_have_no_tables_of_poses(self):
+        evaluation = self.evaluation('comparison')
+        evaluation.fill(['DPSO-80'])
+        evaluation.write()
+        self.assertNotIn('## Poses', self.report())
+
     def test_sources_that_differ_are_both_shown(self):
         evaluation = self.evaluation('kidnapped')
         evaluation.fill(['not adaptive', 'adaptive, paper recovery', 'adaptive, guided recovery', 'PF-l-100'])
