@@ -152,6 +152,17 @@ void judge(const DriveImage& image, const TrainingMap& map, const std::optional<
   if (verdict.estimate) judgePose(*verdict.estimate, truth_m, image.truth->yaw_rad, map_error, step);
 }
 
+StepRecord stepOf(const Verdict& verdict) {
+  StepRecord step;
+  step.confidence = static_cast<float>(verdict.confidence);
+  step.comparisons = static_cast<std::uint32_t>(verdict.comparisons);
+  step.sift = verdict.features == FeatureKind::kSift;
+  if (!verdict.estimate) return step;
+  step.state = verdict.estimate->state;
+  step.source = verdict.estimate->source;
+  return step;
+}
+
 TraceRecord traced(std::size_t index, const DriveImage& image, const TrainingMap& map, double diversity_m,
                    const Estimate& estimate) {
   TraceRecord trace{index, diversity_m, estimate};
@@ -198,17 +209,10 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
     const Verdict verdict = contestant->process(shown.stamp_ns);
     record.method_ms += stopwatch.elapsed_ms();
     counter.add(*image, record);
-    StepRecord step;
-    step.confidence = static_cast<float>(verdict.confidence);
-    step.comparisons = static_cast<std::uint32_t>(verdict.comparisons);
-    step.sift = verdict.features == FeatureKind::kSift;
-    if (verdict.estimate) {
-      step.state = verdict.estimate->state;
-      step.source = verdict.estimate->source;
-    }
     const TrainingMap& map = *context.map.map;
-    judge(shown, map, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]], verdict, step);
-    record.steps.push_back(step);
+    record.steps.push_back(stepOf(verdict));
+    judge(shown, map, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]], verdict,
+          record.steps.back());
     if (trace && verdict.estimate) {
       record.trace.push_back(traced(order[i], shown, map, contestant->diversity_m(), *verdict.estimate));
     }

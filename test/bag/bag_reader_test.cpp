@@ -132,6 +132,8 @@ TEST_F(BagReaderTest, NamesTheTopicsThatThereAre) {
   EXPECT_THAT(reason([&] { bag.images("/eye"); }), AllOf(HasSubstr("'/eye'"), HasSubstr("/camera/compressed")));
   EXPECT_THAT(reason([&] { bag.fixes("/position"); }), AllOf(HasSubstr("'/position'"), HasSubstr("/gps")));
   EXPECT_THAT(reason([&] { bag.fixes("/talk"); }), HasSubstr("no fix topic"));
+  EXPECT_TRUE(bag.hasFixes("/gps"));
+  EXPECT_FALSE(bag.hasFixes("/talk"));
 }
 
 TEST_F(BagReaderTest, SaysWhyAFileIsNoBag) {
