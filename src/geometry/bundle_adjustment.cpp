@@ -8,6 +8,7 @@
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
+#include <ceres/rotation.h>
 #include <ceres/sized_cost_function.h>
 #include <ceres/solver.h>
 #include <glog/logging.h>
@@ -94,10 +95,29 @@ class GemanMcClureLoss final : public ceres::LossFunction {
 struct PositionResidual {
   Eigen::Vector2d measured_m;
   double sigma_m;
+  Eigen::Matrix3d map_from_start;
+  Eigen::Vector3d antenna_m;  ///< in the camera's frame
 
   template <class T>
-  bool operator()(const T* camera, T* residual) const {
-    for (int i = 0; i < 2; ++i) residual[i] = (camera[3 + i] - T(measured_m[i])) / T(sigma_m);
+  bool operator()(const T* camera, const T* bias, T* residual) const {
+    const T antenna[3] = {T(antenna_m.x()), T(antenna_m.y()), T(antenna_m.z())};
+    T turned[3];
+    ceres::AngleAxisRotatePoint(camera, antenna, turned);
+    for (int i = 0; i < 2; ++i) {
+      T antenna_in_map = camera[3 + i];
+      for (int k = 0; k < 3; ++k) antenna_in_map += T(map_from_start(i, k)) * turned[k];
+      residual[i] = (antenna_in_map + bias[i] - T(measured_m[i])) / T(sigma_m);
+    }
+    return true;
+  }
+};
+
+struct BiasResidual {
+  double sigma_m;
+
+  template <class T>
+  bool operator()(const T* bias, T* residual) const {
+    for (int i = 0; i < 2; ++i) residual[i] = bias[i] / T(sigma_m);
     return true;
   }
 };
@@ -164,6 +184,9 @@ class Adjustment {
         ceres_(borrowedLosses()) {
     for (const CameraPose& camera : problem.cameras) {
       const Eigen::Vector3d& position = camera.position_m;
+      const std::size_t next = sessions_.empty() ? 1 : sessions_.back() + 1;
+      const bool begins = next < problem.sessions.size() && problem.sessions[next].begin == sessions_.size();
+      sessions_.push_back(begins ? next : next - 1);
       starts_.push_back(camera.rotation.toRotationMatrix());
       cameras_.push_back({0.0, 0.0, 0.0, position.x(), position.y(), position.z()});
     }
@@ -211,8 +234,16 @@ class Adjustment {
 
   void addPositions() {
     for (const PositionObservation& position : problem_.positions) {
-      ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6>({position.east_north_m, position.sigma_m}),
-                              &position_loss_, cameras_[position.image].data());
+      BundleSession& session = problem_.sessions[sessions_[position.image]];
+      const PositionResidual residual{position.east_north_m, position.sigma_m, starts_[position.image],
+                                      session.antenna_m};
+      ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6, 2>(residual), &position_loss_,
+                              cameras_[position.image].data(), session.fix_bias_m.data());
+    }
+    for (BundleSession& session : problem_.sessions) {
+      double* bias = session.fix_bias_m.data();
+      ceres_.AddResidualBlock(automatic<BiasResidual, 2, 2>({config_.fix_bias_sigma_m}), nullptr, bias);
+      if (problem_.sessions.size() == 1) ceres_.SetParameterBlockConstant(bias);
     }
   }
 
@@ -220,8 +251,8 @@ class Adjustment {
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
       const MountingResidual mounting(problem_.cameras[i].rotation, problem_.travel[i], config_.tilt_sigma_rad);
       ceres_.AddResidualBlock(automatic<CameraMountingResidual, 3, 6, 3>({mounting}), &tilt_loss_, cameras_[i].data(),
-                              problem_.mounting_rad.data());
-      if (i + 1 == cameras_.size()) continue;
+                              problem_.sessions[sessions_[i]].mounting_rad.data());
+      if (i + 1 == cameras_.size() || sessions_[i + 1] != sessions_[i]) continue;
       const double run_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i].position_m).head<2>().norm();
       ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>({config_.slope_sigma * run_m + kRoughness_m}), nullptr,
                               cameras_[i].data(), cameras_[i + 1].data());
@@ -232,6 +263,7 @@ class Adjustment {
   }
 
   /// Landmarks first. Left to itself Ceres eliminates the mounting as well, which ties every camera to every other.
+  /// Within a group Ceres goes by address, so a group is of one array, or the result would depend on where memory is.
   ceres::Solver::Options solverOptions() {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -239,13 +271,17 @@ class Adjustment {
     options.num_threads = config_.threads;
     options.logging_type = ceres::SILENT;
     options.function_tolerance = config_.tolerance;
+    options.use_nonmonotonic_steps = true;  // along a flat valley it takes a third fewer
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     for (Landmark& landmark : problem_.landmarks) {
       if (!landmark.sightings.empty()) options.linear_solver_ordering->AddElementToGroup(landmark.position_m.data(), 0);
     }
     for (auto& camera : cameras_) options.linear_solver_ordering->AddElementToGroup(camera.data(), 1);
-    options.linear_solver_ordering->AddElementToGroup(problem_.mounting_rad.data(), 1);
-    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 1);
+    for (BundleSession& session : problem_.sessions) {
+      options.linear_solver_ordering->AddElementToGroup(session.mounting_rad.data(), 2);
+      options.linear_solver_ordering->AddElementToGroup(session.fix_bias_m.data(), 3);
+    }
+    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 4);
     return options;
   }
 
@@ -254,6 +290,7 @@ class Adjustment {
   ceres::CauchyLoss sighting_loss_;
   ceres::CauchyLoss tilt_loss_;
   GemanMcClureLoss position_loss_;
+  std::vector<std::size_t> sessions_;  ///< of the cameras
   std::vector<Eigen::Matrix3d> starts_;
   std::vector<std::array<double, 6>> cameras_;  ///< as in SightingCost
   ceres::Problem ceres_;

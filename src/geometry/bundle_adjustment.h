@@ -25,21 +25,29 @@ struct Landmark {
   std::vector<LandmarkSighting> sightings;
 };
 
-/// What a satellite receiver says about where a camera was.
+/// What a satellite receiver says about where its antenna was when an image was taken.
 struct PositionObservation {
   std::uint32_t image = 0;
   Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();
   double sigma_m = 0.3;
 };
 
-/// Cameras in order of time, what they saw, and what is known besides.
+/// What the images of one recording have in common.
+struct BundleSession {
+  std::size_t begin = 0;                                   ///< its first camera
+  Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
+  Eigen::Vector2d fix_bias_m = Eigen::Vector2d::Zero();    ///< its fixes are this far off; not for a single session
+  Eigen::Vector3d antenna_m = Eigen::Vector3d::Zero();     ///< in the camera's optical frame; known
+};
+
+/// Cameras session by session, each in order of time, what they saw, and what is known besides.
 struct BundleProblem {
   std::vector<CameraPose> cameras;
   std::vector<Landmark> landmarks;
   std::vector<PositionObservation> positions;
   std::vector<Eigen::Quaterniond> travel;  ///< of each camera: levelCamera() along the direction of travel
-  Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
-  double focal_scale = 1.0;                                ///< true focal length, as a share of the calibration's
+  std::vector<BundleSession> sessions;
+  double focal_scale = 1.0;  ///< true focal length, as a share of the calibration's
 };
 
 struct BundleConfig {
@@ -47,14 +55,15 @@ struct BundleConfig {
   double position_loss = 1.0;                       ///< scale of the Geman-McClure loss of a fix, sigmas
   Eigen::Vector3d tilt_sigma_rad{0.02, 0.1, 0.02};  ///< of a camera about the mounting: pitch, yaw, roll
   double slope_sigma = 0.1;                         ///< rise over run
+  double fix_bias_sigma_m = 0.3;                    ///< per axis, of a session's fixes
   int max_iterations = 30;
   double tolerance = 1e-4;  ///< relative change of the cost at which it ends
   bool focal_is_free = false;
   int threads = 1;  ///< the last digits depend on it: Ceres adds up in the order in which threads end
 };
 
-/// Moves cameras, landmarks and mounting, and the focal length when it is free, to where all observations agree best.
-/// Returns the final cost.
+/// Moves cameras, landmarks, mountings and biases, and the focal length when it is free, to where all observations
+/// agree best. Returns the final cost.
 double adjust(BundleProblem& problem, const BundleConfig& config);
 
 /// Distance of where a landmark is seen from where it projects to, normalised coordinates; infinite behind the camera.

@@ -63,4 +63,30 @@ std::vector<FeatureTrack> tracksOf(const std::vector<ImagePair>& pairs, const st
   return tracks;
 }
 
+std::vector<FeatureTrack> cutTracks(const std::vector<FeatureTrack>& tracks, std::size_t max_views,
+                                    const std::function<std::size_t(std::uint32_t image)>& session_of_image) {
+  std::vector<FeatureTrack> cut;
+  for (const FeatureTrack& track : tracks) {
+    std::vector<FeatureTrack> by_session;
+    for (std::size_t i = 0; i < track.size(); ++i) {
+      const bool begins = i == 0 || session_of_image(track[i].image) != session_of_image(track[i - 1].image);
+      if (begins) by_session.emplace_back();
+      by_session.back().push_back(track[i]);
+    }
+    std::size_t longest = 0;
+    for (const FeatureTrack& part : by_session) longest = std::max(longest, part.size());
+    const std::size_t pieces = longest == 0 ? 0 : (longest - 1) / max_views + 1;
+    for (std::size_t piece = 0; piece < pieces; ++piece) {
+      FeatureTrack& joined = cut.emplace_back();
+      for (const FeatureTrack& part : by_session) {
+        const auto at = [&](std::size_t k) {
+          return part.begin() + static_cast<std::ptrdiff_t>(k * part.size() / pieces);
+        };
+        joined.insert(joined.end(), at(piece), at(piece + 1));
+      }
+    }
+  }
+  return cut;
+}
+
 }  // namespace visual_localization

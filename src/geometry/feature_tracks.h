@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "visual_localization/features/sift_matcher.h"
@@ -27,5 +28,10 @@ struct ImagePair {
 /// different things: it is dropped. `feature_counts`: of each image. In order of the first observation.
 std::vector<FeatureTrack> tracksOf(const std::vector<ImagePair>& pairs, const std::vector<std::size_t>& feature_counts,
                                    std::size_t min_views);
+
+/// Cuts tracks into pieces of about the same length, with at most `max_views` images of a session each. A piece has
+/// what all sessions see on the same stretch, if they drive the same way. `session_of_image`: increasing.
+std::vector<FeatureTrack> cutTracks(const std::vector<FeatureTrack>& tracks, std::size_t max_views,
+                                    const std::function<std::size_t(std::uint32_t image)>& session_of_image);
 
 }  // namespace visual_localization

@@ -30,6 +30,11 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                fix_bias, 0.0, 100.0);
   visitor.integer({"geometry/min_landmarks", "1", "an image with fewer landmarks has a place only"}, min_landmarks, 4,
                   10000);
+  visitor.real(
+      {"geometry/spacing", "m",
+       "of a session with landmarks keep, after all images were adjusted, only those at least this far from the "
+       "last kept one"},
+      spacing_m, 0.0, 1000.0);
 }
 
 }  // namespace visual_localization

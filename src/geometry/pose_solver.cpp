@@ -75,6 +75,10 @@ struct NormalEquations {
   Matrix6 information = Matrix6::Zero();
   Vector6 gradient = Vector6::Zero();
   double squared_sigmas = 0.0;  ///< mean of the squared residuals
+  // The same of the focal length's scale, alone and with the step.
+  double focal_information = 0.0;
+  double focal_gradient = 0.0;
+  Vector6 focal_with_step = Vector6::Zero();
 
   NormalEquations(const std::vector<LandmarkMatch>& matches, const std::vector<std::size_t>& inliers,
                   const CameraPose& pose) {
@@ -104,6 +108,10 @@ struct NormalEquations {
     information += weight * jacobian.transpose() * inverse * jacobian;
     gradient += weight * jacobian.transpose() * inverse * residual;
     squared_sigmas += weight * squared;
+    const Eigen::Vector2d by_focal = inverse * point.hnormalized();
+    focal_information += weight * by_focal.dot(point.hnormalized());
+    focal_gradient += weight * by_focal.dot(residual);
+    focal_with_step += weight * jacobian.transpose() * by_focal;
   }
 };
 
@@ -133,6 +141,10 @@ std::optional<SolvedPose> refined(const std::vector<LandmarkMatch>& matches, Cam
   if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().minCoeff() > 0.0)) return std::nullopt;
   solved.covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
                       eigen.eigenvectors().transpose() * std::max(1.0, equations.squared_sigmas);
+  const Vector6 by_step = equations.information.ldlt().solve(equations.focal_with_step);
+  const double information = equations.focal_information - by_step.dot(equations.focal_with_step);
+  solved.focal_scale = 1.0 - (equations.focal_gradient - by_step.dot(equations.gradient)) / information;
+  solved.focal_sigma = std::sqrt(std::max(1.0, equations.squared_sigmas) / information);
   std::vector<double> errors;
   for (const std::size_t i : solved.inliers) errors.push_back(errorOf(matches[i], pose));
   solved.median_error = median(errors);

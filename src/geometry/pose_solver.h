@@ -25,6 +25,9 @@ struct SolvedPose {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::vector<std::size_t> inliers;  ///< of the matches
   double median_error = 0.0;         ///< distance of an inlier from its landmark's projection, normalised coordinates
+  /// What the inliers would rather have as focal length, as a share of the calibration's, and its standard deviation.
+  double focal_scale = 1.0;
+  double focal_sigma = 0.0;
 };
 
 /// The pose from which most matches are right: AP3P in a robust loop, then least squares on all inliers, each weighed

@@ -2,283 +2,274 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "base/parallel.h"
-#include "base/statistics.h"
-#include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
-#include "geometry/fix_positions.h"
 #include "geometry/keypoint_rays.h"
+#include "geometry/reconstruction.h"
+#include "geometry/revisits.h"
 #include "geometry/rotation_averaging.h"
-#include "geometry/triangulation.h"
+#include "geometry/session_alignment.h"
 #include "geometry/two_view.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr double kMaxTurn_rad = 0.6;        ///< from one image to the next
+constexpr double kMaxTurn_rad = 0.6;  ///< from one image to the next
+constexpr double kMaxRevisitTurn_rad = 0.8;
 constexpr std::uint32_t kRotationSpan = 3;  ///< images farther apart say little about each other's rotation
 constexpr std::size_t kMinViews = 3;        ///< of a landmark
-constexpr double kMinAngle_rad = 0.01;      ///< between two rays to a landmark
-constexpr double kFar_m = 3.0;              ///< an image moved by more than this is far from the cleaned path
-constexpr double kMostFar = 0.05;           ///< share of such images in a session to be believed
+constexpr double kMostFar = 0.05;           ///< share of images far from the cleaned path in a session to be believed
 constexpr double kFocalTolerance = 0.01;
-constexpr double kBelievedFix_m = 1.0;  ///< from the cleaned path: what the first adjustment takes
+constexpr double kLeastAgreeing = 2.0 / 3.0;  ///< share of the tracked features that must agree with the adjustment
+constexpr double kBelievedFix_m = 1.0;        ///< from the cleaned path: what the first adjustment takes
+constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 /// Relative changes of the cost at which adjustments end. The whole path turns and shifts along a flat valley of the
 /// cost: thousands of sightings hardly feel it. With 100 times as much it stops on the way, metres off where the camera
 /// looks aside or the road climbs.
 constexpr double kCoarse = 1e-5;
 constexpr double kFine = 1e-6;
+/// Landmarks that many images show tie all of these to each other, which costs time. Until positions are about right
+/// their tracks are cut.
+constexpr std::size_t kCoarseViews = 20;
+constexpr std::size_t kAllViews = std::numeric_limits<std::size_t>::max();
+constexpr double kCoarseLoss = 5.0;  ///< the same for the loss of fixes, as a multiple: no fix loses its say yet
 
-/// Two images of the session, and what they agree on.
+using Indices = std::pair<std::uint32_t, std::uint32_t>;
+
+/// Two images, and what they agree on.
 struct Pair {
   ImagePair matches;
   std::optional<TwoView> view;
 };
 
-class SessionAdjuster {
+/// Matches and verifies pairs of images.
+class PairMatcher {
  public:
-  SessionAdjuster(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads)
-      : session_(session), config_(config), threads_(threads) {
-    bundle_.position_loss = config.fix_loss;
+  PairMatcher(const GeometryConfig& config, std::size_t threads) : config_(config), threads_(threads) {}
+
+  /// Those pairs that agree on enough. `view(i)`: features and rays of an image; `turns_rad(a, b)`: most that it turns.
+  template <class ViewOf>
+  std::vector<Pair> match(const std::vector<Indices>& indices, const ViewOf& viewOf) const {
+    std::vector<Pair> pairs(indices.size());
+    parallelFor(pairs.size(), threads_, [&](std::size_t i) {
+      const auto [a, b] = indices[i];
+      pairs[i].matches = {a, b, {}};
+      verify(viewOf(a), viewOf(b), pairs[i]);
+    });
+    pairs.erase(std::remove_if(pairs.begin(), pairs.end(), [](const Pair& pair) { return !pair.view; }), pairs.end());
+    return pairs;
   }
 
-  SessionGeometry run(std::uint32_t first_id) {
-    for (std::size_t i = 0; i < session_.images.size(); ++i) {
-      rays_.push_back(raysOf(*session_.features(i), *session_.camera, config_.keypoint_sigma_px));
-    }
-    matchPairs();
-    startProblem();
-    adjustAll();
-    return result(first_id);
-  }
+  struct View {
+    std::shared_ptr<const SiftFeatures> features;
+    const KeypointRays* rays;
+    double focal_px;
+  };
 
  private:
-  void matchPairs() {
-    const auto count = static_cast<std::uint32_t>(rays_.size());
-    const auto span = static_cast<std::uint32_t>(config_.pair_span);
-    for (std::uint32_t a = 0; a < count; ++a) {
-      for (std::uint32_t b = a + 1; b < count && b <= a + span; ++b) pairs_.push_back({{a, b, {}}, {}});
-    }
-    parallelFor(pairs_.size(), threads_, [this](std::size_t i) { verify(pairs_[i]); });
-    pairs_.erase(std::remove_if(pairs_.begin(), pairs_.end(), [](const Pair& pair) { return !pair.view; }),
-                 pairs_.end());
-  }
-
-  void verify(Pair& pair) const {
-    const auto [a, b] = std::pair(pair.matches.a, pair.matches.b);
-    const auto matches = matchSymmetric(*session_.features(a), *session_.features(b), config_.match_ratio);
-    pair.view = verifyTwoViews(rays_[a].normalised, rays_[b].normalised, usable(matches, rays_[a], rays_[b]),
-                               config_.epipolar_tolerance_px / focal_px(),
-                               static_cast<std::size_t>(config_.min_pair_inliers), kMaxTurn_rad * (b - a));
+  void verify(const View& a, const View& b, Pair& pair) const {
+    const auto matches = matchSymmetric(*a.features, *b.features, config_.match_ratio);
+    const std::uint32_t apart = pair.matches.b - pair.matches.a;
+    const double turn_rad =
+        apart <= static_cast<std::uint32_t>(config_.pair_span) ? kMaxTurn_rad * apart : kMaxRevisitTurn_rad;
+    pair.view = verifyTwoViews(a.rays->normalised, b.rays->normalised, usable(matches, *a.rays, *b.rays),
+                               config_.epipolar_tolerance_px / std::min(a.focal_px, b.focal_px),
+                               static_cast<std::size_t>(config_.min_pair_inliers), turn_rad);
     if (pair.view) pair.matches.matches = pair.view->inliers;
   }
 
-  void startProblem() {
+  const GeometryConfig& config_;
+  std::size_t threads_;
+};
+
+/// A session on its own.
+class SessionAdjuster {
+ public:
+  SessionAdjuster(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads)
+      : session_(session), config_(config), matcher_(config, threads), reconstruction_(config) {
+    std::vector<KeypointRays> rays;
+    for (std::size_t i = 0; i < session.images.size(); ++i) {
+      rays.push_back(raysOf(*session.features(i), *session.camera, config.keypoint_sigma_px));
+    }
+    matchPairs(rays);
+    start(std::move(rays));
+    adjust();
+  }
+
+  /// Of a single session; landmark ids begin with `first_id`.
+  SessionGeometry result(std::uint32_t first_id) const {
+    SessionGeometry geometry = std::move(reconstruction_.results(first_id).front());
+    geometry.focal_scale = focal_scale_;
+    geometry.contradicts_calibration = !isBelievable(geometry);
+    return geometry;
+  }
+  const Reconstruction& reconstruction() const { return reconstruction_; }
+  /// Matches between its images.
+  const std::vector<ImagePair>& matches() const { return matches_; }
+
+ private:
+  void matchPairs(const std::vector<KeypointRays>& rays) {
+    const auto count = static_cast<std::uint32_t>(rays.size());
+    const auto span = static_cast<std::uint32_t>(config_.pair_span);
+    std::vector<Indices> indices;
+    for (std::uint32_t a = 0; a < count; ++a) {
+      for (std::uint32_t b = a + 1; b < count && b <= a + span; ++b) indices.emplace_back(a, b);
+    }
+    std::vector<PathImage> path;
+    for (const TrajectoryPoint& image : session_.images) path.push_back({0, image});
+    for (const Indices& pair : revisits(path)) indices.push_back(pair);
+    pairs_ = matcher_.match(indices, [&](std::uint32_t i) {
+      return PairMatcher::View{session_.features(i), &rays[i], session_.camera->intrinsics().fx};
+    });
+  }
+
+  void start(std::vector<KeypointRays> rays) {
     std::vector<double> yaws_rad;
     for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
     std::vector<RelativeRotation> relative;
-    std::vector<ImagePair> matches;
     std::vector<std::size_t> feature_counts;
     for (const Pair& pair : pairs_) {
       const auto& [a, b, inliers] = pair.matches;
       if (b - a <= kRotationSpan) relative.push_back({a, b, pair.view->b_from_a});
-      matches.push_back(pair.matches);
+      matches_.push_back(pair.matches);
     }
-    for (const KeypointRays& rays : rays_) feature_counts.push_back(rays.normalised.size());
-    tracks_ = tracksOf(matches, feature_counts, kMinViews);
-    const AveragedRotations rotations = averageRotations(yaws_rad, relative);
-    problem_.mounting_rad = rotations.mounting_rad;
-    for (std::size_t i = 0; i < yaws_rad.size(); ++i) {
-      const Eigen::Vector2d& position = session_.images[i].position_m;
-      problem_.cameras.push_back({rotations.camera_in_map[i], {position.x(), position.y(), 0.0}});
-      problem_.travel.push_back(levelCamera(yaws_rad[i]));
-    }
+    for (const KeypointRays& of_image : rays) feature_counts.push_back(of_image.normalised.size());
+    reconstruction_.add(session_, std::move(rays), averageRotations(yaws_rad, relative));
+    reconstruction_.setTracks(tracksOf(matches_, feature_counts, kMinViews));
   }
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
-  void adjustAll() {
-    std::vector<PositionObservation> positions = positionsAt(session_.images, session_.fixes, config_.fix_sigma_m);
-    std::vector<double> sigmas_m;
-    for (PositionObservation& position : positions) {
-      sigmas_m.push_back(position.sigma_m);
-      position.sigma_m *= config_.fix_correlation;
-    }
-    fix_sigma_m_ = sigmas_m.empty() ? config_.fix_sigma_m : median(sigmas_m);
-    for (const PositionObservation& position : positions) {
-      const double off_m = (position.east_north_m - session_.images[position.image].position_m).norm();
-      if (off_m < kBelievedFix_m) problem_.positions.push_back(position);
-    }
-    triangulateAll(20.0);
-    adjustAndPrune(kCoarse, 2);
-    problem_.positions = positions;
-    for (int again = 0; again < 2; ++again) {
-      triangulateAll(4.0);
-      adjustAndPrune(kCoarse, 2);
-    }
-    adjustAndPrune(kFine, kMinViews);
-    focal_scale_ = freeFocalScale();
+  void adjust() {
+    reconstruction_.useFixes(kBelievedFix_m, kCoarseLoss * config_.fix_loss);
+    reconstruction_.triangulateAll(20.0, kCoarseViews);
+    reconstruction_.adjustAndPrune(kCoarse, 2);
+    reconstruction_.bringBack();
+    reconstruction_.useFixes(kAllFixes_m, config_.fix_loss);
+    reconstruction_.triangulateAll(4.0, kCoarseViews);
+    reconstruction_.adjustAndPrune(kCoarse, 2);
+    reconstruction_.bringBack();
+    reconstruction_.triangulateAll(4.0, kAllViews);
+    reconstruction_.adjustAndPrune(kCoarse, 2);
+    reconstruction_.adjustAndPrune(kFine, kMinViews);
+    focal_scale_ = reconstruction_.freeFocalScale();
   }
 
-  /// What the images make of the focal length, when they may.
-  double freeFocalScale() const {
-    BundleProblem problem = problem_;
-    BundleConfig config = bundle_;
-    config.focal_is_free = true;
-    config.tolerance = 1e-3;
-    adjust(problem, config);
-    return problem.focal_scale;
+  /// A wrong calibration bends the path away from the fixes, or the images would rather have another one; one that is
+  /// wrong by far leaves many sightings that fit nowhere.
+  static bool isBelievable(const SessionGeometry& geometry) {
+    return geometry.far_share <= kMostFar && std::abs(geometry.focal_scale - 1.0) <= kFocalTolerance &&
+           geometry.agreeing_share >= kLeastAgreeing;
   }
-
-  void adjustAndPrune(double tolerance, std::size_t min_views) {
-    bundle_.tolerance = tolerance;
-    adjust(problem_, bundle_);
-    for (Landmark& landmark : problem_.landmarks) {
-      auto& all = landmark.sightings;
-      const auto disagrees = [&](const LandmarkSighting& sighting) {
-        return !(error(landmark, sighting) <= config_.max_residual_sigmas * sighting.sigma);
-      };
-      all.erase(std::remove_if(all.begin(), all.end(), disagrees), all.end());
-    }
-    auto& all = problem_.landmarks;
-    const auto lost = [&](const Landmark& landmark) {
-      return landmark.sightings.size() < min_views || !landmark.position_m.allFinite();
-    };
-    all.erase(std::remove_if(all.begin(), all.end(), lost), all.end());
-  }
-
-  void triangulateAll(double gate_px) {
-    problem_.landmarks.clear();
-    for (const FeatureTrack& track : tracks_) {
-      Landmark landmark;
-      std::vector<Sight> sights;
-      for (const FeatureObservation& seen : track) {
-        const KeypointRays& rays = rays_[seen.image];
-        sights.push_back({&problem_.cameras[seen.image], rays.normalised[seen.feature]});
-        landmark.sightings.push_back({seen.image, seen.feature, sights.back().normalised, rays.sigmas[seen.feature]});
-      }
-      const std::optional<Eigen::Vector3d> point = triangulate(sights, kMinAngle_rad);
-      if (!point) continue;
-      landmark.position_m = *point;
-      auto& all = landmark.sightings;
-      const auto is_off = [&](const LandmarkSighting& sighting) {
-        return !(error(landmark, sighting) * focal_px() <= gate_px);
-      };
-      all.erase(std::remove_if(all.begin(), all.end(), is_off), all.end());
-      if (all.size() >= 2) problem_.landmarks.push_back(std::move(landmark));
-    }
-  }
-
-  /// Of a sighting, in normalised coordinates.
-  double error(const Landmark& landmark, const LandmarkSighting& sighting) const {
-    return reprojectionError(problem_.cameras[sighting.image], landmark.position_m, sighting.normalised);
-  }
-
-  SessionGeometry result(std::uint32_t first_id) const {
-    SessionGeometry geometry;
-    std::vector<ImageGeometry> images(problem_.cameras.size());
-    std::vector<double> errors_px;
-    for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i);
-    for (std::size_t i = 0; i < problem_.landmarks.size(); ++i) {
-      const Landmark& landmark = problem_.landmarks[i];
-      const Eigen::Matrix3d covariance = covarianceOf(landmark);
-      for (const LandmarkSighting& sighting : landmark.sightings) {
-        errors_px.push_back(error(landmark, sighting) * focal_px());
-        addLandmark(images[sighting.image], landmark, covariance, sighting.feature,
-                    first_id + static_cast<std::uint32_t>(i));
-      }
-    }
-    geometry.landmarks = problem_.landmarks.size();
-    geometry.sightings = errors_px.size();
-    geometry.median_error_px = median(errors_px);
-    geometry.mounting_rad = problem_.mounting_rad;
-    geometry.focal_scale = focal_scale_;
-    keep(std::move(images), geometry);
-    geometry.contradicts_calibration = !isBelievable(geometry);
-    return geometry;
-  }
-
-  ImageGeometry imageAt(std::size_t i) const {
-    ImageGeometry image;
-    image.camera = problem_.cameras[i];
-    Eigen::Matrix<double, 6, 1> sigmas;
-    const double bias_m = std::max(config_.fix_bias * fix_sigma_m_, 0.01);
-    sigmas << bias_m, bias_m, bias_m, 0.004, 0.004, 0.004;
-    image.covariance = sigmas.cwiseAbs2().asDiagonal();
-    return image;
-  }
-
-  /// Of a landmark among cameras that stand still.
-  Eigen::Matrix3d covarianceOf(const Landmark& landmark) const {
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-    for (const LandmarkSighting& sighting : landmark.sightings) {
-      const CameraPose& camera = problem_.cameras[sighting.image];
-      const Eigen::Vector3d point = camera.toCamera(landmark.position_m);
-      Eigen::Matrix<double, 2, 3> by_point;
-      by_point << 1.0, 0.0, -point.x() / point.z(), 0.0, 1.0, -point.y() / point.z();
-      by_point *= 1.0 / (point.z() * sighting.sigma);
-      const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera.rotation.conjugate().toRotationMatrix();
-      information += by_landmark.transpose() * by_landmark;
-    }
-    return information.ldlt().solve(Eigen::Matrix3d::Identity());
-  }
-
-  static void addLandmark(ImageGeometry& image, const Landmark& landmark, const Eigen::Matrix3d& covariance,
-                          std::uint32_t feature, std::uint32_t id) {
-    const Eigen::Vector3d offset = landmark.position_m - image.camera.position_m;
-    const Eigen::Vector3d ray = offset.normalized();
-    const double along_m2 = ray.dot(covariance * ray);
-    const double across_m2 = 0.5 * (covariance.trace() - along_m2);
-    if (!(std::isfinite(along_m2) && along_m2 > 0.0 && across_m2 > 0.0)) return;
-    image.landmarks.push_back({feature, id, offset.cast<float>(), static_cast<float>(std::sqrt(along_m2)),
-                               static_cast<float>(std::sqrt(across_m2))});
-  }
-
-  void keep(std::vector<ImageGeometry> images, SessionGeometry& geometry) const {
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      auto& landmarks = images[i].landmarks;
-      std::sort(landmarks.begin(), landmarks.end(),
-                [](const SeenLandmark& a, const SeenLandmark& b) { return a.feature < b.feature; });
-      const bool enough = landmarks.size() >= static_cast<std::size_t>(config_.min_landmarks);
-      const double shift_m = (images[i].camera.position_m.head<2>() - session_.images[i].position_m).norm();
-      geometry.images.push_back(enough ? std::optional<ImageGeometry>(std::move(images[i])) : std::nullopt);
-      if (!enough) continue;
-      geometry.mean_shift_m += shift_m;
-      geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
-      if (shift_m > kFar_m) geometry.far_share += 1.0 / static_cast<double>(images.size());
-    }
-    const auto kept = std::count_if(geometry.images.begin(), geometry.images.end(),
-                                    [](const auto& image) { return image.has_value(); });
-    if (kept > 0) geometry.mean_shift_m /= static_cast<double>(kept);
-  }
-
-  /// A wrong calibration bends the path away from the fixes, or the images would rather have another one.
-  bool isBelievable(const SessionGeometry& geometry) const {
-    return geometry.far_share <= kMostFar && std::abs(geometry.focal_scale - 1.0) <= kFocalTolerance;
-  }
-
-  double focal_px() const { return session_.camera->intrinsics().fx; }
 
   const UnadjustedSession& session_;
   const GeometryConfig& config_;
-  std::size_t threads_;
-  BundleConfig bundle_;
-  std::vector<KeypointRays> rays_;
+  PairMatcher matcher_;
+  Reconstruction reconstruction_;
   std::vector<Pair> pairs_;
-  std::vector<FeatureTrack> tracks_;
-  BundleProblem problem_;
+  std::vector<ImagePair> matches_;
   double focal_scale_ = 1.0;
-  double fix_sigma_m_ = 0.0;  ///< of a usual fix
+};
+
+/// Sessions that were adjusted on their own, tied to each other where they overlap.
+class SessionTier {
+ public:
+  SessionTier(const std::vector<UnadjustedSession>& sessions, const GeometryConfig& config, std::size_t threads)
+      : sessions_(sessions), config_(config), matcher_(config, threads), together_(config) {}
+
+  void add(std::size_t session, const SessionAdjuster& alone) {
+    const auto begin = static_cast<std::uint32_t>(together_.size());
+    for (ImagePair pair : alone.matches()) {
+      pair.a += begin;
+      pair.b += begin;
+      matches_.push_back(std::move(pair));
+    }
+    together_.append(alone.reconstruction());
+    which_.push_back(session);
+    begins_.push_back(begin);
+  }
+
+  /// Nothing when no two sessions overlap; otherwise that of each session, in the order in which they were added.
+  std::optional<std::vector<SessionGeometry>> run() {
+    const std::vector<ImagePair> ties = matchTies();
+    if (ties.empty()) return std::nullopt;
+    const std::vector<double> apart_m = alignSessions(ties, together_);
+    matches_.insert(matches_.end(), ties.begin(), ties.end());
+    std::vector<std::size_t> feature_counts;
+    for (std::size_t i = 0; i < together_.size(); ++i) {
+      feature_counts.push_back(together_.rays(i).normalised.size());
+    }
+    together_.setTracks(tracksOf(matches_, feature_counts, kMinViews));
+    together_.useFixes(kAllFixes_m, config_.fix_loss);
+    together_.triangulateAll(20.0, kCoarseViews);
+    together_.adjustAndPrune(kCoarse, 2);
+    together_.triangulateAll(4.0, kCoarseViews);
+    together_.adjustAndPrune(kCoarse, 2);
+    together_.adjustAndPrune(kFine, kMinViews);
+    std::vector<SessionGeometry> results = together_.results(0);
+    for (std::size_t k = 0; k < results.size(); ++k) results[k].tied_apart_m = apart_m[k];
+    return results;
+  }
+
+ private:
+  std::vector<ImagePair> matchTies() const {
+    std::vector<PathImage> path;
+    for (std::size_t i = 0; i < together_.size(); ++i) {
+      TrajectoryPoint at = together_.cleaned(i);
+      at.position_m = together_.camera(i).position_m.head<2>();
+      path.push_back({together_.sessionOf(i), at});
+    }
+    std::vector<Indices> indices;
+    for (const Indices& pair : revisits(path)) {
+      if (path[pair.first].session != path[pair.second].session) indices.push_back(pair);
+    }
+    std::vector<ImagePair> ties;
+    for (Pair& pair : matcher_.match(indices, [this](std::uint32_t i) { return view(i); })) {
+      ties.push_back(std::move(pair.matches));
+    }
+    return ties;
+  }
+
+  PairMatcher::View view(std::uint32_t image) const {
+    const std::uint32_t session = together_.sessionOf(image);
+    return {sessions_[which_[session]].features(image - begins_[session]), &together_.rays(image),
+            together_.focal_px(image)};
+  }
+
+  const std::vector<UnadjustedSession>& sessions_;
+  const GeometryConfig& config_;
+  PairMatcher matcher_;
+  Reconstruction together_;
+  std::vector<ImagePair> matches_;
+  std::vector<std::size_t> which_;  ///< of the sessions
+  std::vector<std::uint32_t> begins_;
 };
 
 }  // namespace
 
-SessionGeometry adjustSession(const UnadjustedSession& session, const GeometryConfig& config, std::uint32_t first_id,
-                              std::size_t threads) {
-  return SessionAdjuster(session, config, threads).run(first_id);
+std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>& sessions,
+                                            const GeometryConfig& config, std::size_t threads) {
+  std::vector<SessionGeometry> geometries;
+  SessionTier tier(sessions, config, threads);
+  std::vector<std::size_t> believed;
+  std::uint32_t next_id = 0;
+  for (std::size_t k = 0; k < sessions.size(); ++k) {
+    const SessionAdjuster alone(sessions[k], config, threads);
+    geometries.push_back(alone.result(next_id));
+    if (geometries.back().contradicts_calibration) continue;
+    next_id += static_cast<std::uint32_t>(geometries.back().landmarks);
+    tier.add(k, alone);
+    believed.push_back(k);
+  }
+  auto tied = believed.size() > 1 ? tier.run() : std::nullopt;
+  for (std::size_t i = 0; tied && i < believed.size(); ++i) {
+    (*tied)[i].focal_scale = geometries[believed[i]].focal_scale;
+    geometries[believed[i]] = std::move((*tied)[i]);
+  }
+  return geometries;
 }
 
 }  // namespace visual_localization

@@ -14,6 +14,7 @@
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/geometry_config.h"
 #include "visual_localization/geometry/image_geometry.h"
+#include "visual_localization/geometry/sensor_mount.h"
 
 namespace visual_localization {
 
@@ -26,9 +27,10 @@ struct MapFix {
 
 /// A session before its adjustment.
 struct UnadjustedSession {
-  std::vector<TrajectoryPoint> images;  ///< where the cleaned path has them, in order of time
+  std::vector<TrajectoryPoint> images;  ///< where the cleaned path has the antenna, in order of time
   std::function<std::shared_ptr<const SiftFeatures>(std::size_t)> features;  ///< of an image
   const CameraModel* camera = nullptr;
+  SensorMount mount;
   std::vector<MapFix> fixes;  ///< in order of time
 };
 
@@ -40,16 +42,20 @@ struct SessionGeometry {
   double focal_scale = 1.0;              ///< what the images say the focal length is, as a share of the calibration's
   bool contradicts_calibration = false;  ///< then it is no geometry to rely on
   double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
+  double agreeing_share = 1.0;           ///< of the features in tracks: those that are sightings of a landmark
+  double tied_apart_m = 0.0;             ///< from what the sessions before see as well, before they were tied
   double mean_shift_m = 0.0;             ///< of the images from the cleaned path
   double largest_shift_m = 0.0;
   double far_share = 0.0;                                  ///< of all images: moved by more than 3 m
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
 };
 
-/// Landmarks and camera poses of a session from its images and fixes: matches of neighbouring images, verified; their
-/// rotations averaged; landmarks triangulated; all adjusted together, so that the images decide which fixes lie.
-/// Landmark ids begin with `first_id`. The result does not depend on the number of threads.
-SessionGeometry adjustSession(const UnadjustedSession& session, const GeometryConfig& config, std::uint32_t first_id,
-                              std::size_t threads);
+/// Landmarks and camera poses of sessions from their images and fixes: matches of neighbouring images and of those that
+/// come back to a position, verified; their rotations averaged; landmarks triangulated; all adjusted together, so that
+/// the images decide which fixes lie. Sessions that overlap are tied by what both see, each with a bias of its fixes,
+/// so that one position lies once. A session whose images contradict its calibration is not tied. Landmark ids are
+/// unique. The result does not depend on the number of threads.
+std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>& sessions,
+                                            const GeometryConfig& config, std::size_t threads);
 
 }  // namespace visual_localization

@@ -19,6 +19,7 @@ constexpr double kSigma = test::kKeypointSigma_px / 450.0;
 /// The truth, with sightings to `noise` (one sigma, normalised) and a position of sigma 1 m for each image.
 BundleProblem truthOf(const std::vector<DrivenPose>& poses, double noise, std::mt19937& random) {
   BundleProblem problem;
+  problem.sessions.emplace_back();
   const auto world = test::pointsAlong(poses, 5.0, random);
   std::normal_distribution<double> error(0.0, 1.0);
   std::vector<Landmark> landmarks(world.size());
@@ -98,7 +99,7 @@ TEST(BundleAdjustment, FindsHowTheCameraIsMounted) {
   adjust(problem, thorough());
   const Eigen::Quaterniond mounting = problem.travel[0].conjugate() * poses[0].camera.rotation;
   const Eigen::AngleAxisd expected(mounting);
-  EXPECT_LT((problem.mounting_rad - expected.angle() * expected.axis()).norm(), 1e-4);
+  EXPECT_LT((problem.sessions.front().mounting_rad - expected.angle() * expected.axis()).norm(), 1e-4);
 }
 
 /// Positions that bend aside by 8 m on a third of the way.
@@ -162,6 +163,7 @@ TEST(BundleAdjustment, GivesLandmarksBehindACameraNoSay) {
 
 TEST(BundleAdjustment, OfNothingChangesNothing) {
   BundleProblem problem;
+  problem.sessions.emplace_back();
   EXPECT_EQ(adjust(problem, {}), 0.0);
   problem.cameras.resize(1);
   problem.travel.push_back(problem.cameras[0].rotation);

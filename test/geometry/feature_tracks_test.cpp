@@ -1,6 +1,7 @@
 #include "geometry/feature_tracks.h"
 
 #include <algorithm>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -58,6 +59,41 @@ TEST(FeatureTracks, HaveAtLeastTheViewsAskedFor) {
 TEST(FeatureTracks, OfNothingAreNone) {
   EXPECT_TRUE(tracksOf({}, {}, 2).empty());
   EXPECT_TRUE(tracksOf({}, {0, 5, 0}, 2).empty());
+}
+
+std::size_t oneSession(std::uint32_t) { return 0; }
+
+TEST(FeatureTracks, AreCutIntoPiecesOfAboutTheSameLength) {
+  FeatureTrack track;
+  for (std::uint32_t image = 0; image < 11; ++image) track.push_back({image, 7});
+  const auto cut = cutTracks({track}, 4, oneSession);
+  ASSERT_EQ(cut.size(), 3U);
+  std::vector<FeatureObservation> joined;
+  for (const FeatureTrack& piece : cut) {
+    EXPECT_GE(piece.size(), 3U);
+    EXPECT_LE(piece.size(), 4U);
+    joined.insert(joined.end(), piece.begin(), piece.end());
+  }
+  EXPECT_TRUE(equal(joined, track));
+}
+
+TEST(FeatureTracks, StayWholeBelowTheLimit) {
+  const FeatureTrack track{{0, 1}, {1, 2}, {4, 3}};
+  for (const std::size_t most : {std::size_t{3}, std::numeric_limits<std::size_t>::max()}) {
+    const auto cut = cutTracks({track}, most, oneSession);
+    ASSERT_EQ(cut.size(), 1U);
+    EXPECT_TRUE(equal(cut[0], track));
+  }
+  EXPECT_TRUE(cutTracks({{}}, 3, oneSession).empty());
+}
+
+TEST(FeatureTracks, AreCutWithTheImagesOfAllSessionsTogether) {
+  FeatureTrack track;
+  for (std::uint32_t image = 0; image < 12; ++image) track.push_back({image, 1});
+  const auto cut = cutTracks({track}, 4, [](std::uint32_t image) { return image < 8 ? 0 : 1; });
+  ASSERT_EQ(cut.size(), 2U);
+  EXPECT_TRUE(equal(cut[0], {{0, 1}, {1, 1}, {2, 1}, {3, 1}, {8, 1}, {9, 1}}));
+  EXPECT_TRUE(equal(cut[1], {{4, 1}, {5, 1}, {6, 1}, {7, 1}, {10, 1}, {11, 1}}));
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 #include "geometry/session_geometry.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <random>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -25,7 +27,7 @@ RecordedDrive recorded(const test::StreetDrive& street, std::uint32_t seed) {
   return test::record(poses, test::pointsAlong(poses, kDensity, random), kFixNoise_m, random);
 }
 
-SessionGeometry adjusted(const RecordedDrive& drive) { return adjustSession(drive.unadjusted(), {}, 0, 1); }
+SessionGeometry adjusted(const RecordedDrive& drive) { return adjustSessions({drive.unadjusted()}, {}, 1).front(); }
 
 std::size_t imagesIn(const SessionGeometry& geometry) {
   return static_cast<std::size_t>(std::count_if(geometry.images.begin(), geometry.images.end(),
@@ -156,8 +158,7 @@ TEST(SessionGeometry, IgnoresWhatMovesAndWhatLooksAlike) {
 
 TEST(SessionGeometry, CallsALandmarkTheSameInAllImages) {
   const RecordedDrive drive = recorded({}, 6);
-  constexpr std::uint32_t kFirst = 1000;
-  const SessionGeometry geometry = adjustSession(drive.unadjusted(), {}, kFirst, 1);
+  const SessionGeometry geometry = adjustSessions({drive.unadjusted()}, {}, 1).front();
   std::map<std::uint32_t, Eigen::Vector3d> positions_m;
   std::size_t sightings = 0;
   for (const auto& image : geometry.images) {
@@ -171,8 +172,8 @@ TEST(SessionGeometry, CallsALandmarkTheSameInAllImages) {
   }
   EXPECT_EQ(sightings, geometry.sightings);
   ASSERT_EQ(positions_m.size(), geometry.landmarks);
-  EXPECT_EQ(positions_m.begin()->first, kFirst);
-  EXPECT_EQ(positions_m.rbegin()->first, kFirst + geometry.landmarks - 1);
+  EXPECT_EQ(positions_m.begin()->first, 0U);
+  EXPECT_EQ(positions_m.rbegin()->first, geometry.landmarks - 1);
 }
 
 TEST(SessionGeometry, NamesEachFeatureOnceAndInOrder) {
@@ -189,8 +190,8 @@ TEST(SessionGeometry, NamesEachFeatureOnceAndInOrder) {
 
 TEST(SessionGeometry, DoesNotDependOnTheNumberOfThreads) {
   const RecordedDrive drive = recorded({}, 8);
-  const SessionGeometry one = adjustSession(drive.unadjusted(), {}, 0, 1);
-  const SessionGeometry two = adjustSession(drive.unadjusted(), {}, 0, 2);
+  const SessionGeometry one = adjustSessions({drive.unadjusted()}, {}, 1).front();
+  const SessionGeometry two = adjustSessions({drive.unadjusted()}, {}, 2).front();
   EXPECT_EQ(one.landmarks, two.landmarks);
   EXPECT_EQ(one.sightings, two.sightings);
   for (std::size_t i = 0; i < one.images.size(); ++i) {
@@ -201,14 +202,14 @@ TEST(SessionGeometry, DoesNotDependOnTheNumberOfThreads) {
 
 TEST(SessionGeometry, OfARobotThatStandsIsNone) {
   const RecordedDrive drive = standing(20, 0.0);
-  const SessionGeometry geometry = adjustSession(withTruePath(drive), {}, 0, 1);
+  const SessionGeometry geometry = adjustSessions({withTruePath(drive)}, {}, 1).front();
   EXPECT_EQ(geometry.images.size(), 20U);
   EXPECT_EQ(imagesIn(geometry), 0U);
 }
 
 TEST(SessionGeometry, OfARobotThatTurnsOnTheSpotIsNone) {
   const RecordedDrive drive = standing(20, 0.05);
-  const SessionGeometry geometry = adjustSession(withTruePath(drive), {}, 0, 1);
+  const SessionGeometry geometry = adjustSessions({withTruePath(drive)}, {}, 1).front();
   EXPECT_EQ(geometry.images.size(), 20U);
   EXPECT_EQ(imagesIn(geometry), 0U);
 }
@@ -239,7 +240,7 @@ TEST(SessionGeometry, OfNoImagesIsNone) {
   const CameraModel camera = test::streetCamera();
   UnadjustedSession session;
   session.camera = &camera;
-  const SessionGeometry geometry = adjustSession(session, {}, 0, 1);
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
   EXPECT_TRUE(geometry.images.empty());
   EXPECT_EQ(geometry.landmarks, 0U);
 }
@@ -257,7 +258,7 @@ TEST(SessionGeometry, WithoutAnyFixIsFinite) {
   const RecordedDrive drive = recorded({}, 13);
   UnadjustedSession session = drive.unadjusted();
   session.fixes.clear();
-  const SessionGeometry geometry = adjustSession(session, {}, 0, 1);
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
   EXPECT_EQ(geometry.images.size(), drive.truth.size());
   expectFinite(geometry);
   EXPECT_LT(pathError_m(geometry, drive.truth), 5.0);
@@ -269,9 +270,98 @@ TEST(SessionGeometry, OfASingleImageIsNone) {
   RecordedDrive drive = recorded(street, 14);
   UnadjustedSession session = withTruePath(drive);
   session.images.pop_back();
-  const SessionGeometry geometry = adjustSession(session, {}, 0, 1);
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
   ASSERT_EQ(geometry.images.size(), 1U);
   EXPECT_FALSE(geometry.images[0]);
+}
+
+/// Another drive along the same street, a little beside, whose fixes are all off by `bias_m`.
+RecordedDrive again(const std::vector<WorldPoint>& world, const Eigen::Vector2d& bias_m, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  auto poses = test::drive({});
+  for (DrivenPose& pose : poses) pose.camera.position_m += pose.camera.rotation * Eigen::Vector3d(0.3, 0.0, 0.2);
+  RecordedDrive drive = test::record(poses, world, kFixNoise_m, random);
+  for (MapFix& fix : drive.fixes) fix.position_m += bias_m;
+  return drive;
+}
+
+/// How far two sessions have what both see apart: the mean over landmarks that both name.
+double apart_m(const std::vector<RecordedDrive>& drives, const std::vector<SessionGeometry>& sessions) {
+  double sum_m = 0.0;
+  for (std::size_t i = 0; i < drives[0].truth.size(); ++i) {
+    const Eigen::Vector3d first = sessions[0].images[i]->camera.position_m - drives[0].truth[i].camera.position_m;
+    const Eigen::Vector3d second = sessions[1].images[i]->camera.position_m - drives[1].truth[i].camera.position_m;
+    sum_m += (first - second).head<2>().norm();
+  }
+  return sum_m / static_cast<double>(drives[0].truth.size());
+}
+
+TEST(SessionGeometry, TiesSessionsWhereTheyOverlap) {
+  std::mt19937 random(21);
+  const auto world = test::pointsAlong(test::drive({}), kDensity, random);
+  const std::vector<RecordedDrive> drives{again(world, {0.0, 0.0}, 22), again(world, {1.5, -1.0}, 23)};
+  const std::vector<UnadjustedSession> sessions{drives[0].unadjusted(), drives[1].unadjusted()};
+  const auto alone_a = adjustSessions({sessions[0]}, {}, 1);
+  const auto alone_b = adjustSessions({sessions[1]}, {}, 1);
+  EXPECT_GT(apart_m(drives, {alone_a.front(), alone_b.front()}), 1.5);
+  const auto tied = adjustSessions(sessions, {}, 2);
+  ASSERT_EQ(tied.size(), 2U);
+  EXPECT_LT(apart_m(drives, tied), 0.05);
+  EXPECT_DOUBLE_EQ(tied[0].tied_apart_m, 0.0);
+  EXPECT_NEAR(tied[1].tied_apart_m, std::hypot(1.5, 1.0), 0.3);
+  for (const SessionGeometry& session : tied) EXPECT_EQ(imagesIn(session), session.images.size());
+}
+
+TEST(SessionGeometry, SharesLandmarksOfTiedSessions) {
+  std::mt19937 random(31);
+  const auto world = test::pointsAlong(test::drive({}), kDensity, random);
+  const std::vector<RecordedDrive> drives{again(world, {0.0, 0.0}, 32), again(world, {0.3, 0.2}, 33)};
+  const auto tied = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  std::vector<std::set<std::uint32_t>> ids(2);
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (const auto& image : tied[k].images) {
+      for (const SeenLandmark& landmark : image->landmarks) ids[k].insert(landmark.id);
+    }
+  }
+  std::vector<std::uint32_t> both;
+  std::set_intersection(ids[0].begin(), ids[0].end(), ids[1].begin(), ids[1].end(), std::back_inserter(both));
+  EXPECT_GT(2 * both.size(), ids[0].size());
+}
+
+TEST(SessionGeometry, LeavesSessionsApartThatShareNothing) {
+  const RecordedDrive here = recorded({}, 41);
+  RecordedDrive far = recorded({}, 42);
+  for (MapFix& fix : far.fixes) fix.position_m += Eigen::Vector2d(1000.0, 0.0);
+  const auto both = adjustSessions({here.unadjusted(), far.unadjusted()}, {}, 1);
+  EXPECT_LT(pathError_m(both[0], here.truth), 0.15);
+  std::set<std::uint32_t> ids;
+  for (const auto& image : both[0].images) {
+    for (const SeenLandmark& landmark : image->landmarks) ids.insert(landmark.id);
+  }
+  EXPECT_GT(imagesIn(both[1]), far.truth.size() / 2);
+  for (const auto& image : both[1].images) {
+    if (!image) continue;
+    for (const SeenLandmark& landmark : image->landmarks) EXPECT_EQ(ids.count(landmark.id), 0U);
+  }
+}
+
+/// The fixes are those of an antenna `antenna_m` away from the camera, in the optical frame.
+RecordedDrive withAntenna(RecordedDrive drive, const Eigen::Vector3d& antenna_m) {
+  const double per_image = static_cast<double>(drive.fixes.size()) / static_cast<double>(drive.truth.size());
+  for (std::size_t i = 0; i < drive.fixes.size(); ++i) {
+    const auto image = static_cast<std::size_t>(static_cast<double>(i) / per_image);
+    drive.fixes[i].position_m += (drive.truth[image].camera.rotation * antenna_m).head<2>();
+  }
+  return drive;
+}
+
+TEST(SessionGeometry, KnowsTheAntennaFromTheCamera) {
+  const Eigen::Vector3d antenna_m(0.5, -0.6, -0.6);
+  const RecordedDrive drive = withAntenna(recorded({}, 51), antenna_m);
+  UnadjustedSession session = drive.unadjusted();
+  EXPECT_GT(pathError_m(adjustSessions({session}, {}, 1).front(), drive.truth), 0.5) << "nobody said where it is";
+  session.mount.antenna_m = session.mount.camera.position_m + session.mount.camera.rotation * antenna_m;
+  EXPECT_LT(pathError_m(adjustSessions({session}, {}, 1).front(), drive.truth), 0.15);
 }
 
 }  // namespace

@@ -42,13 +42,21 @@ inline Mask exampleMask() {
   return Mask(grey);
 }
 
-/// The first session has a camera and a mask.
+/// A camera ahead that looks a little to the left, an antenna behind.
+inline SensorMount exampleMount() {
+  SensorMount mount;
+  mount.camera = parseCameraMount("0.25 0.125 1.0 0.25 0 0");
+  mount.antenna_m = {-0.5, 0.25, 0.75};
+  return mount;
+}
+
+/// The first session has a camera, a mask and a mount.
 inline MapHeader exampleHeader() {
   MapHeader header;
   header.datum = {48.5, 9.05, 430.25};
   header.image_size = {320, 240};
   header.sift.contrast_threshold = 0.03;
-  header.sessions = {{"monday", exampleCamera(), exampleMask()}, {"tuesday \"quoted\" \xC3\xA4"}};
+  header.sessions = {{"monday", exampleCamera(), exampleMask(), exampleMount()}, {"tuesday \"quoted\" \xC3\xA4"}};
   return header;
 }
 

@@ -1,0 +1,284 @@
+#include "geometry/reconstruction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Cholesky>
+
+#include "base/statistics.h"
+#include "geometry/fix_positions.h"
+#include "geometry/triangulation.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kMinAngle_rad = 0.01;     ///< between two rays to a landmark
+constexpr std::ptrdiff_t kNeighbours = 7;  ///< on each side of an image
+constexpr double kAstray_m = 2.0;          ///< an image moved by this more or less than its neighbours lost its way
+constexpr double kFarthest_m = 1000.0;     ///< a landmark farther away has no position to rely on
+constexpr double kFar_m = 3.0;             ///< an image moved by more than this is far from the cleaned path
+constexpr std::size_t kEnoughTracked =
+    20;  ///< tracked features of an image on average, for their share to say anything
+constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
+
+Eigen::Vector3d level(const Eigen::Vector2d& position_m) { return {position_m.x(), position_m.y(), 0.0}; }
+
+void addLandmark(ImageGeometry& image, const Landmark& landmark, const Eigen::Matrix3d& covariance,
+                 std::uint32_t feature, std::uint32_t id) {
+  const Eigen::Vector3d offset = landmark.position_m - image.camera.position_m;
+  const Eigen::Vector3d ray = offset.normalized();
+  const double along_m2 = ray.dot(covariance * ray);
+  const double across_m2 = 0.5 * (covariance.trace() - along_m2);
+  if (!(std::isfinite(along_m2) && along_m2 > 0.0 && across_m2 > 0.0)) return;
+  image.landmarks.push_back({feature, id, offset.cast<float>(), static_cast<float>(std::sqrt(along_m2)),
+                             static_cast<float>(std::sqrt(across_m2))});
+}
+
+}  // namespace
+
+void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointRays> rays,
+                         const AveragedRotations& rotations) {
+  const auto begin = static_cast<std::uint32_t>(images_.size());
+  std::vector<double> sigmas_m;
+  for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
+    sigmas_m.push_back(fix.sigma_m);
+    fix.image += begin;
+    fix.sigma_m *= config_.fix_correlation;
+    fixes_.push_back(fix);
+  }
+  fix_sigmas_m_.push_back(sigmas_m.empty() ? config_.fix_sigma_m : median(sigmas_m));
+  const Eigen::Vector3d antenna_m = session.mount.antennaInCamera_m();
+  problem_.sessions.push_back({begin, rotations.mounting_rad, Eigen::Vector2d::Zero(), antenna_m});
+  for (std::size_t i = 0; i < session.images.size(); ++i) {
+    const TrajectoryPoint& image = session.images[i];
+    const Eigen::Quaterniond& start = rotations.camera_in_map[i];
+    images_.push_back({static_cast<std::uint32_t>(sessions_.size()), image, std::move(rays[i]), start});
+    problem_.cameras.push_back({start, level(image.position_m) - start * antenna_m});
+    problem_.travel.push_back(levelCamera(image.yaw_rad));
+  }
+  sessions_.push_back(&session);
+}
+
+void Reconstruction::append(const Reconstruction& other) {
+  const auto begin = static_cast<std::uint32_t>(images_.size());
+  const auto session = static_cast<std::uint32_t>(sessions_.size());
+  for (Image image : other.images_) {
+    image.session += session;
+    images_.push_back(std::move(image));
+  }
+  for (PositionObservation fix : other.fixes_) {
+    fix.image += begin;
+    fixes_.push_back(fix);
+  }
+  for (BundleSession added : other.problem_.sessions) {
+    added.begin += begin;
+    problem_.sessions.push_back(added);
+  }
+  for (Landmark landmark : other.problem_.landmarks) {
+    for (LandmarkSighting& sighting : landmark.sightings) sighting.image += begin;
+    problem_.landmarks.push_back(std::move(landmark));
+  }
+  const auto add = [](const auto& from, auto& to) { to.insert(to.end(), from.begin(), from.end()); };
+  add(other.sessions_, sessions_);
+  add(other.fix_sigmas_m_, fix_sigmas_m_);
+  add(other.problem_.cameras, problem_.cameras);
+  add(other.problem_.travel, problem_.travel);
+}
+
+void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m) {
+  const std::size_t begin = problem_.sessions[session].begin;
+  for (std::size_t i = 0; i < shifts_m.size(); ++i) problem_.cameras[begin + i].position_m += shifts_m[i];
+  for (Landmark& landmark : problem_.landmarks) {
+    const std::uint32_t first = landmark.sightings.front().image;
+    if (images_[first].session == session) landmark.position_m += shifts_m[first - begin];
+  }
+}
+
+void Reconstruction::useFixes(double farthest_m, double loss) {
+  bundle_.position_loss = loss;
+  problem_.positions.clear();
+  for (const PositionObservation& fix : fixes_) {
+    if ((fix.east_north_m - images_[fix.image].cleaned.position_m).norm() <= farthest_m) {
+      problem_.positions.push_back(fix);
+    }
+  }
+}
+
+void Reconstruction::triangulateAll(double gate_px, std::size_t max_views) {
+  problem_.landmarks.clear();
+  for (const FeatureTrack& track :
+       cutTracks(tracks_, max_views, [this](std::uint32_t image) { return sessionOf(image); })) {
+    Landmark landmark;
+    std::vector<Sight> sights;
+    for (const FeatureObservation& seen : track) {
+      const KeypointRays& rays = images_[seen.image].rays;
+      sights.push_back({&problem_.cameras[seen.image], rays.normalised[seen.feature]});
+      landmark.sightings.push_back({seen.image, seen.feature, sights.back().normalised, rays.sigmas[seen.feature]});
+    }
+    const std::optional<Eigen::Vector3d> point = triangulate(sights, kMinAngle_rad);
+    if (!point) continue;
+    landmark.position_m = *point;
+    auto& all = landmark.sightings;
+    const auto is_off = [&](const LandmarkSighting& sighting) {
+      return !(error(landmark, sighting) * focal_px(sighting.image) <= gate_px);
+    };
+    all.erase(std::remove_if(all.begin(), all.end(), is_off), all.end());
+    if (all.size() >= 2) problem_.landmarks.push_back(std::move(landmark));
+  }
+}
+
+void Reconstruction::adjustAndPrune(double tolerance, std::size_t min_views) {
+  bundle_.tolerance = tolerance;
+  adjust(problem_, bundle_);
+  for (Landmark& landmark : problem_.landmarks) {
+    auto& all = landmark.sightings;
+    const auto disagrees = [&](const LandmarkSighting& sighting) {
+      return !(error(landmark, sighting) <= config_.max_residual_sigmas * sighting.sigma);
+    };
+    all.erase(std::remove_if(all.begin(), all.end(), disagrees), all.end());
+  }
+  auto& all = problem_.landmarks;
+  const auto lost = [&](const Landmark& landmark) {
+    return landmark.sightings.size() < min_views || !(distance_m(landmark) <= kFarthest_m);
+  };
+  all.erase(std::remove_if(all.begin(), all.end(), lost), all.end());
+}
+
+Eigen::Vector3d Reconstruction::antennaInMap_m(const CameraPose& camera, std::size_t image) const {
+  return camera.position_m + camera.rotation * problem_.sessions[sessionOf(image)].antenna_m;
+}
+
+Eigen::Vector3d Reconstruction::shiftOf_m(std::size_t image) const {
+  return antennaInMap_m(problem_.cameras[image], image) - level(images_[image].cleaned.position_m);
+}
+
+/// How far the adjustment moved the neighbours of an image on the cleaned path, the image itself included.
+Eigen::Vector3d Reconstruction::usualShift_m(std::size_t image) const {
+  std::vector<double> shifts_m[3];
+  const auto last = static_cast<std::ptrdiff_t>(images_.size()) - 1;
+  const auto at = static_cast<std::ptrdiff_t>(image);
+  for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, at - kNeighbours); i <= std::min(last, at + kNeighbours); ++i) {
+    const auto neighbour = static_cast<std::size_t>(i);
+    if (images_[neighbour].session != images_[image].session) continue;
+    const Eigen::Vector3d shift_m = shiftOf_m(neighbour);
+    for (int axis = 0; axis < 3; ++axis) shifts_m[axis].push_back(shift_m[axis]);
+  }
+  return {median(shifts_m[0]), median(shifts_m[1]), median(shifts_m[2])};
+}
+
+bool Reconstruction::isAstray(std::size_t image) const {
+  return !((shiftOf_m(image) - usualShift_m(image)).norm() <= kAstray_m);
+}
+
+void Reconstruction::bringBack() {
+  std::vector<std::pair<std::size_t, CameraPose>> back;
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    if (!isAstray(i)) continue;
+    const CameraPose turned{images_[i].start, Eigen::Vector3d::Zero()};
+    back.emplace_back(i, CameraPose{turned.rotation, level(images_[i].cleaned.position_m) + usualShift_m(i) -
+                                                         antennaInMap_m(turned, i)});
+  }
+  for (const auto& [image, pose] : back) problem_.cameras[image] = pose;
+}
+
+double Reconstruction::freeFocalScale() const {
+  BundleProblem problem = problem_;
+  BundleConfig config = bundle_;
+  config.focal_is_free = true;
+  config.tolerance = 1e-3;
+  adjust(problem, config);
+  return problem.focal_scale;
+}
+
+/// In normalised coordinates.
+double Reconstruction::error(const Landmark& landmark, const LandmarkSighting& sighting) const {
+  return reprojectionError(problem_.cameras[sighting.image], landmark.position_m, sighting.normalised);
+}
+
+double Reconstruction::distance_m(const Landmark& landmark) const {
+  return (landmark.position_m - problem_.cameras[landmark.sightings.front().image].position_m).norm();
+}
+
+std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) const {
+  std::vector<SessionGeometry> geometries(sessions_.size());
+  std::vector<std::vector<double>> errors_px(sessions_.size());
+  std::vector<std::size_t> tracked(sessions_.size());
+  std::vector<ImageGeometry> images(images_.size());
+  for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i);
+  for (const Landmark& landmark : problem_.landmarks) {
+    const Eigen::Matrix3d covariance = covarianceOf(landmark);
+    ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
+    for (const LandmarkSighting& sighting : landmark.sightings) {
+      errors_px[sessionOf(sighting.image)].push_back(error(landmark, sighting) * focal_px(sighting.image));
+      addLandmark(images[sighting.image], landmark, covariance, sighting.feature, first_id);
+    }
+    ++first_id;
+  }
+  for (const FeatureTrack& track : tracks_) {
+    for (const FeatureObservation& seen : track) ++tracked[sessionOf(seen.image)];
+  }
+  addPath(images, geometries);
+  for (std::size_t k = 0; k < geometries.size(); ++k) {
+    SessionGeometry& geometry = geometries[k];
+    geometry.sightings = errors_px[k].size();
+    if (tracked[k] >= kEnoughTracked * geometry.images.size()) {
+      geometry.agreeing_share = static_cast<double>(geometry.sightings) / static_cast<double>(tracked[k]);
+    }
+    geometry.median_error_px = median(errors_px[k]);
+    geometry.mounting_rad = problem_.sessions[k].mounting_rad;
+  }
+  return geometries;
+}
+
+ImageGeometry Reconstruction::imageAt(std::size_t image) const {
+  ImageGeometry geometry;
+  geometry.camera = problem_.cameras[image];
+  Eigen::Matrix<double, 6, 1> sigmas;
+  const double bias_m = std::max(config_.fix_bias * fix_sigmas_m_[sessionOf(image)], 0.01);
+  sigmas << bias_m, bias_m, bias_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
+  geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
+  return geometry;
+}
+
+/// Of a landmark among cameras that stand still.
+Eigen::Matrix3d Reconstruction::covarianceOf(const Landmark& landmark) const {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  for (const LandmarkSighting& sighting : landmark.sightings) {
+    const CameraPose& camera = problem_.cameras[sighting.image];
+    const Eigen::Vector3d point = camera.toCamera(landmark.position_m);
+    Eigen::Matrix<double, 2, 3> by_point;
+    by_point << 1.0, 0.0, -point.x() / point.z(), 0.0, 1.0, -point.y() / point.z();
+    by_point *= 1.0 / (point.z() * sighting.sigma);
+    const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera.rotation.conjugate().toRotationMatrix();
+    information += by_landmark.transpose() * by_landmark;
+  }
+  return information.ldlt().solve(Eigen::Matrix3d::Identity());
+}
+
+/// Images with enough landmarks, and how far they were moved.
+void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    SessionGeometry& geometry = geometries[sessionOf(i)];
+    const auto least = static_cast<std::size_t>(config_.min_landmarks);
+    if (images[i].landmarks.size() < least || isAstray(i)) {
+      geometry.images.emplace_back();
+      continue;
+    }
+    ImageGeometry& image = geometry.images.emplace_back(images[i]).value();
+    std::sort(image.landmarks.begin(), image.landmarks.end(),
+              [](const SeenLandmark& a, const SeenLandmark& b) { return a.feature < b.feature; });
+    const double shift_m = shiftOf_m(i).head<2>().norm();
+    geometry.mean_shift_m += shift_m;
+    geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
+    geometry.far_share += shift_m > kFar_m ? 1.0 : 0.0;
+  }
+  for (SessionGeometry& geometry : geometries) {
+    const auto kept = std::count_if(geometry.images.begin(), geometry.images.end(),
+                                    [](const auto& image) { return image.has_value(); });
+    if (kept > 0) geometry.mean_shift_m /= static_cast<double>(kept);
+    geometry.far_share /= static_cast<double>(std::max<std::size_t>(1, geometry.images.size()));
+  }
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "geometry/bundle_adjustment.h"
+#include "geometry/feature_tracks.h"
+#include "geometry/keypoint_rays.h"
+#include "geometry/rotation_averaging.h"
+#include "geometry/session_geometry.h"
+#include "visual_localization/geometry/geometry_config.h"
+
+namespace visual_localization {
+
+/// Images of one session or several, and what they show, while they are adjusted.
+class Reconstruction {
+ public:
+  explicit Reconstruction(const GeometryConfig& config) : config_(config) {}
+
+  /// Appends the images of a session, where the cleaned path has their antenna. `session` must outlive it.
+  void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations);
+  /// Appends those of another one, with its landmarks, as they are there.
+  void append(const Reconstruction& other);
+
+  std::size_t size() const { return images_.size(); }
+  std::size_t sessions() const { return sessions_.size(); }
+  std::uint32_t sessionOf(std::size_t image) const { return images_[image].session; }
+  const KeypointRays& rays(std::size_t image) const { return images_[image].rays; }
+  double focal_px(std::size_t image) const { return sessions_[images_[image].session]->camera->intrinsics().fx; }
+  const TrajectoryPoint& cleaned(std::size_t image) const { return images_[image].cleaned; }
+  const CameraPose& camera(std::size_t image) const { return problem_.cameras[image]; }
+  const std::vector<Landmark>& landmarks() const { return problem_.landmarks; }
+
+  /// Moves the images of a session, and the landmarks that they were the first to see.
+  void move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m);
+  /// What is matched over several images, from now on.
+  void setTracks(std::vector<FeatureTrack> tracks) { tracks_ = std::move(tracks); }
+  /// Fixes count from now on: all of them, or those that are at most `farthest_m` from the cleaned path. `loss`: scale
+  /// of their robust loss, sigmas.
+  void useFixes(double farthest_m, double loss);
+  /// Landmarks from tracks, anew; of tracks cut into pieces of at most `max_views`. Sightings farther than `gate_px`
+  /// from their landmark are left out.
+  void triangulateAll(double gate_px, std::size_t max_views);
+  /// Adjusts everything, then drops sightings that disagree and landmarks that fewer than `min_views` images see.
+  void adjustAndPrune(double tolerance, std::size_t min_views);
+  /// A single image may end in a minimum of its own, metres off. It starts again among its neighbours.
+  void bringBack();
+  /// What the images make of the focal length of all cameras, when they may.
+  double freeFocalScale() const;
+  /// What it came to, session by session; landmark ids begin with `first_id`.
+  std::vector<SessionGeometry> results(std::uint32_t first_id) const;
+
+ private:
+  struct Image {
+    std::uint32_t session = 0;
+    TrajectoryPoint cleaned;
+    KeypointRays rays;
+    Eigen::Quaterniond start;  ///< rotation before the adjustment
+  };
+
+  Eigen::Vector3d antennaInMap_m(const CameraPose& camera, std::size_t image) const;
+  Eigen::Vector3d shiftOf_m(std::size_t image) const;
+  Eigen::Vector3d usualShift_m(std::size_t image) const;
+  bool isAstray(std::size_t image) const;
+  double error(const Landmark& landmark, const LandmarkSighting& sighting) const;
+  double distance_m(const Landmark& landmark) const;
+  ImageGeometry imageAt(std::size_t image) const;
+  Eigen::Matrix3d covarianceOf(const Landmark& landmark) const;
+  void addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const;
+
+  const GeometryConfig& config_;
+  BundleConfig bundle_;
+  std::vector<const UnadjustedSession*> sessions_;
+  std::vector<double> fix_sigmas_m_;  ///< of a usual fix of each session
+  std::vector<Image> images_;
+  std::vector<PositionObservation> fixes_;  ///< all of them
+  std::vector<FeatureTrack> tracks_;
+  BundleProblem problem_;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,85 @@
+#include "visual_localization/geometry/sensor_mount.h"
+
+#include <cmath>
+#include <iomanip>
+#include <locale>
+#include <sstream>
+#include <vector>
+
+#include "base/angles.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kFarthest_m = 100.0;
+constexpr double kUnitTolerance = 1e-3;
+
+std::vector<double> numbersOf(const std::string& text, std::size_t count, const char* meaning) {
+  std::istringstream in(text);
+  in.imbue(std::locale::classic());
+  std::vector<double> numbers;
+  for (double number = 0.0; in >> number;) numbers.push_back(number);
+  if (!in.eof() || numbers.size() != count) {
+    throw MountError("'" + text + "' must be " + std::to_string(count) + " numbers: " + meaning);
+  }
+  return numbers;
+}
+
+void requireNear(const char* what, const Eigen::Vector3d& position_m) {
+  if (position_m.norm() <= kFarthest_m) return;
+  throw MountError(std::string(what) + " must be at most 100 m from the robot's origin");
+}
+
+}  // namespace
+
+Eigen::Isometry3d SensorMount::baseInMap(const CameraPose& camera_in_map) const {
+  Eigen::Isometry3d base = Eigen::Isometry3d::Identity();
+  base.linear() = (camera_in_map.rotation * camera.rotation.conjugate()).normalized().toRotationMatrix();
+  base.translation() = camera_in_map.position_m - base.linear() * camera.position_m;
+  return base;
+}
+
+double yawOf(const Eigen::Isometry3d& base_in_map) {
+  return std::atan2(base_in_map.linear()(1, 0), base_in_map.linear()(0, 0));
+}
+
+void requireMount(const SensorMount& mount) {
+  requireNear("the camera", mount.camera.position_m);
+  requireNear("the antenna", mount.antenna_m);
+  if (!(std::abs(mount.camera.rotation.norm() - 1.0) <= kUnitTolerance)) {
+    throw MountError("the camera's rotation is not of unit length");
+  }
+}
+
+CameraPose parseCameraMount(const std::string& text) {
+  const std::vector<double> n =
+      numbersOf(text, 6, "x y z yaw pitch roll of the camera on the robot, metres and radians");
+  const Eigen::Quaterniond body(Eigen::AngleAxisd(n[3], Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(n[4], Eigen::Vector3d::UnitY()) *
+                                Eigen::AngleAxisd(n[5], Eigen::Vector3d::UnitX()));
+  SensorMount mount;
+  mount.camera = {body * levelCamera(0.0), {n[0], n[1], n[2]}};
+  requireMount(mount);
+  return mount.camera;
+}
+
+Eigen::Vector3d parseAntennaMount(const std::string& text) {
+  const std::vector<double> n = numbersOf(text, 3, "x y z of the antenna on the robot, metres");
+  SensorMount mount;
+  mount.antenna_m = {n[0], n[1], n[2]};
+  requireMount(mount);
+  return mount.antenna_m;
+}
+
+std::string describe(const SensorMount& mount) {
+  const Eigen::Vector3d ahead = mount.camera.ahead();
+  std::ostringstream out;
+  out.imbue(std::locale::classic());
+  out << std::fixed << std::setprecision(2) << "camera at " << mount.camera.position_m.transpose() << " m, looking "
+      << std::setprecision(1) << std::atan2(ahead.y(), ahead.x()) * 180.0 / kPi << " degrees to the left and "
+      << std::asin(std::min(1.0, std::max(-1.0, ahead.z()))) * 180.0 / kPi << " up; antenna at " << std::setprecision(2)
+      << mount.antenna_m.transpose() << " m";
+  return out.str();
+}
+
+}  // namespace visual_localization
