@@ -9,8 +9,8 @@
 
 #include "base/files.h"
 #include "base/statistics.h"
-#include "geometry/session_geometry.h"
 #include "map/extraction_pool.h"
+#include "map/map_geometry.h"
 #include "map/map_writer.h"
 #include "map/pruning_neighbours.h"
 #include "visual_localization/features/front_end.h"
@@ -71,42 +71,6 @@ std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, con
   return features;
 }
 
-/// Images [begin, end) of the map, which are one session.
-UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::size_t end, const CameraModel& camera,
-                             const std::vector<MapFix>& fixes) {
-  UnadjustedSession session;
-  for (std::size_t i = begin; i < end; ++i) {
-    session.images.push_back({map.pose(i).stamp_ns, map.position_m(i), map.yaw_rad(i)});
-  }
-  session.features = [&map, begin](std::size_t i) { return map.sift(begin + i); };
-  session.camera = &camera;
-  session.fixes = fixes;
-  return session;
-}
-
-SessionLandmarks summaryOf(const SessionGeometry& geometry) {
-  const auto images = std::count_if(geometry.images.begin(), geometry.images.end(),
-                                    [](const auto& image) { return image.has_value(); });
-  SessionLandmarks summary;
-  summary.images = static_cast<std::size_t>(images);
-  summary.landmarks = geometry.landmarks;
-  summary.sightings = geometry.sightings;
-  summary.contradicts_calibration = geometry.contradicts_calibration;
-  summary.focal_scale = geometry.focal_scale;
-  summary.far_share = geometry.far_share;
-  summary.median_error_px = geometry.median_error_px;
-  summary.mean_shift_m = geometry.mean_shift_m;
-  summary.largest_shift_m = geometry.largest_shift_m;
-  return summary;
-}
-
-/// The image is where the adjustment has its camera.
-void place(TrainingImage& image, ImageGeometry geometry) {
-  image.position_m = geometry.camera.position_m.head<2>();
-  image.yaw_rad = geometry.camera.yaw_rad();
-  image.geometry = std::move(geometry);
-}
-
 std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
   std::vector<MapFix> found;
   for (const Fix& fix : fixes) {
@@ -122,6 +86,23 @@ std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<co
   std::vector<const SiftFeatures*> pointers;
   for (const auto& features : owned) pointers.push_back(features.get());
   return pointers;
+}
+
+template <class Parse>
+bool canParse(const std::string& text, Parse parse) {
+  try {
+    if (!text.empty()) parse(text);
+    return true;
+  } catch (const MountError&) {
+    return false;
+  }
+}
+
+void requireMountTexts(ParameterVisitor& visitor, const std::string& camera, const std::string& antenna) {
+  visitor.require(canParse(camera, parseCameraMount), "robot/camera", "'" + camera + "'",
+                  "six numbers: x y z yaw pitch roll, metres (at most 100) and radians");
+  visitor.require(canParse(antenna, parseAntennaMount), "robot/antenna", "'" + antenna + "'",
+                  "three numbers: x y z, metres, at most 100");
 }
 
 }  // namespace
@@ -178,6 +159,13 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   visitor.choice(
       {"map/sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any localizer"},
       sift_backend, siftBackends());
+  visitor.text({"robot/base_frame", "", "frame of the robot in /tf_static"}, base_frame);
+  visitor.text({"robot/camera", "m, rad",
+                "x y z yaw pitch roll of the camera (x ahead) on the robot; empty: from /tf_static, or the robot is "
+                "where the camera is"},
+               camera_mount);
+  visitor.text({"robot/antenna", "m", "x y z of the antenna on the robot; empty: likewise"}, antenna_mount);
+  requireMountTexts(visitor, camera_mount, antenna_mount);
   sift.declare(visitor);
   match.declare(visitor);
   trajectory.declare(visitor);
@@ -205,9 +193,9 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
     throw std::runtime_error("session '" + name + "': " + error.what());
   }
   header_.datum = frame_->datum();
-  header_.sessions.push_back({name});
+  header_.sessions.push_back({name, {}, {}, camera.mount});
   fixes_.push_back(inFrame(fixes, *frame_));
-  report_.session_images.push_back({name, 0, {}, {}, camera});
+  report_.session_images.push_back({name, 0, {}, camera});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
 }
@@ -251,7 +239,6 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   SessionImages& session = report_.session_images.back();
   if (session.kept == 0) session.recorded = grey.size();
   ++session.kept;
-  session.positions_m.push_back(point->position_m);
   ++report_.images_kept;
   if (waiting_.size() >= most_waiting_) extractWaiting();
 }
@@ -281,19 +268,34 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   extractWaiting();
   const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
   const bool adjusts = config_.geometry.enabled && hasCalibratedSession();
-  if (!adjusts && !(config_.spacing_m > 0.0)) {
+  if (!adjusts && !(config_.spacing_m > 0.0) && !hasMount()) {
     prune(*unpruned, sink, progress);
     return;
   }
   ImageSpool pruned(resources_.spool_beside);
   prune(
       *unpruned, [&pruned](const TrainingImage& image) { pruned.append(image); }, progress);
-  addGeometry(*pruned.finish(header_), sink, progress);
+  const std::shared_ptr<const TrainingMap> map = pruned.finish(header_);
+  std::vector<std::optional<SessionGeometry>> geometries(header_.sessions.size());
+  if (adjusts) geometries = geometryOf(*map, header_.sessions, fixes_, config_.geometry, resources_.threads);
+  for (std::size_t i = 0; i < geometries.size(); ++i) {
+    if (!geometries[i]) continue;
+    report_.session_images[i].geometry = summaryOf(*geometries[i]);
+    if (!geometries[i]->contradicts_calibration) continue;
+    geometries[i].reset();
+    header_.sessions[i].camera.reset();
+  }
+  report_.images_thinned += writeThinned(*map, header_.sessions, std::move(geometries), config_, sink);
 }
 
 bool MapBuilder::hasCalibratedSession() const {
   return std::any_of(header_.sessions.begin(), header_.sessions.end(),
                      [](const Session& session) { return session.camera.has_value(); });
+}
+
+bool MapBuilder::hasMount() const {
+  return std::any_of(header_.sessions.begin(), header_.sessions.end(),
+                     [](const Session& session) { return session.mount.has_value(); });
 }
 
 void MapBuilder::prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress) {
@@ -309,39 +311,6 @@ void MapBuilder::prune(const TrainingMap& unpruned, const Sink& sink, const Prog
     report_.features_kept += image.sift.size();
     sink(image);
     if (progress) progress(i + 1, unpruned.size());
-  }
-}
-
-/// The images of a session follow each other.
-void MapBuilder::addGeometry(const TrainingMap& pruned, const Sink& sink, const Progress& progress) {
-  std::uint32_t next_id = 0;
-  for (std::size_t begin = 0; begin < pruned.size();) {
-    const auto session = static_cast<std::size_t>(pruned.pose(begin).session);
-    const std::size_t end = begin + report_.session_images[session].kept;
-    SessionGeometry geometry;
-    if (config_.geometry.enabled && header_.sessions[session].camera) {
-      geometry = adjustSession(unadjusted(pruned, begin, end, *header_.sessions[session].camera, fixes_[session]),
-                               config_.geometry, next_id, resources_.threads);
-      next_id += static_cast<std::uint32_t>(geometry.landmarks);
-      report_.session_images[session].geometry = summaryOf(geometry);
-      if (geometry.contradicts_calibration) {
-        geometry.images.clear();
-        header_.sessions[session].camera.reset();
-      }
-    }
-    std::optional<Eigen::Vector2d> last_m;
-    for (std::size_t i = begin; i < end; ++i) {
-      TrainingImage image = pruned.image(i);
-      if (!geometry.images.empty() && geometry.images[i - begin]) place(image, std::move(*geometry.images[i - begin]));
-      if (last_m && (image.position_m - *last_m).norm() < config_.spacing_m) {
-        ++report_.images_thinned;
-        continue;
-      }
-      last_m = image.position_m;
-      sink(image);
-    }
-    begin = end;
-    if (progress) progress(end, pruned.size());
   }
 }
 

@@ -18,6 +18,7 @@ namespace visual_localization::map_schema {
 namespace {
 
 constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
+constexpr const char* kMount = "/mount/";    ///< likewise
 constexpr const char* kMask = "/mask";
 constexpr const char* kGeometryCount = "geometry/images";
 
@@ -99,6 +100,38 @@ std::optional<CameraModel> takeCamera(ParameterValues& meta, const std::string& 
   }
 }
 
+ParameterValues toValues(const SensorMount& mount) {
+  const Eigen::Vector3d& camera_m = mount.camera.position_m;
+  const Eigen::Quaterniond& rotation = mount.camera.rotation;
+  return {{"camera_x_m", camera_m.x()},         {"camera_y_m", camera_m.y()},
+          {"camera_z_m", camera_m.z()},         {"camera_qw", rotation.w()},
+          {"camera_qx", rotation.x()},          {"camera_qy", rotation.y()},
+          {"camera_qz", rotation.z()},          {"antenna_x_m", mount.antenna_m.x()},
+          {"antenna_y_m", mount.antenna_m.y()}, {"antenna_z_m", mount.antenna_m.z()}};
+}
+
+std::optional<SensorMount> takeMount(ParameterValues& meta, const std::string& session) {
+  ParameterValues values = takeGroup(meta, session + kMount);
+  if (values.empty()) return std::nullopt;
+  const auto number = [&values](const char* name) { return take<double>(values, name); };
+  SensorMount mount;
+  mount.camera.position_m = {number("camera_x_m"), number("camera_y_m"), number("camera_z_m")};
+  const double w = number("camera_qw");
+  const double x = number("camera_qx");
+  const double y = number("camera_qy");
+  mount.camera.rotation = Eigen::Quaterniond(w, x, y, number("camera_qz"));
+  mount.antenna_m = {number("antenna_x_m"), number("antenna_y_m"), number("antenna_z_m")};
+  try {
+    requireMount(mount);
+  } catch (const MountError& error) {
+    throw std::runtime_error("the mount of " + session + ": " + error.what());
+  }
+  if (!values.empty())
+    throw std::runtime_error("meta value '" + session + kMount + values.begin()->first + "' is unknown");
+  mount.camera.rotation.normalize();
+  return mount;
+}
+
 Mask takeMask(ParameterValues& meta, std::size_t session, const cv::Size& size, const MaskBits& masks) {
   const std::string key = sessionKey(session);
   const auto bits = masks.find(static_cast<std::int64_t>(session));
@@ -121,6 +154,7 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
     Session session{take<std::string>(meta, key)};
     if (version >= kSinceCameras) {
       session.camera = takeCamera(meta, key);
+      session.mount = takeMount(meta, key);
       session.mask = takeMask(meta, sessions.size(), size, masks);
     }
     if (!session.mask.empty()) ++used;
@@ -222,6 +256,9 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
     meta[key] = session.name;
     if (session.camera) {
       for (const auto& [name, value] : toValues(*session.camera)) meta[key + kCamera + name] = value;
+    }
+    if (session.mount) {
+      for (const auto& [name, value] : toValues(*session.mount)) meta[key + kMount + name] = value;
     }
     if (session.mask.empty()) continue;
     const std::vector<std::uint8_t> bits = packMask(session.mask);

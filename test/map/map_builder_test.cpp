@@ -188,7 +188,6 @@ TEST(MapBuilder, CountsTheImagesOfEachRound) {
   const auto& sessions = builder.report().session_images;
   ASSERT_EQ(sessions.size(), 2U);
   EXPECT_EQ(sessions[0].kept, 2U);
-  EXPECT_EQ(sessions[0].positions_m.size(), 2U);
   EXPECT_EQ(sessions[0].recorded, cv::Size(320, 240));
   EXPECT_EQ(sessions[1].name, "second");
   EXPECT_EQ(sessions[1].recorded, cv::Size(640, 200));

@@ -36,6 +36,13 @@ void expectSame(const TrainingMap& a, const TrainingMap& b) {
     EXPECT_EQ(a.header().sessions[s].name, b.header().sessions[s].name);
     EXPECT_EQ(a.header().sessions[s].camera, b.header().sessions[s].camera);
     EXPECT_TRUE(a.header().sessions[s].mask == b.header().sessions[s].mask);
+    const auto& mount = a.header().sessions[s].mount;
+    const auto& other = b.header().sessions[s].mount;
+    ASSERT_EQ(mount.has_value(), other.has_value());
+    if (!mount) continue;
+    EXPECT_EQ(mount->camera.position_m, other->camera.position_m);
+    EXPECT_LT(mount->camera.rotation.angularDistance(other->camera.rotation), 1e-12);
+    EXPECT_EQ(mount->antenna_m, other->antenna_m);
   }
   EXPECT_EQ(a.header().sift.contrast_threshold, b.header().sift.contrast_threshold);
   EXPECT_EQ(a.header().sift.max_features, b.header().sift.max_features);
@@ -226,6 +233,7 @@ TEST_F(MapStore, RefusesChangedContent) {
 TEST_F(MapStore, CamerasAndMasksThatCannotBeAreRefused) {
   const std::string whole = test::readAll(path_);
   const std::string camera = "'session/0/camera/";
+  const std::string mount = "'session/0/mount/";
   const struct {
     std::string sql, reason;
   } cases[] = {
@@ -238,6 +246,11 @@ TEST_F(MapStore, CamerasAndMasksThatCannotBeAreRefused) {
       {"UPDATE meta SET value = -9.0 WHERE key = " + camera + "d0'", "cannot be undone"},
       {"DELETE FROM meta WHERE key = " + camera + "fy'", "'fy' is missing"},
       {"INSERT INTO meta VALUES(" + camera + "zoom', 1.0)", "unknown value 'zoom'"},
+      {"UPDATE meta SET value = 1e6 WHERE key = " + mount + "camera_x_m'", "the camera must be at most 100 m"},
+      {"UPDATE meta SET value = 0.0 WHERE key = " + mount + "camera_qw'", "not of unit length"},
+      {"UPDATE meta SET value = 'x' WHERE key = " + mount + "antenna_y_m'", "antenna_y_m"},
+      {"DELETE FROM meta WHERE key = " + mount + "antenna_z_m'", "'antenna_z_m' is missing"},
+      {"INSERT INTO meta VALUES(" + mount + "wheel', 1.0)", "mount/wheel' is unknown"},
       {"INSERT INTO meta VALUES('session/9/mask', 1)", "'session/9/mask' is unknown"},
       {"DELETE FROM meta WHERE key = 'session/0/mask'", "mask of session/0 is missing or unexpected"},
       {"DELETE FROM masks", "mask of session/0 is missing or unexpected"},

@@ -31,6 +31,9 @@ struct MapBuilderConfig {
   bool prune = true;
   int preview_width_px = 80;
   std::string sift_backend = kNativeSift;
+  std::string base_frame = "base_link";
+  std::string camera_mount;
+  std::string antenna_mount;
   SiftConfig sift;
   MatchConfig match;
   TrajectoryCleanerConfig trajectory;
@@ -43,6 +46,7 @@ struct MapBuilderConfig {
 struct SessionCamera {
   std::optional<CameraModel> model = {};  ///< none: not calibrated
   Mask mask = {};                         ///< features under it are not used; empty: all are
+  std::optional<SensorMount> mount = {};  ///< none: camera and antenna are where the robot is
 };
 
 /// What the adjustment of a session came to; all zero when its camera is not calibrated.
@@ -55,14 +59,15 @@ struct SessionLandmarks {
   double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
   double mean_shift_m = 0.0;             ///< of these images from the cleaned path
   double largest_shift_m = 0.0;
-  double far_share = 0.0;  ///< of all images: moved by more than 3 m
+  double far_share = 0.0;       ///< of all images: moved by more than 3 m
+  double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
+  double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
 };
 
 /// What one session brought.
 struct SessionImages {
   std::string name;
   std::size_t kept = 0;
-  std::vector<Eigen::Vector2d> positions_m;  ///< of those kept
   cv::Size recorded;  ///< size of its first image, pixels; the map's is that of the first session
   SessionCamera camera;
   SessionLandmarks geometry = {};  ///< complete when the map is built
@@ -125,8 +130,8 @@ class MapBuilder {
   void extractWaiting();
   void finish(const Sink& sink, const Progress& progress);
   void prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress);
-  void addGeometry(const TrainingMap& pruned, const Sink& sink, const Progress& progress);
   bool hasCalibratedSession() const;
+  bool hasMount() const;
 
   MapBuilderConfig config_;
   MapBuilderResources resources_;

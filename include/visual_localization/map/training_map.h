@@ -17,6 +17,7 @@
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geo/local_frame.h"
 #include "visual_localization/geometry/image_geometry.h"
+#include "visual_localization/geometry/sensor_mount.h"
 
 namespace visual_localization {
 
@@ -27,8 +28,9 @@ class PositionIndex;
 struct TrainingPose {
   std::int64_t stamp_ns = 0;
   int session = 0;                                       ///< which of MapHeader::sessions it came from
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north in the map frame
-  double yaw_rad = 0.0;                                  ///< direction of travel, 0 = east, counter-clockwise
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< of the robot: east, north in the map frame
+  /// Of the robot where the image has geometry; otherwise the direction of travel. 0 = east, counter-clockwise.
+  double yaw_rad = 0.0;
 };
 
 /// One image of the map: where it was taken and what it looked like.
@@ -60,6 +62,7 @@ struct Session {
   std::string name;
   std::optional<CameraModel> camera = {};  ///< of images of the map's size; none: not calibrated
   Mask mask = {};                          ///< of the map's size; features under it were not used
+  std::optional<SensorMount> mount = {};   ///< of the robot that recorded it; none: nobody said
 };
 
 /// What holds for all images of a map.

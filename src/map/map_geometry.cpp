@@ -1,0 +1,108 @@
+#include "map/map_geometry.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace visual_localization {
+namespace {
+
+/// Images [begin, end) of the map, which are one session.
+UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::size_t end, const Session& of,
+                             const std::vector<MapFix>& fixes) {
+  UnadjustedSession session;
+  for (std::size_t i = begin; i < end; ++i) {
+    session.images.push_back({map.pose(i).stamp_ns, map.position_m(i), map.yaw_rad(i)});
+  }
+  session.features = [&map, begin](std::size_t i) { return map.sift(begin + i); };
+  session.camera = &of.camera.value();
+  session.mount = of.mount.value_or(SensorMount());
+  session.fixes = fixes;
+  return session;
+}
+
+/// The image is where the adjustment has the robot.
+void place(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry) {
+  const Eigen::Isometry3d base = mount.baseInMap(geometry.camera);
+  image.position_m = base.translation().head<2>();
+  image.yaw_rad = yawOf(base);
+  image.geometry = std::move(geometry);
+}
+
+/// From the antenna to the robot, which looks where it drives.
+void place(TrainingImage& image, const SensorMount& mount) {
+  image.position_m -= Eigen::Rotation2Dd(image.yaw_rad) * mount.antenna_m.head<2>();
+}
+
+/// The first image of each session, and the end of the last one.
+std::vector<std::size_t> begins(const TrainingMap& map, std::size_t sessions) {
+  std::vector<std::size_t> begins(sessions + 1, 0);
+  for (std::size_t i = 0; i < map.size(); ++i) ++begins[static_cast<std::size_t>(map.pose(i).session) + 1];
+  for (std::size_t k = 0; k < sessions; ++k) begins[k + 1] += begins[k];
+  return begins;
+}
+
+}  // namespace
+
+std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned, const std::vector<Session>& sessions,
+                                                       const std::vector<std::vector<MapFix>>& fixes,
+                                                       const GeometryConfig& config, std::size_t threads) {
+  const std::vector<std::size_t> begin = begins(pruned, sessions.size());
+  std::vector<UnadjustedSession> calibrated;
+  std::vector<std::size_t> which;
+  for (std::size_t k = 0; k < sessions.size(); ++k) {
+    if (!sessions[k].camera) continue;
+    calibrated.push_back(unadjusted(pruned, begin[k], begin[k + 1], sessions[k], fixes[k]));
+    which.push_back(k);
+  }
+  std::vector<SessionGeometry> adjusted = adjustSessions(calibrated, config, threads);
+  std::vector<std::optional<SessionGeometry>> geometries(sessions.size());
+  for (std::size_t i = 0; i < which.size(); ++i) geometries[which[i]] = std::move(adjusted[i]);
+  return geometries;
+}
+
+SessionLandmarks summaryOf(const SessionGeometry& geometry) {
+  const auto images = std::count_if(geometry.images.begin(), geometry.images.end(),
+                                    [](const auto& image) { return image.has_value(); });
+  SessionLandmarks summary;
+  summary.images = static_cast<std::size_t>(images);
+  summary.landmarks = geometry.landmarks;
+  summary.sightings = geometry.sightings;
+  summary.contradicts_calibration = geometry.contradicts_calibration;
+  summary.focal_scale = geometry.focal_scale;
+  summary.far_share = geometry.far_share;
+  summary.tied_apart_m = geometry.tied_apart_m;
+  summary.agreeing_share = geometry.agreeing_share;
+  summary.median_error_px = geometry.median_error_px;
+  summary.mean_shift_m = geometry.mean_shift_m;
+  summary.largest_shift_m = geometry.largest_shift_m;
+  return summary;
+}
+
+std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& sessions,
+                         std::vector<std::optional<SessionGeometry>> geometries, const MapBuilderConfig& config,
+                         const std::function<void(const TrainingImage&)>& sink) {
+  const std::vector<std::size_t> begin = begins(pruned, geometries.size());
+  std::size_t thinned = 0;
+  for (std::size_t k = 0; k < geometries.size(); ++k) {
+    const double spacing_m = geometries[k] ? std::max(config.spacing_m, config.geometry.spacing_m) : config.spacing_m;
+    std::optional<Eigen::Vector2d> last_m;
+    for (std::size_t i = begin[k]; i < begin[k + 1]; ++i) {
+      TrainingImage image = pruned.image(i);
+      const SensorMount mount = sessions[k].mount.value_or(SensorMount());
+      if (geometries[k] && geometries[k]->images[i - begin[k]]) {
+        place(image, mount, std::move(*geometries[k]->images[i - begin[k]]));
+      } else {
+        place(image, mount);
+      }
+      if (last_m && (image.position_m - *last_m).norm() < spacing_m) {
+        ++thinned;
+        continue;
+      }
+      last_m = image.position_m;
+      sink(image);
+    }
+  }
+  return thinned;
+}
+
+}  // namespace visual_localization
