@@ -90,12 +90,13 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
     confine(particle, area_);
   }
   seen_an_image_ = true;
-  const std::size_t best = evaluate(input.scores);
+  const std::size_t best = evaluate(input);
   // An image that matches nothing says nothing about where to go: the attractor stays where it was.
   if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
+  if (input.verified_m) attract(*input.verified_m);
   TrackerEstimate result = estimate();
   adaptSpeed();
-  adaptDiversity(result.best);
+  if (!input.verified_m) adaptDiversity(result.best);
   assignKinds();
   centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
   result.tuning = tuning_;
@@ -151,10 +152,12 @@ bool Dpso::isGuided() const {
   return tuning_.recovering || (config_.guided_start && position_unknown_);
 }
 
-std::size_t Dpso::evaluate(Scores& scores) {
+std::size_t Dpso::evaluate(const TrackerInput& input) {
   std::size_t best = 0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    fitness_[i] = evaluateFitness(particles_[i].position_m, map_, scores, fitness_config_);
+    const Eigen::Vector2d& position_m = particles_[i].position_m;
+    fitness_[i] = input.verified_m ? Fitness{fitnessAbout(*input.verified_m, position_m), 0, {}}
+                                   : evaluateFitness(position_m, map_, input.scores, fitness_config_);
     particles_[i].weight = fitness_[i].value;
     if (fitness_[i].value > fitness_[best].value) best = i;
   }

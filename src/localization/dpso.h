@@ -29,7 +29,7 @@ class Dpso final : public Tracker {
   void move(Particle& particle);
   void moveQuantum(Particle& particle);
   bool isGuided() const;
-  std::size_t evaluate(Scores& scores);
+  std::size_t evaluate(const TrackerInput& input);
   TrackerEstimate estimate() const;
   void adaptSpeed();
   void adaptDiversity(const Score& best);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
+#include <sstream>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -20,6 +22,20 @@ double Estimate::sigma_m() const {
 
 double Estimate::sigmaYaw_rad() const { return metric ? metric->sigmaYaw_rad() : std::sqrt(pose.yaw_variance_rad2); }
 
+namespace {
+
+constexpr std::size_t kSweptImages = 20;  ///< those of the whole map that look most alike: a few positions
+
+}  // namespace
+
+std::string Estimate::cameraTrouble() const {
+  if (!camera_contradicted) return "";
+  std::ostringstream text;
+  text << "the images ask for " << std::fixed << std::setprecision(1) << 100.0 * focal_scale
+       << " % of the calibration's focal length: no metric poses";
+  return text.str();
+}
+
 Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
     : Localizer(
           map, config,
@@ -32,6 +48,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       config_(requireValid(config)),
       camera_(map_->header().sessions.front().camera),
       mask_(map_->header().sessions.front().mask),
+      mount_(map_->header().sessions.front().mount.value_or(SensorMount())),
       image_(std::move(image)),
       scores_(map_->size()),
       sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept()),
@@ -42,6 +59,10 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
 
 Localizer::~Localizer() = default;
 
+MatchedLandmarks Localizer::lastLandmarks() const {
+  return last_ && last_->metric ? verifier_->matched() : MatchedLandmarks();
+}
+
 Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const Stopwatch stopwatch;
   image_->set(stamp_ns, grey);
@@ -49,13 +70,15 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   if (isRepetition(stamp_ns)) return lastAgain(stamp_ns, stopwatch.elapsed_ms());
   last_.reset();  // should this image fail, its repetition must not get the answer of the one before
 
+  // Geometry looks where the motion leads. Without success the tracker proposes, and geometry disposes.
+  std::optional<MetricPose> metric = poseNearPrediction(stamp_ns);
   // Similarities to the training images are computed when somebody asks for them, each at most once.
-  scores_.startImage(choice_.next(), [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
+  scores_.startImage(metric ? FeatureKind::kSift : choice_.next(),
+                     [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
   sweep_.startImage();
-  const TrackerEstimate tracked = tracker_->update({scores_, sweep_});
-  const std::optional<MetricPose> metric = solvePose(stamp_ns, tracked);
-  Evidence evidence = verify(tracked);
-  if (isMetric()) evidence.verified = metric && metric->confirmed;
+  const TrackerEstimate tracked = track(metric);
+  if (!metric) metric = poseNearProposal(tracked);
+  const Evidence evidence = verify(tracked, metric);
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
 
@@ -78,10 +101,13 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.pose = poseOf(tracked, state);
   estimate.metric = metric;
   estimate.images_since_metric = verifier_->imagesSince();
+  estimate.focal_scale = verifier_->focal().scale();
+  estimate.camera_contradicted = verifier_->focal().contradicts();
   estimate.tracked = tracked;
-  choosePose(stamp_ns, estimate);
+  choosePose(estimate);
   estimate.evidence = evidence;
   estimate.motion_residual_m = assessor_.motionResidual_m();
+  if (isMetric()) scores_.count(verifier_->compared());
   estimate.comparisons = scores_.comparisons();
   estimate.swept = scores_.swept();
   estimate.image = image_->report();
@@ -126,14 +152,15 @@ bool Localizer::isFrozen() const {
 
 /// Asks the second witness only when the first is not sure, so that SIFT alone does without global features while all
 /// is well.
-Evidence Localizer::verify(const TrackerEstimate& tracked) {
+Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric) {
   const StateConfig& state = config_.state;
   Evidence evidence;
+  if (isMetric() && !verifier_->focal().contradicts()) evidence.verified = metric && metric->confirmed;
   evidence.features = scores_.kind();
   const bool sift = evidence.features == FeatureKind::kSift;
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
-  if (state.place_check && !sure) {
+  if (state.place_check && !sure && !evidence.verified.value_or(false)) {
     evidence.place_ratio = sweep_.ratio(scores_, tracked.position_m, state.max_distance_m);
   }
   evidence.blind =
@@ -141,39 +168,69 @@ Evidence Localizer::verify(const TrackerEstimate& tracked) {
   return evidence;
 }
 
-bool Localizer::isMetric() const { return config_.metric.pose_source == "metric" && camera_ && map_->hasGeometry(); }
+/// Whether landmarks can verify the pose of the current image.
+bool Localizer::isMetric() const {
+  return config_.metric.pose_source == "metric" && camera_ && map_->hasGeometry() && image_->unprunedSift() != nullptr;
+}
 
-/// The swarm proposes, geometry disposes: a verified pose is where the next image is searched.
-std::optional<MetricPose> Localizer::solvePose(std::int64_t stamp_ns, const TrackerEstimate& tracked) {
+std::optional<MetricPose> Localizer::poseNearPrediction(std::int64_t stamp_ns) {
   geometry_ms_ = 0.0;
   if (!isMetric()) return std::nullopt;
   const Stopwatch stopwatch;
-  const double extracted_ms = image_->report().extract_ms;
-  std::optional<MetricPose> pose = verifier_->verify(stamp_ns, *image_, scores_, *camera_);
-  geometry_ms_ = stopwatch.elapsed_ms() - (image_->report().extract_ms - extracted_ms);
-  if (!pose) return pose;
-  const Eigen::Vector2d position_m = pose->camera.position_m.head<2>();
+  verifier_->startImage(stamp_ns, *image_->unprunedSift(), *camera_, mount_);
+  std::optional<MetricPose> pose = verifier_->nearPrediction();
+  geometry_ms_ = stopwatch.elapsed_ms();
+  return pose;
+}
+
+std::optional<MetricPose> Localizer::poseNearProposal(const TrackerEstimate& tracked) {
+  if (!isMetric()) return std::nullopt;
+  const Stopwatch stopwatch;
+  std::optional<MetricPose> pose = verifier_->nearOneOf(scores_.mostSimilar());
+  if (!pose) pose = verifier_->nearOneOf(sweep_.mostSimilar(scores_, kSweptImages));  // wherever that may be
+  geometry_ms_ += stopwatch.elapsed_ms();
+  if (pose) bringTracker(tracked, *pose);
+  return pose;
+}
+
+/// A verified pose takes the place of all comparisons but one: that with the training image that it is nearest to.
+TrackerEstimate Localizer::track(const std::optional<MetricPose>& metric) {
+  if (!metric) return tracker_->update({scores_, sweep_});
+  const Eigen::Vector2d position_m = metric->base.translation().head<2>();
+  TrackerEstimate tracked = tracker_->update({scores_, sweep_, {}, position_m});
+  bringTracker(tracked, *metric);
+  tracked.best_image = verifier_->compared().front();
+  tracked.best = scores_[tracked.best_image];
+  tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
+  return tracked;
+}
+
+/// To a pose that landmarks verify: the next image is searched around it.
+void Localizer::bringTracker(const TrackerEstimate& tracked, const MetricPose& metric) {
+  const Eigen::Vector2d position_m = metric.base.translation().head<2>();
   tracker_->attract(position_m);
-  if (pose->confirmed && (tracked.position_m - position_m).norm() > config_.state.max_step_m) {
+  const double farthest_m = std::max((tracked.position_m - position_m).norm(), tracked.spread_m.maxCoeff());
+  if (metric.confirmed && farthest_m > config_.state.max_step_m) {
     tracker_->reset(normallyDistributed(position_m, Eigen::Matrix2d::Identity()));
   }
-  return pose;
 }
 
 /// The solved pose; without one where the motion so far leads to, if the tracker is not elsewhere; or what the tracker
 /// has.
-void Localizer::choosePose(std::int64_t stamp_ns, Estimate& estimate) const {
+void Localizer::choosePose(Estimate& estimate) const {
   if (estimate.metric) {
     estimate.pose = poseOf(*estimate.metric);
     estimate.source = PoseSource::kMetric;
     return;
   }
   estimate.source = estimate.tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
-  const std::optional<PredictedPose> predicted = isMetric() ? verifier_->predicted(stamp_ns) : std::nullopt;
+  const auto predicted = isMetric() ? verifier_->predicted() : std::nullopt;
   if (!predicted) return;
   if ((predicted->position_m - estimate.pose.position_m).norm() > config_.state.max_distance_m) return;
   estimate.pose.position_m = predicted->position_m;
   estimate.pose.yaw_rad = predicted->yaw_rad;
+  estimate.pose.covariance_m2 = predicted->covariance_m2;
+  estimate.pose.yaw_variance_rad2 = predicted->yaw_variance_rad2;
   estimate.pose.geodetic = map_->frame().toGeodetic(predicted->position_m);
   estimate.source = PoseSource::kNone;
 }
@@ -181,8 +238,8 @@ void Localizer::choosePose(std::int64_t stamp_ns, Estimate& estimate) const {
 /// Map and pose together.
 PoseEstimate Localizer::poseOf(const MetricPose& metric) const {
   PoseEstimate pose;
-  pose.position_m = metric.camera.position_m.head<2>();
-  pose.yaw_rad = metric.camera.yaw_rad();
+  pose.position_m = metric.base.translation().head<2>();
+  pose.yaw_rad = yawOf(metric.base);
   const MetricPose::Covariance covariance = metric.covariance + metric.map_covariance;
   pose.covariance_m2 = covariance.topLeftCorner<2, 2>();
   pose.yaw_variance_rad2 = covariance(5, 5);
@@ -218,7 +275,17 @@ void Localizer::configure(const LocalizerConfig& config) {
   last_.reset();
 }
 
-void Localizer::setCamera(const CameraModel& camera) { camera_ = camera.scaledTo(map_->header().image_size); }
+void Localizer::setCamera(const CameraModel& camera) {
+  camera_ = camera.scaledTo(map_->header().image_size);
+  verifier_->resetCamera();
+}
+
+void Localizer::setMount(const SensorMount& mount) {
+  requireMount(mount);
+  mount_ = mount;
+  verifier_->reset();
+  last_.reset();
+}
 
 void Localizer::setMask(const Mask& mask) {
   mask_ = mask.scaledTo(map_->header().image_size);
@@ -260,6 +327,7 @@ void Localizer::forgetEvidence() {
 }
 
 LocalizationState Localizer::doubt() {
+  verifier_->reset();  // the motion may have been another meanwhile
   const LocalizationState state = assessor_.doubt(tracker_->tuning().recovering);
   if (last_) {
     last_->state = state;

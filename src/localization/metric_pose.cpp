@@ -46,6 +46,9 @@ void MetricConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"metric/min_inliers", "1", "a pose on fewer landmarks is not believed"}, min_inliers, 6, 10000);
   visitor.integer({"metric/min_inliers_predicted", "1", "the same where the motion since the last pose predicts it"},
                   min_inliers_predicted, 6, 10000);
+  visitor.real({"metric/sigma_factor", "1",
+                "landmarks err alike: this multiple of the standard deviations that they would give a pose one by one"},
+               sigma_factor, 0.1, 100.0);
   visitor.real({"metric/max_sigma", "m", "a pose with a larger standard deviation is not believed"}, max_sigma_m, 0.01,
                100.0);
   visitor.real({"metric/max_gap", "s", "the motion predicts poses at most this long after the last one"}, max_gap_s,
@@ -53,6 +56,9 @@ void MetricConfig::declare(ParameterVisitor& visitor) {
   visitor.real(
       {"metric/max_prediction_error", "m", "farthest of a pose from the predicted one, plus half the way since"},
       max_prediction_error_m, 0.01, 1000.0);
+  visitor.real({"metric/max_focal_error", "1",
+                "no pose is believed while the last images ask for a focal length farther from the calibration's"},
+               max_focal_error, 0.001, 1.0);
 }
 
 double MetricPose::sigma_m() const { return largerSigma_m(covariance); }

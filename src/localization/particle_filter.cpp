@@ -59,22 +59,19 @@ TrackerEstimate ParticleFilter::update(const TrackerInput& input) {
     for (Particle& particle : particles_) motion_->move(particle, input.travel, random_);
   }
   seen_an_image_ = true;
-  weigh(input.scores);
+  weigh(input);
   TrackerEstimate result = estimate();
   injectRandomParticles();
   return result;
 }
 
-/// Low-variance resampling: one random offset, then equal steps through the cumulated weights.
-/// As one more likelihood, as wide as the one beside the recorded path.
+/// As one more likelihood.
 void ParticleFilter::attract(const Eigen::Vector2d& position_m) {
-  const double sigma_m = fitness_config_.distance_sigma_m;
-  for (Particle& particle : particles_) {
-    particle.weight *= std::exp(-0.5 * (particle.position_m - position_m).squaredNorm() / (sigma_m * sigma_m));
-  }
+  for (Particle& particle : particles_) particle.weight *= fitnessAbout(position_m, particle.position_m);
   normaliseWeights(particles_);
 }
 
+/// Low-variance resampling: one random offset, then equal steps through the cumulated weights.
 void ParticleFilter::resample() {
   const double step = 1.0 / static_cast<double>(particles_.size());
   const double offset = random_.uniform(0.0, step);
@@ -89,10 +86,12 @@ void ParticleFilter::resample() {
   particles_.swap(drawn_);
 }
 
-void ParticleFilter::weigh(Scores& scores) {
+void ParticleFilter::weigh(const TrackerInput& input) {
   best_ = Fitness();
   for (Particle& particle : particles_) {
-    const Fitness fitness = evaluateFitness(particle.position_m, map_, scores, fitness_config_);
+    const Fitness fitness = input.verified_m
+                                ? Fitness{fitnessAbout(*input.verified_m, particle.position_m), 0, {}}
+                                : evaluateFitness(particle.position_m, map_, input.scores, fitness_config_);
     particle.weight = fitness.value;
     if (fitness.score.similarity > best_.score.similarity) best_ = fitness;
   }

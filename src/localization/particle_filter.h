@@ -35,7 +35,7 @@ class ParticleFilter final : public Tracker {
 
  private:
   void resample();
-  void weigh(Scores& scores);
+  void weigh(const TrackerInput& input);
   TrackerEstimate estimate() const;
   void injectRandomParticles();
 

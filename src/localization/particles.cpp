@@ -132,4 +132,9 @@ Fitness evaluateFitness(const Eigen::Vector2d& position_m, const TrainingMap& ma
   return {score.weight * std::exp(-0.5 * offset * offset), nearest.image, score};
 }
 
+double fitnessAbout(const Eigen::Vector2d& verified_m, const Eigen::Vector2d& position_m) {
+  constexpr double kSigma_m = 1.0;  // a cloud as wide as that of a place: the next image may have no pose
+  return std::exp(-0.5 * (position_m - verified_m).squaredNorm() / (kSigma_m * kSigma_m));
+}
+
 }  // namespace visual_localization

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "base/angles.h"
 #include "base/time.h"
+#include "geometry/rotation_vector.h"
 
 namespace visual_localization {
 namespace {
@@ -12,6 +14,7 @@ namespace {
 constexpr std::size_t kNeighbours = 32;  ///< looked at for those that face alike
 constexpr std::size_t kHypotheses = 2;   ///< of positions that look alike
 constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way
+constexpr double kTurn_rad_per_m = 0.1;  ///< standard deviation of how much it turns on the way
 constexpr double kApart_m = 5.0;         ///< training images closer than this belong to one hypothesis
 
 Eigen::Matrix3d covarianceOf(const SeenLandmark& landmark) {
@@ -21,58 +24,115 @@ Eigen::Matrix3d covarianceOf(const SeenLandmark& landmark) {
   return across * across * Eigen::Matrix3d::Identity() + (along * along - across * across) * ray * ray.transpose();
 }
 
+/// That of the camera's pose as that of the robot's: a rotation about the camera moves it.
+MetricPose::Covariance atBase(const MetricPose::Covariance& of_camera, const MetricPose& pose) {
+  MetricPose::Covariance by_camera = MetricPose::Covariance::Identity();
+  by_camera.topRightCorner<3, 3>() = -crossMatrix(pose.base.translation() - pose.camera.position_m);
+  return by_camera * of_camera * by_camera.transpose();
+}
+
 }  // namespace
 
-std::optional<MetricPose> PoseVerifier::verify(std::int64_t stamp_ns, QueryImage& image, Scores& scores,
-                                               const CameraModel& camera) {
+void PoseVerifier::configure(const MetricConfig& config) {
+  config_ = config;
+  focal_.configure(config.max_focal_error);
+}
+
+void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
+                              const SensorMount& mount) {
   ++images_since_;
-  rays_ = {};
-  std::optional<MetricPose> pose = nearPrediction(stamp_ns, image, scores, camera);
-  if (!pose) pose = amongMostSimilar(image, scores, camera);
-  if (!pose) return std::nullopt;
-  pose->confirmed = pose->inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isNear(*pose, stamp_ns);
-  remember(stamp_ns, *pose);
-  return pose;
+  stamp_ns_ = stamp_ns;
+  features_ = &features;
+  rays_ = raysOf(features, camera, config_.keypoint_sigma_px);
+  focal_px_ = camera.intrinsics().fx;
+  mount_ = mount;
+  compared_.clear();
 }
 
-std::optional<PredictedPose> PoseVerifier::predicted(std::int64_t stamp_ns) const {
-  if (!last_) return std::nullopt;
-  const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns);
-  if (!(elapsed_s >= 0.0 && elapsed_s <= config_.max_gap_s)) return std::nullopt;
-  const Eigen::Vector2d way_m = last_->velocity_mps.value_or(Eigen::Vector2d::Zero()) * elapsed_s;
-  return PredictedPose{last_->position_m + way_m, last_->yaw_rad, kTurn * way_m.norm()};
-}
-
-bool PoseVerifier::isNear(const MetricPose& pose, std::int64_t stamp_ns) const {
-  const std::optional<PredictedPose> expected = predicted(stamp_ns);
-  return expected && (pose.camera.position_m.head<2>() - expected->position_m).norm() <=
-                         config_.max_prediction_error_m + expected->sigma_m;
-}
-
-std::optional<MetricPose> PoseVerifier::nearPrediction(std::int64_t stamp_ns, QueryImage& image, Scores& scores,
-                                                       const CameraModel& camera) {
-  const std::optional<PredictedPose> expected = predicted(stamp_ns);
+std::optional<MetricPose> PoseVerifier::nearPrediction() {
+  const std::optional<Prediction> expected = predicted();
   if (!expected) return std::nullopt;
   const auto few = static_cast<std::size_t>(std::min(config_.min_inliers, config_.min_inliers_predicted));
-  const auto pose = solve(around(expected->position_m, expected->yaw_rad), few, image, scores, camera);
-  if (!pose || pose->inliers >= static_cast<std::size_t>(config_.min_inliers)) return pose;
-  return isNear(*pose, stamp_ns) ? pose : std::nullopt;
+  const auto pose = solveNear(expected->position_m, expected->yaw_rad, few);
+  if (!pose) return std::nullopt;
+  if (pose->inliers < static_cast<std::size_t>(config_.min_inliers) && !isPredicted(*pose)) return std::nullopt;
+  return accepted(*pose);
 }
 
-std::optional<MetricPose> PoseVerifier::amongMostSimilar(QueryImage& image, Scores& scores, const CameraModel& camera) {
+std::optional<MetricPose> PoseVerifier::nearOneOf(const std::vector<std::size_t>& training_images) {
   std::vector<Eigen::Vector2d> tried;
-  for (const std::size_t best : scores.mostSimilar()) {
-    const Eigen::Vector2d& position_m = map_.position_m(best);
+  for (const std::size_t image : training_images) {
+    const Eigen::Vector2d& position_m = map_.position_m(image);
     if (std::any_of(tried.begin(), tried.end(),
                     [&](const Eigen::Vector2d& other) { return (other - position_m).norm() < kApart_m; })) {
       continue;
     }
     tried.push_back(position_m);
-    const auto pose = solve(around(position_m, map_.yaw_rad(best)), static_cast<std::size_t>(config_.min_inliers),
-                            image, scores, camera);
-    if (pose || tried.size() == kHypotheses) return pose;
+    const auto pose = solveNear(position_m, map_.yaw_rad(image), static_cast<std::size_t>(config_.min_inliers));
+    if (pose) return accepted(*pose);
+    if (tried.size() == kHypotheses) break;
   }
   return std::nullopt;
+}
+
+std::optional<PoseVerifier::Prediction> PoseVerifier::predicted() const {
+  if (!last_) return std::nullopt;
+  const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
+  if (!(elapsed_s >= 0.0 && elapsed_s <= config_.max_gap_s)) return std::nullopt;
+  const MetricPose& last = last_->pose;
+  const Eigen::Vector2d way_m = last_->velocity_mps.value_or(Eigen::Vector2d::Zero()) * elapsed_s;
+  const MetricPose::Covariance covariance = last.covariance + last.map_covariance;
+  Prediction prediction;
+  prediction.position_m = last.base.translation().head<2>() + way_m;
+  prediction.yaw_rad = yawOf(last.base);
+  prediction.sigma_m = kTurn * way_m.norm();
+  prediction.covariance_m2 =
+      covariance.topLeftCorner<2, 2>() + prediction.sigma_m * prediction.sigma_m * Eigen::Matrix2d::Identity();
+  const double turn_rad = kTurn_rad_per_m * way_m.norm();
+  prediction.yaw_variance_rad2 = covariance(5, 5) + turn_rad * turn_rad;
+  return prediction;
+}
+
+std::vector<std::size_t> PoseVerifier::compared() const {
+  std::vector<std::size_t> images;
+  for (const Compared& compared : compared_) images.push_back(compared.training_image);
+  return images;
+}
+
+bool PoseVerifier::isPredicted(const MetricPose& pose) const {
+  const std::optional<Prediction> expected = predicted();
+  return expected && (pose.base.translation().head<2>() - expected->position_m).norm() <=
+                         config_.max_prediction_error_m + expected->sigma_m;
+}
+
+std::optional<MetricPose> PoseVerifier::solveNear(const Eigen::Vector2d& position_m, double yaw_rad,
+                                                  std::size_t min_inliers) {
+  const std::vector<std::size_t> images = around(position_m, yaw_rad);
+  std::vector<LandmarkMatch> sights;
+  std::vector<Pair> seen;  // training images share landmarks
+  for (const std::size_t image : images) {
+    for (const Match& match : matchesWith(image)) {
+      const Pair pair(match.landmark, match.feature);
+      if (std::find(seen.begin(), seen.end(), pair) != seen.end()) continue;
+      seen.push_back(pair);
+      sights.push_back(match.sight);
+    }
+  }
+  const auto solved = solvePose(sights, config_.tolerance_px / focal_px_, min_inliers);
+  if (!solved) return std::nullopt;
+  std::vector<Pair> inliers;
+  for (const std::size_t i : solved->inliers) inliers.push_back(seen[i]);
+  keepMatched(images, std::move(inliers));
+  MetricPose pose;
+  pose.camera = solved->camera;
+  pose.base = mount_.baseInMap(pose.camera);
+  pose.covariance = config_.sigma_factor * config_.sigma_factor * atBase(solved->covariance, pose);
+  pose.inliers = solved->inliers.size();
+  pose.reprojection_px = solved->median_error * focal_px_;
+  if (const auto geometry = map_.geometry(images.front())) pose.map_covariance = atBase(geometry->covariance, pose);
+  if (!(pose.sigma_m() <= config_.max_sigma_m)) return std::nullopt;
+  focal_.add(solved->focal_scale, solved->focal_sigma);
+  return focal_.contradicts() ? std::nullopt : std::optional<MetricPose>(pose);
 }
 
 std::vector<std::size_t> PoseVerifier::around(const Eigen::Vector2d& position_m, double yaw_rad) {
@@ -85,60 +145,67 @@ std::vector<std::size_t> PoseVerifier::around(const Eigen::Vector2d& position_m,
   return chosen;
 }
 
-std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& training_images, std::size_t min_inliers,
-                                              QueryImage& image, Scores& scores, const CameraModel& camera) {
-  matches_.clear();
-  seen_.clear();
-  if (rays_.sigmas.empty()) {
-    live_ = image.unprunedSift();
-    if (live_ == nullptr) return std::nullopt;
-    rays_ = raysOf(*live_, camera, config_.keypoint_sigma_px);
-  }
-  for (const std::size_t training_image : training_images) addMatches(training_image, scores);
-  const double focal_px = camera.intrinsics().fx;
-  const auto solved = solvePose(matches_, config_.tolerance_px / focal_px, min_inliers);
-  if (!solved) return std::nullopt;
-  MetricPose pose;
-  pose.camera = solved->camera;
-  pose.covariance = solved->covariance;
-  pose.inliers = solved->inliers.size();
-  pose.reprojection_px = solved->median_error * focal_px;
-  pose.map_covariance = map_.geometry(training_images.front()) ? map_.geometry(training_images.front())->covariance
-                                                               : MetricPose::Covariance::Zero();
-  return pose.sigma_m() <= config_.max_sigma_m ? std::optional<MetricPose>(pose) : std::nullopt;
+/// Each training image is compared at most once.
+const std::vector<PoseVerifier::Match>& PoseVerifier::matchesWith(std::size_t training_image) {
+  const auto known = std::find_if(compared_.begin(), compared_.end(), [training_image](const Compared& compared) {
+    return compared.training_image == training_image;
+  });
+  if (known != compared_.end()) return known->matches;
+  compared_.push_back({training_image, {}});
+  const std::shared_ptr<const ImageGeometry> geometry = map_.geometry(training_image);
+  if (geometry) match(training_image, *geometry, compared_.back().matches);
+  return compared_.back().matches;
 }
 
-void PoseVerifier::addMatches(std::size_t training_image, Scores& scores) {
-  const std::shared_ptr<const ImageGeometry> geometry = map_.geometry(training_image);
-  if (!geometry) return;
-  scores.count(training_image);
+void PoseVerifier::match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches) {
   indices_.clear();
-  for (const SeenLandmark& landmark : geometry->landmarks) indices_.push_back(landmark.feature);
+  for (const SeenLandmark& landmark : geometry.landmarks) indices_.push_back(landmark.feature);
   const std::shared_ptr<const SiftFeatures> features = map_.sift(training_image);
   if (!indices_.empty() && indices_.back() >= features->size()) return;  // they could not be read
   features->subset(indices_, landmarks_);
-  matchSymmetric(*live_, landmarks_, config_.match_ratio, found_);
-  for (const FeatureMatch& match : found_) {
-    if (!rays_.normalised[match.a].allFinite()) continue;
-    const SeenLandmark& landmark = geometry->landmarks[match.b];
-    const std::pair<std::uint32_t, std::size_t> pair(landmark.id, match.a);
-    if (std::find(seen_.begin(), seen_.end(), pair) != seen_.end()) continue;
-    seen_.push_back(pair);
-    matches_.push_back({rays_.normalised[match.a], rays_.sigmas[match.a],
-                        geometry->camera.position_m + landmark.offset_m.cast<double>(), covarianceOf(landmark)});
+  matchSymmetric(*features_, landmarks_, config_.match_ratio, found_);
+  for (const FeatureMatch& pair : found_) {
+    if (!rays_.normalised[pair.a].allFinite()) continue;
+    const SeenLandmark& landmark = geometry.landmarks[pair.b];
+    matches.push_back({landmark.id,
+                       pair.a,
+                       landmark.feature,
+                       {rays_.normalised[pair.a], rays_.sigmas[pair.a],
+                        geometry.camera.position_m + landmark.offset_m.cast<double>(), covarianceOf(landmark)}});
   }
 }
 
-void PoseVerifier::remember(std::int64_t stamp_ns, const MetricPose& pose) {
-  Known known{stamp_ns, pose.camera.position_m.head<2>(), pose.camera.yaw_rad(), {}};
+void PoseVerifier::keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers) {
+  std::sort(inliers.begin(), inliers.end());
+  std::size_t most = 0;
+  for (const std::size_t image : training_images) {
+    MatchedLandmarks matched{image, {}};
+    std::size_t agreeing = 0;
+    for (const Match& match : matchesWith(image)) {
+      const SiftKeypoint& keypoint = features_->keypoints()[match.feature];
+      const bool inlier = std::binary_search(inliers.begin(), inliers.end(), Pair(match.landmark, match.feature));
+      matched.landmarks.push_back({{keypoint.x_px, keypoint.y_px}, match.training_feature, inlier});
+      agreeing += inlier ? 1 : 0;
+    }
+    if (agreeing <= most) continue;
+    most = agreeing;
+    matched_ = std::move(matched);
+  }
+}
+
+MetricPose PoseVerifier::accepted(MetricPose pose) {
+  pose.confirmed =
+      focal_.confirms() && (pose.inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isPredicted(pose));
+  Known known{stamp_ns_, pose, {}};
   if (last_) {
-    const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns);
+    const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
     if (elapsed_s > 0.0 && elapsed_s <= config_.max_gap_s) {
-      known.velocity_mps = (known.position_m - last_->position_m) / elapsed_s;
+      known.velocity_mps = (pose.base.translation() - last_->pose.base.translation()).head<2>() / elapsed_s;
     }
   }
   last_ = known;
   images_since_ = 0;
+  return pose;
 }
 
 }  // namespace visual_localization

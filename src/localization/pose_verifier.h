@@ -2,71 +2,104 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "geometry/keypoint_rays.h"
 #include "geometry/pose_solver.h"
+#include "localization/focal_check.h"
 #include "visual_localization/camera/camera_model.h"
+#include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/localization/matched_landmarks.h"
 #include "visual_localization/localization/metric_pose.h"
-#include "visual_localization/localization/scores.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
-
-/// A pose that no image verifies.
-struct PredictedPose {
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-  double yaw_rad = 0.0;
-  double sigma_m = 0.0;  ///< of each axis, beside that of the pose it goes on from
-};
 
 /// Solves the camera's pose from the landmarks of training images: of those near the pose that the motion so far
 /// predicts, or else of those that look most alike. The solved pose is judged, not the image that it came from.
 class PoseVerifier {
  public:
-  /// `map` must outlive it.
-  PoseVerifier(const TrainingMap& map, const MetricConfig& config) : map_(map), config_(config) {}
+  /// A pose that no image verifies.
+  struct Prediction {
+    Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+    double yaw_rad = 0.0;
+    double sigma_m = 0.0;                                     ///< of each axis of the way since the last verified pose
+    Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< of all of it, the map's own included
+    double yaw_variance_rad2 = 0.0;
+  };
 
-  void configure(const MetricConfig& config) { config_ = config; }
+  /// `map` must outlive it.
+  PoseVerifier(const TrainingMap& map, const MetricConfig& config)
+      : map_(map), config_(config), focal_(config.max_focal_error) {}
+
+  void configure(const MetricConfig& config);
   /// Forgets the motion.
   void reset() { last_.reset(); }
-  /// The pose of the current image; nothing when too few landmarks agree. Training images that are compared for it are
-  /// counted in `scores`.
-  std::optional<MetricPose> verify(std::int64_t stamp_ns, QueryImage& image, Scores& scores, const CameraModel& camera);
+  /// Another camera, or another calibration of it.
+  void resetCamera() { focal_.reset(); }
+  /// The next image. Its features, not pruned, must live until the one after it.
+  /// `mount`: where the robot carries the camera.
+  void startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
+                  const SensorMount& mount = {});
+
+  /// The pose of the image if it is where the motion leads; nothing when too few landmarks agree there.
+  std::optional<MetricPose> nearPrediction();
+  /// The same near the first of `training_images` that verifies a pose; the most similar come first.
+  std::optional<MetricPose> nearOneOf(const std::vector<std::size_t>& training_images);
   /// Where the motion since the last verified pose leads to; nothing when that was longer ago than a prediction holds.
-  std::optional<PredictedPose> predicted(std::int64_t stamp_ns) const;
+  std::optional<Prediction> predicted() const;
+  /// Training images whose landmarks were matched with the image, each once.
+  std::vector<std::size_t> compared() const;
+  /// What the last solved pose rests on: of the training image that shares most inliers with it.
+  const MatchedLandmarks& matched() const { return matched_; }
+  /// What the last images say about the calibration. While they contradict it no pose is verified.
+  const FocalCheck& focal() const { return focal_; }
   /// Images since the last verified one; 0 when it was the last.
   std::size_t imagesSince() const { return images_since_; }
 
  private:
   struct Known {
     std::int64_t stamp_ns = 0;
-    Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-    double yaw_rad = 0.0;
+    MetricPose pose;
     std::optional<Eigen::Vector2d> velocity_mps;
   };
+  /// A landmark and the feature of the image that seems to show it.
+  struct Match {
+    std::uint32_t landmark = 0;
+    std::size_t feature = 0;
+    std::uint32_t training_feature = 0;
+    LandmarkMatch sight;
+  };
+  struct Compared {
+    std::size_t training_image = 0;
+    std::vector<Match> matches;
+  };
+  using Pair = std::pair<std::uint32_t, std::size_t>;  ///< a landmark and a feature of the image
 
-  std::optional<MetricPose> nearPrediction(std::int64_t stamp_ns, QueryImage& image, Scores& scores,
-                                           const CameraModel& camera);
-  std::optional<MetricPose> amongMostSimilar(QueryImage& image, Scores& scores, const CameraModel& camera);
-  std::optional<MetricPose> solve(const std::vector<std::size_t>& training_images, std::size_t min_inliers,
-                                  QueryImage& image, Scores& scores, const CameraModel& camera);
-  void addMatches(std::size_t training_image, Scores& scores);
+  std::optional<MetricPose> solveNear(const Eigen::Vector2d& position_m, double yaw_rad, std::size_t min_inliers);
   std::vector<std::size_t> around(const Eigen::Vector2d& position_m, double yaw_rad);
-  bool isNear(const MetricPose& pose, std::int64_t stamp_ns) const;
-  void remember(std::int64_t stamp_ns, const MetricPose& pose);
+  const std::vector<Match>& matchesWith(std::size_t training_image);
+  void match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches);
+  void keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers);
+  bool isPredicted(const MetricPose& pose) const;
+  MetricPose accepted(MetricPose pose);
 
   const TrainingMap& map_;
   MetricConfig config_;
   std::optional<Known> last_;
+  FocalCheck focal_;
   std::size_t images_since_ = 0;
-  KeypointRays rays_;                                        ///< of the current image
-  std::vector<LandmarkMatch> matches_;                       ///< of the current attempt
-  std::vector<std::pair<std::uint32_t, std::size_t>> seen_;  ///< landmark and live feature of each of them
-  SiftFeatures landmarks_;                                   ///< of a training image: its features that show one
+  std::int64_t stamp_ns_ = 0;
+  const SiftFeatures* features_ = nullptr;
+  KeypointRays rays_;  ///< of the features
+  double focal_px_ = 0.0;
+  SensorMount mount_;
+  std::vector<Compared> compared_;
+  MatchedLandmarks matched_;
+  SiftFeatures landmarks_;  ///< of a training image: its features that show one
   std::vector<std::size_t> indices_;
   std::vector<FeatureMatch> found_;
-  const SiftFeatures* live_ = nullptr;  ///< of the current image
   std::vector<Neighbour> neighbours_;
 };
 

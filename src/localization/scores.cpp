@@ -148,7 +148,7 @@ void Scores::startImage(FeatureKind kind, Compare compare) {
   sift_.clear();
   global_.clear();
   comparisons_ = 0;
-  counted_.clear();
+  counted_ = 0;
 }
 
 Score Scores::operator[](std::size_t training_image) {
@@ -174,14 +174,12 @@ std::vector<std::size_t> Scores::mostSimilar() const {
   return images;
 }
 
-void Scores::count(std::size_t training_image) {
-  const auto& compared = sift_.entries();
-  const bool known = kind_ == FeatureKind::kSift &&
-                     std::any_of(compared.begin(), compared.end(), [training_image](const Cache::Entry& entry) {
-                       return entry.counted && entry.training_image == training_image;
-                     });
-  if (known || std::find(counted_.begin(), counted_.end(), training_image) != counted_.end()) return;
-  counted_.push_back(training_image);
+void Scores::count(const std::vector<std::size_t>& training_images) {
+  const std::vector<std::size_t> known = kind_ == FeatureKind::kSift ? mostSimilar() : std::vector<std::size_t>();
+  counted_ = 0;
+  for (const std::size_t image : training_images) {
+    if (std::find(known.begin(), known.end(), image) == known.end()) ++counted_;
+  }
 }
 
 std::size_t Scores::swept() const { return global_.size() - (kind_ == FeatureKind::kGlobal ? comparisons_ : 0); }
@@ -216,6 +214,17 @@ std::size_t MapSweep::draw(Scores& scores, Random& random) {
   const double target = random.uniform(0.0, cumulated_.back());
   const auto found = std::upper_bound(cumulated_.begin(), cumulated_.end(), target);
   return imageAt(std::min(cumulated_.size() - 1, static_cast<std::size_t>(found - cumulated_.begin())));
+}
+
+std::vector<std::size_t> MapSweep::mostSimilar(Scores& scores, std::size_t count) {
+  sweep(scores);
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = first_; i < map_.size(); i += stride_) order.emplace_back(-scores.global(i).similarity, i);
+  const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(count, order.size()));
+  std::partial_sort(order.begin(), end, order.end());
+  std::vector<std::size_t> images;
+  for (auto entry = order.begin(); entry != end; ++entry) images.push_back(entry->second);
+  return images;
 }
 
 double MapSweep::ratio(Scores& scores, const Eigen::Vector2d& position_m, double near_m) {

@@ -51,6 +51,7 @@ class MadeUpSweep {
     }
     return all;
   }
+  std::vector<std::size_t> mostSimilar(std::size_t count) { return sweep_.mostSimilar(scores_, count); }
   const Scores& scores() const { return scores_; }
 
   std::set<std::size_t> compared;  ///< for the current image
@@ -274,6 +275,14 @@ TEST_F(PlaceRatioTest, OfALargeMapAnotherPartIsAskedEachTime) {
     all.insert(sweep.asked.begin(), sweep.asked.end());
   }
   EXPECT_EQ(all.size(), map_->size());
+}
+
+TEST(MapSweep, NamesTheMostSimilarOfAllTheMap) {
+  MadeUpSweep sweep(50);
+  sweep.startImage([](std::size_t i) { return i == 7 ? 0.9 : i == 31 ? 0.8 : 0.1; });
+  EXPECT_EQ(sweep.mostSimilar(2), (std::vector<std::size_t>{7, 31}));
+  EXPECT_EQ(sweep.mostSimilar(1000).size(), 50U);
+  EXPECT_EQ(sweep.compared.size(), 50U);
 }
 
 }  // namespace

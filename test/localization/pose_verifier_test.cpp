@@ -24,7 +24,7 @@ class StreetMap {
   StreetMap() : random_(1), poses_(test::drive({})), world_(test::pointsAlong(poses_, 6.0, random_)) {
     const test::RecordedDrive drive = test::record(poses_, world_, 0.1, random_);
     const UnadjustedSession session = drive.unadjusted();
-    SessionGeometry geometry = adjustSession(session, {}, 0, 1);
+    SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
     std::vector<TrainingImage> images(poses_.size());
     for (std::size_t i = 0; i < images.size(); ++i) {
       images[i].stamp_ns = session.images[i].stamp_ns;
@@ -96,11 +96,21 @@ class PoseVerifierTest : public testing::Test {
   /// After particles compared the image with these training images.
   std::optional<MetricPose> verify(double time_s, const SiftFeatures& features,
                                    const std::vector<std::size_t>& compared) {
-    SeenImage image(street_.map(), features);
-    scores_.startImage(FeatureKind::kSift,
-                       [&image](FeatureKind kind, std::size_t i) { return image.compare(kind, i); });
-    for (const std::size_t i : compared) scores_[i];
-    return verifier_.verify(static_cast<std::int64_t>(time_s * kSecond_ns), image, scores_, street_.camera());
+    return verifyWith(street_.camera(), time_s, features, compared);
+  }
+  std::optional<MetricPose> verifyWith(const CameraModel& camera, double time_s, const SiftFeatures& features,
+                                       const std::vector<std::size_t>& compared) {
+    features_ = features;
+    verifier_.startImage(static_cast<std::int64_t>(time_s * kSecond_ns), features_, camera);
+    const auto pose = verifier_.nearPrediction();
+    return pose ? pose : verifier_.nearOneOf(mostSimilar(compared));
+  }
+  std::vector<std::size_t> mostSimilar(const std::vector<std::size_t>& compared) {
+    SeenImage image(street_.map(), features_);
+    Scores scores(street_.map().size());
+    scores.startImage(FeatureKind::kSift, [&image](FeatureKind kind, std::size_t i) { return image.compare(kind, i); });
+    for (const std::size_t i : compared) scores[i];
+    return scores.mostSimilar();
   }
   /// An image with all features from beside training image `i`.
   std::optional<MetricPose> verifyNear(double time_s, std::size_t i) {
@@ -113,7 +123,7 @@ class PoseVerifierTest : public testing::Test {
 
   const Eigen::Vector3d kBeside_m{0.3, -0.1, 0.4};
   StreetMap street_;
-  Scores scores_{street_.map().size()};
+  SiftFeatures features_;  ///< of the last image
   PoseVerifier verifier_{street_.map(), {}};
 };
 
@@ -132,10 +142,66 @@ TEST_F(PoseVerifierTest, FindsThePoseToCentimetres) {
   }
 }
 
-TEST_F(PoseVerifierTest, CountsTheTrainingImagesWhoseLandmarksItUses) {
+TEST_F(PoseVerifierTest, NamesTheTrainingImagesWhoseLandmarksItUses) {
   ASSERT_TRUE(verify(0.0, street_.seenFrom(street_.trueNear(14, kBeside_m)), {14}));
-  EXPECT_EQ(scores_.comparisons(), static_cast<std::size_t>(MetricConfig().training_images))
-      << "one of them by particles";
+  std::vector<std::size_t> compared = verifier_.compared();
+  std::sort(compared.begin(), compared.end());
+  EXPECT_EQ(compared, (std::vector<std::size_t>{12, 13, 14, 15, 16}));
+}
+
+TEST_F(PoseVerifierTest, ComparesEachTrainingImageOnce) {
+  ASSERT_TRUE(verifyNear(0.0, 14));
+  const auto few = street_.fewSeenFrom(street_.trueNear(14, kBeside_m), 14, 8);
+  EXPECT_FALSE(verify(1.0, few, {14})) << "too few, near the prediction and near the most similar";
+  std::vector<std::size_t> compared = verifier_.compared();
+  std::sort(compared.begin(), compared.end());
+  EXPECT_EQ(std::unique(compared.begin(), compared.end()), compared.end());
+}
+
+// A street's landmarks tell the focal length of each image to about 1 %.
+TEST_F(PoseVerifierTest, RefusesACalibrationThatTheImagesContradict) {
+  for (const double scale : {0.95, 1.05, 2.0}) {
+    verifier_.reset();
+    verifier_.resetCamera();
+    Intrinsics wrong = street_.camera().intrinsics();
+    wrong.fx *= scale;
+    wrong.fy *= scale;
+    std::size_t believed = 0;
+    for (std::size_t i = 10; i < 30; ++i) {
+      const auto features = street_.seenFrom(street_.trueNear(i, kBeside_m));
+      if (verifyWith(CameraModel(wrong), static_cast<double>(i), features, {i - 1, i, i + 1})) ++believed;
+    }
+    EXPECT_LE(believed, 3U) << scale;
+    EXPECT_TRUE(verifier_.focal().contradicts()) << scale;
+    EXPECT_LT((verifier_.focal().scale() - 1.0) * (scale - 1.0), 0.0) << "the other way";
+  }
+}
+
+TEST_F(PoseVerifierTest, BelievesTheRightCalibrationAgain) {
+  Intrinsics wrong = street_.camera().intrinsics();
+  wrong.fx *= 1.05;
+  wrong.fy *= 1.05;
+  for (std::size_t i = 10; i < 30; ++i) {
+    verifyWith(CameraModel(wrong), static_cast<double>(i), street_.seenFrom(street_.trueNear(i, kBeside_m)), {i});
+  }
+  ASSERT_TRUE(verifier_.focal().contradicts());
+  verifier_.resetCamera();
+  EXPECT_TRUE(verifyNear(40.0, 14));
+  EXPECT_TRUE(verifyNear(41.0, 15)->confirmed);
+}
+
+TEST_F(PoseVerifierTest, PredictsWithAGrowingCovariance) {
+  ASSERT_TRUE(verifyNear(0.0, 10));
+  const auto pose = verifyNear(1.0, 11);
+  ASSERT_TRUE(pose);
+  verify(2.0, SiftFeatures(), {});
+  const auto soon = verifier_.predicted();
+  verify(4.0, SiftFeatures(), {});
+  const auto later = verifier_.predicted();
+  ASSERT_TRUE(soon && later);
+  EXPECT_GT(soon->covariance_m2(0, 0), pose->covariance(0, 0) + pose->map_covariance(0, 0));
+  EXPECT_GT(later->covariance_m2(0, 0), soon->covariance_m2(0, 0));
+  EXPECT_GT(later->yaw_variance_rad2, soon->yaw_variance_rad2);
 }
 
 TEST_F(PoseVerifierTest, FindsNothingWhereNothingMatches) {

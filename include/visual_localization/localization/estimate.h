@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -32,18 +33,22 @@ struct Estimate {
   PoseSource source = PoseSource::kNone;  ///< what `pose` rests on
   std::optional<MetricPose> metric;       ///< solved from landmarks in this image
   std::size_t images_since_metric = 0;    ///< 0 when this image has one
-  double motion_residual_m = 0.0;         ///< see MotionConsistency; of the last estimates
-  std::size_t comparisons = 0;            ///< distinct training images that particles were compared with
-  std::size_t swept = 0;                  ///< distinct training images compared beside these, see MapSweep
-  ImageReport image;                      ///< statistics, features, times
-  double update_ms = 0.0;                 ///< wall-clock time of all but extraction and comparisons
-  std::size_t repeats = 0;                ///< images in a row, this one included, that repeated the one before
-  bool frozen = false;                    ///< too many of them: the camera must be broken
+  double focal_scale = 1.0;          ///< focal length by the last images with a pose, as a share of the calibration's
+  bool camera_contradicted = false;  ///< by them: no pose is metric
+  double motion_residual_m = 0.0;    ///< see MotionConsistency; of the last estimates
+  std::size_t comparisons = 0;       ///< distinct training images that particles were compared with
+  std::size_t swept = 0;             ///< distinct training images compared beside these, see MapSweep
+  ImageReport image;                 ///< statistics, features, times
+  double update_ms = 0.0;            ///< wall-clock time of all but extraction and comparisons
+  std::size_t repeats = 0;           ///< images in a row, this one included, that repeated the one before
+  bool frozen = false;               ///< too many of them: the camera must be broken
 
   /// Standard deviations of position (the larger one, metres) and heading (radians): in relation to the map when the
   /// pose is metric, otherwise of everything that is not known.
   double sigma_m() const;
   double sigmaYaw_rad() const;
+  /// What to tell people about a calibration that the images contradict; empty while they do not.
+  std::string cameraTrouble() const;
 };
 
 }  // namespace visual_localization

@@ -12,6 +12,7 @@
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/localizer_config.h"
+#include "visual_localization/localization/matched_landmarks.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker.h"
@@ -47,6 +48,9 @@ class Localizer {
   void setCamera(const CameraModel& camera);
   /// For images of the map's size; nothing when neither the map nor anybody else knows it.
   const std::optional<CameraModel>& camera() const { return camera_; }
+  /// Where the robot carries the camera, from the next image on: metric poses are those of the robot. Until then as in
+  /// the map's first session. Throws MountError, and then nothing has changed.
+  void setMount(const SensorMount& mount);
   /// Features under it are not used, from the next image on. Until then that of the map's first session. Throws
   /// CameraError when nothing is left of it at the map's size.
   void setMask(const Mask& mask);
@@ -63,6 +67,9 @@ class Localizer {
   const std::vector<Particle>& particles() const { return tracker_->particles(); }
   /// SIFT features of the last image after pruning, for drawing its matches; empty when there was no need for them.
   SiftFeatures lastSift() const { return image_->sift() == nullptr ? SiftFeatures() : *image_->sift(); }
+  /// What the last image's metric pose rests on: landmarks of the training image that shares most inliers with it, for
+  /// drawing them; none without a metric pose.
+  MatchedLandmarks lastLandmarks() const;
 
  private:
   /// How often the last image has come, to the last bit.
@@ -82,11 +89,14 @@ class Localizer {
   Estimate lastAgain(std::int64_t stamp_ns, double elapsed_ms);
   Estimate answer(double elapsed_ms);
   bool isFrozen() const;
-  Evidence verify(const TrackerEstimate& tracked);
+  Evidence verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric);
   bool isMetric() const;
-  std::optional<MetricPose> solvePose(std::int64_t stamp_ns, const TrackerEstimate& tracked);
+  std::optional<MetricPose> poseNearPrediction(std::int64_t stamp_ns);
+  std::optional<MetricPose> poseNearProposal(const TrackerEstimate& tracked);
+  TrackerEstimate track(const std::optional<MetricPose>& metric);
+  void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
   PoseEstimate poseOf(const MetricPose& metric) const;
-  void choosePose(std::int64_t stamp_ns, Estimate& estimate) const;
+  void choosePose(Estimate& estimate) const;
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
   void configureTracker(const std::string& tracker_before);
   void forgetEvidence();
@@ -95,6 +105,7 @@ class Localizer {
   LocalizerConfig config_;
   std::optional<CameraModel> camera_;
   Mask mask_;
+  SensorMount mount_;
   std::shared_ptr<QueryImage> image_;
   Scores scores_;
   MapSweep sweep_;

@@ -30,9 +30,11 @@ struct MetricConfig {
   double keypoint_sigma_px = 0.3;
   int min_inliers = 20;
   int min_inliers_predicted = 12;
+  double sigma_factor = 1.4;
   double max_sigma_m = 0.3;
   double max_gap_s = 5.0;
   double max_prediction_error_m = 2.0;
+  double max_focal_error = 0.01;
 
   void declare(ParameterVisitor& visitor);
 };
@@ -41,9 +43,10 @@ struct MetricConfig {
 struct MetricPose {
   using Covariance = Eigen::Matrix<double, 6, 6>;
 
-  CameraPose camera;  ///< map frame
-  /// In relation to the map around: position (east, north, up; metres), then rotation about these axes (radians). An
-  /// error of its own for each image: the one to fuse.
+  CameraPose camera;                                       ///< map frame
+  Eigen::Isometry3d base = Eigen::Isometry3d::Identity();  ///< the robot's frame (x ahead, y left, z up) in the map
+  /// Of `base`, in relation to the map around: position (east, north, up; metres), then rotation about these axes
+  /// (radians). An error of its own for each image: the one to fuse.
   Covariance covariance = Covariance::Zero();
   /// Of the map there, the same for images near each other: no average takes it away.
   Covariance map_covariance = Covariance::Zero();

@@ -85,4 +85,7 @@ struct Fitness {
 Fitness evaluateFitness(const Eigen::Vector2d& position_m, const TrainingMap& map, Scores& scores,
                         const FitnessConfig& config);
 
+/// In its stead where landmarks verify the position: a Gaussian of height one about it.
+double fitnessAbout(const Eigen::Vector2d& verified_m, const Eigen::Vector2d& position_m);
+
 }  // namespace visual_localization

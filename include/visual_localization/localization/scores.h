@@ -149,10 +149,10 @@ class Scores {
 
   /// The training images that particles were compared with, the most similar first.
   std::vector<std::size_t> mostSimilar() const;
-  /// A training image that was compared otherwise, by SIFT.
-  void count(std::size_t training_image);
+  /// Training images that were compared otherwise, by SIFT.
+  void count(const std::vector<std::size_t>& training_images);
   /// Distinct training images that particles were compared with, and those counted: the papers' measure of cost.
-  std::size_t comparisons() const { return comparisons_ + counted_.size(); }
+  std::size_t comparisons() const { return comparisons_ + counted_; }
   /// Distinct training images compared beside these, by global features: see MapSweep.
   std::size_t swept() const;
 
@@ -181,7 +181,7 @@ class Scores {
   FeatureKind kind_ = FeatureKind::kSift;
   Compare compare_;
   std::size_t comparisons_ = 0;
-  std::vector<std::size_t> counted_;  ///< beside those of the particles
+  std::size_t counted_ = 0;  ///< beside those of the particles
 };
 
 /// Compares the whole map with the current image by global features, when somebody first asks. It tells a lost robot
@@ -199,6 +199,8 @@ class MapSweep {
   void startImage() { cumulated_.clear(); }
   /// Where a lost robot may be: a training image, in proportion to its score's weight; any when nothing has weight.
   std::size_t draw(Scores& scores, Random& random);
+  /// The `count` training images that look most alike, the best first.
+  std::vector<std::size_t> mostSimilar(Scores& scores, std::size_t count);
   /// Best global similarity within `near_m` of `position_m`, as a share of the best in the whole map, in [0, 1]. One
   /// when nothing looks alike anywhere. A swarm that has settled at the wrong position compares only what is there,
   /// and never sees that another position fits better.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -41,6 +42,9 @@ struct TrackerInput {
   Scores& scores;      ///< of the image, by the features chosen for it
   MapSweep& sweep;     ///< where it may have been taken, should the position be lost
   Travel travel = {};  ///< since the last image
+  /// Where landmarks verify that the image was taken: particles are weighed by their distance from there, and no
+  /// training image is compared.
+  std::optional<Eigen::Vector2d> verified_m = {};
 };
 
 /// Follows the position from image to image.
