@@ -149,8 +149,12 @@ main() {
   localize
   clean_up
 
+  step "The same without landmarks, for the plot"
+  "$programs/localize" --map "$output/campus.map" --bag "$bag" --image-topic "$image_topic" --tracker "$tracker" \
+    --features "$features" --pose-source place --output "$output/places.csv" || fail "localize failed"
+
   step "Result"
-  python3 "$repo/scripts/report_track.py" "$output/track.csv" --map-csv "$output/map.csv"
+  python3 "$repo/scripts/report_track.py" "$output/track.csv" --map-csv "$output/map.csv" --places "$output/places.csv"
 }
 
 main "$@"

@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 """Draws the fixes, cleaned paths and training images of a map's sessions. `map_builder --plot` calls it.
 
-A panel for each session: kept fixes, dropped ones with shape and colour of the reason, the cleaned path and the training
-images. With several sessions also a panel with all paths. Metres, north up, one scale on both axes.
+A panel for each session: kept fixes, dropped ones with shape and colour of the reason, the cleaned path, the training
+images and, as faint dots, the landmarks. A session with landmarks was adjusted: its images need not lie on the cleaned
+path, which is dashed. With several sessions also a panel with all paths. Metres, north up, one scale on both axes.
 """
 import argparse
 import io
@@ -35,6 +36,7 @@ VERDICTS: Dict[str, Tuple[Dict[str, Any], str]] = {
     'out of order': ({'marker': 's', 'color': '#9467bd', 'markersize': 4.5, 'markeredgewidth': 0}, 'out of order'),
     'spike': ({'marker': 'x', 'color': '#d62728', 'markersize': 6, 'markeredgewidth': 1.8}, 'spikes (single outliers)'),
 }
+LANDMARK_LOOK: Dict[str, Any] = {'marker': '.', 'color': '#7a9a7a', 'markersize': 1.6, 'markeredgewidth': 0}
 # Inches. Beside a panel its legend; above it the title, below it the labels of the axis.
 LEFT, PANEL, LEGEND, ABOVE, BELOW = .6, 5.4, 2.4, .4, .5
 LINE = .215
@@ -51,6 +53,7 @@ class Session(NamedTuple):
     counts: Dict[str, int]  # a fix before the path begins has no position
     paths: List[Positions]
     images: Positions
+    landmarks: Positions  # none: places only
     length_m: float
     gaps_closed: int
 
@@ -80,7 +83,7 @@ def read_sessions(path: Path) -> List[Session]:
         return [Session(one['name'], {verdict: positions(one['fixes'][verdict]['positions_m']) for verdict in VERDICTS},
                         {verdict: int(one['fixes'][verdict]['count']) for verdict in VERDICTS},
                         [positions(part) for part in one['paths_m']], positions(one['images_m']),
-                        float(one['length_m']), int(one['gaps_closed'])) for one in data['sessions']]
+                        positions(one['landmarks_m']), float(one['length_m']), int(one['gaps_closed'])) for one in data['sessions']]
     except OSError as failure:
         raise DataError(path, f'cannot be read: {failure.strerror}') from failure
     except (ValueError, KeyError, TypeError) as failure:
@@ -180,7 +183,12 @@ def draw_points(axes: plt.Axes, positions: Positions, look: Dict[str, Any], name
 def draw_path(axes: plt.Axes, session: Session, area: Area, colour: str) -> None:
     """A line for each part: where a path was left open, nothing was driven as far as the map knows."""
     for part in session.paths:
-        axes.plot(*area.clipped(part).T, color=colour, linewidth=1.3)
+        axes.plot(*area.clipped(part).T, color=colour, linewidth=1.3, **path_look(session))
+
+
+def path_look(session: Session) -> Dict[str, Any]:
+    """Dashed where the adjustment took another one."""
+    return {'linestyle': '--' if len(session.landmarks) else '-'}
 
 
 def image_look(colour: str) -> Dict[str, Any]:
@@ -188,20 +196,29 @@ def image_look(colour: str) -> Dict[str, Any]:
     return {'marker': 'o', 'markersize': 2.6, 'markeredgewidth': .6, 'markerfacecolor': 'white', 'color': colour}
 
 
+def inside(area: Area, positions: Positions) -> Positions:
+    """Those that the panel shows."""
+    return positions[((positions >= area.low) & (positions <= area.high)).all(axis=1)]
+
+
 def draw_session(page: Page, index: int, session: Session, area: Area) -> None:
     """The panel of one session."""
     colour = SESSION_COLOURS[index % len(SESSION_COLOURS)]
     axes = page.panel(index, shown_name(session.name, 50))
     handles = []
+    draw_points(axes, inside(area, session.landmarks), LANDMARK_LOOK, f'landmarks_{index}')
     for verdict, (look, meaning) in VERDICTS.items():
         draw_points(axes, area.clipped(session.fixes[verdict]), look, f'{verdict}_{index}')
         handles.append(Line2D([], [], linestyle='none', label=f'{session.counts[verdict]} {meaning}', **look))
         if verdict == 'kept':  # the others lie on top of path and images
             draw_path(axes, session, area, colour)
             draw_points(axes, area.clipped(session.images), image_look(colour), f'images_{index}')
-    handles += [Line2D([], [], color=colour, label=f'cleaned path, {session.length_m:.0f} m'),
-                Line2D([], [], linestyle='none', label=f'{len(session.images)} training images', **image_look(colour)),
+    images = f'{len(session.images)} training images' + (', adjusted' if len(session.landmarks) else '')
+    handles += [Line2D([], [], color=colour, label=f'cleaned path, {session.length_m:.0f} m', **path_look(session)),
+                Line2D([], [], linestyle='none', label=images, **image_look(colour)),
                 Line2D([], [], linestyle='none', label=f'{session.gaps_closed} gaps closed')]
+    if len(session.landmarks):
+        handles.append(Line2D([], [], linestyle='none', label='landmarks', **LANDMARK_LOOK))
     page.legend(axes, handles, f'{sum(session.counts.values())} fixes', 'Marks on the border lie outside.')
 
 
@@ -222,7 +239,7 @@ def draw(sessions: Sequence[Session]) -> plt.Figure:
     """The whole figure."""
     together = area_of(sessions)
     areas = [area_for(session, together) for session in sessions]
-    lines = [len(VERDICTS) + 5] * len(sessions)
+    lines = [len(VERDICTS) + 6] * len(sessions)
     if len(sessions) > 1:
         areas.append(together)
         lines.append(len(sessions) + 2)

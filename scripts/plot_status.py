@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Plots what a localizer says about itself: state, inliers, similarity, place ratio, comparisons, cloud and latency.
+"""Plots what a localizer says about itself: state, source, inliers, sigma, similarity, comparisons, cloud and latency.
 
 Of a running localizer in a window that renews itself, or in a picture (--output FILE.png) that is written every few
 seconds, for machines without a display; of a recorded status topic with --bag. For machines without rqt.
@@ -21,8 +21,9 @@ import numpy as np
 
 COLOURS = {'NO_MAP': '#505050', 'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e',
            'RECOVERING': '#d62728', 'OFF_MAP': '#9467bd'}
-FIGURES = ('inliers', 'best_similarity', 'place_ratio', 'comparisons', 'sigma_x', 'sigma_y', 'extract_ms', 'match_ms',
-           'update_ms', 'latency_ms')
+SOURCES = {'METRIC': '#2166ac', 'PLACE': '#92c5de', 'NONE': '#dddddd'}
+FIGURES = ('inliers', 'sigma_position', 'best_similarity', 'place_ratio', 'comparisons', 'sigma_x', 'sigma_y',
+           'extract_ms', 'match_ms', 'update_ms', 'latency_ms')
 BLUE, ORANGE, GREEN, GREY = '#1f77b4', '#e08214', '#4d9221', '#404040'
 
 
@@ -37,23 +38,27 @@ class History:
         self._seconds = seconds
         self._rows: Deque[Dict[str, float]] = collections.deque()
         self._states: Deque[str] = collections.deque()
+        self._sources: Deque[str] = collections.deque()
         self._lock = threading.Lock()
 
     def add(self, status) -> None:
         """One more status; begins anew when time goes back, as it does when a bag is played again."""
         answers_an_image = status.best_image >= 0
-        # A bag of an older version has no inliers.
+        # A bag of an older version has no inliers and no sigma.
         row = {name: float(getattr(status, name, math.nan)) if answers_an_image else math.nan for name in FIGURES}
         row['stamp'] = status.header.stamp.to_sec()
         with self._lock:
             if self._rows and row['stamp'] < self._rows[-1]['stamp']:
                 self._rows.clear()
                 self._states.clear()
+                self._sources.clear()
             self._rows.append(row)
             self._states.append(status.state_name)
+            self._sources.append(getattr(status, 'source_name', ''))
             while row['stamp'] - self._rows[0]['stamp'] > self._seconds:
                 self._rows.popleft()
                 self._states.popleft()
+                self._sources.popleft()
 
     def columns(self) -> Dict[str, np.ndarray]:
         """The figures by name, and `seconds` since the first image shown; empty without any."""
@@ -64,7 +69,13 @@ class History:
         columns = {name: np.array([row[name] for row in rows]) for name in (*FIGURES, 'stamp')}
         columns['seconds'] = columns['stamp'] - columns['stamp'][0]
         columns['latency_ms'][columns['latency_ms'] == -1] = math.nan  # the image has no stamp
+        columns['sigma_position'][~(columns['sigma_position'] > 0)] = math.nan  # the axis is logarithmic
         return columns
+
+    def sources(self) -> List[str]:
+        """What the pose of every image rests on; empty words in a bag of an older version."""
+        with self._lock:
+            return list(self._sources)
 
     def states(self) -> List[str]:
         """The state's name at every image."""
@@ -73,25 +84,27 @@ class History:
 
 
 class Plot:
-    """The figure: a band of states and a panel for each question."""
+    """The figure: bands of states and sources, and a panel for each question."""
 
     def __init__(self, title: str):
         import matplotlib.pyplot as plt  # after the backend has been chosen
         plt.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False,
                              'axes.edgecolor': '#909090', 'axes.titlelocation': 'left', 'axes.titlesize': 9})
-        self.figure, axes = plt.subplots(7, 1, sharex=True, figsize=(10, 8.8),
-                                         gridspec_kw={'height_ratios': [.35, 1, 1, 1, 1, 1, 1], 'hspace': .38,
-                                                      'left': .055, 'right': .985, 'top': .93, 'bottom': .06})
-        self._band, self._panels = axes[0], axes[1:]
+        self.figure, axes = plt.subplots(9, 1, sharex=True, figsize=(10, 10.6),
+                                         gridspec_kw={'height_ratios': [.35, .2, 1, 1, 1, 1, 1, 1, 1], 'hspace': .4,
+                                                      'left': .055, 'right': .985, 'top': .94, 'bottom': .05})
+        self._state_band, self._source_band, self._panels = axes[0], axes[1], axes[2:]
         self._title = title
         if hasattr(self.figure.canvas.manager, 'set_window_title'):
             self.figure.canvas.manager.set_window_title(title)
 
     def draw(self, history: History) -> None:
         """Everything anew."""
-        columns, states = history.columns(), history.states()
-        states = states[:len(columns['seconds'])] if columns else []
-        for axes in (self._band, *self._panels):
+        columns, states, sources = history.columns(), history.states(), history.sources()
+        count = min(len(columns['seconds']), len(states), len(sources)) if columns else 0
+        columns = {name: column[:count] for name, column in columns.items()}
+        states, sources = states[:count], sources[:count]
+        for axes in (self._state_band, self._source_band, *self._panels):
             axes.clear()
         if not states:
             self.figure.suptitle(f'{self._title}: no status yet', x=.01, y=.985, ha='left', fontsize=12)
@@ -99,10 +112,11 @@ class Plot:
         self.figure.suptitle(f'{self._title}: {states[-1]}', x=.01, y=.985, ha='left', fontsize=12, fontweight='bold',
                              color=COLOURS.get(states[-1], GREY))
         edges = self._edges(columns['seconds'])
-        self._draw_band(edges, states)
+        self._draw_band(self._state_band, edges, states, COLOURS)
+        self._draw_band(self._source_band, edges, sources, SOURCES)
         self._draw_panels(columns)
         for axes in self._panels:
-            self._shade(axes, edges, states, .10)
+            self._shade(axes, edges, states, COLOURS, .10)
             axes.grid(axis='y', color='#d8d8d8', linewidth=.6, zorder=0)
             axes.set_axisbelow(True)
         self._panels[-1].set_xlabel('time [s]')
@@ -115,29 +129,30 @@ class Plot:
         return np.append(seconds, seconds[-1] + max(step, 1e-3))
 
     @staticmethod
-    def _shade(axes, edges: np.ndarray, states: List[str], alpha: float) -> None:
-        """One rectangle for each stretch of the same state."""
+    def _shade(axes, edges: np.ndarray, words: List[str], colours: Dict[str, str], alpha: float) -> None:
+        """One rectangle for each stretch of the same word."""
         begin = 0
-        for i in range(1, len(states) + 1):
-            if i == len(states) or states[i] != states[begin]:
-                axes.axvspan(edges[begin], edges[i], color=COLOURS.get(states[begin], GREY), alpha=alpha, linewidth=0,
+        for i in range(1, len(words) + 1):
+            if i == len(words) or words[i] != words[begin]:
+                axes.axvspan(edges[begin], edges[i], color=colours.get(words[begin], GREY), alpha=alpha, linewidth=0,
                              zorder=0)
                 begin = i
 
-    def _draw_band(self, edges: np.ndarray, states: List[str]) -> None:
-        self._shade(self._band, edges, states, 1.0)
-        self._band.set(yticks=[], ylim=(0, 1))
-        self._band.spines['left'].set_visible(False)
-        present = [state for state in COLOURS if state in states]
-        handles = [matplotlib.patches.Patch(color=COLOURS[state],
-                                            label=f'{state} {100 * states.count(state) / len(states):.0f} %')
-                   for state in present]
-        self._band.legend(handles=handles, loc='lower right', bbox_to_anchor=(1, 1), ncol=len(handles), frameon=False,
-                          borderaxespad=.1, handlelength=1, columnspacing=1.2)
+    def _draw_band(self, axes, edges: np.ndarray, words: List[str], colours: Dict[str, str]) -> None:
+        self._shade(axes, edges, words, colours, 1.0)
+        axes.set(yticks=[], ylim=(0, 1))
+        axes.spines['left'].set_visible(False)
+        present = [word for word in colours if word in words]
+        handles = [matplotlib.patches.Patch(color=colours[word],
+                                            label=f'{word} {100 * words.count(word) / len(words):.0f} %')
+                   for word in present]
+        if handles:
+            axes.legend(handles=handles, loc='lower right', bbox_to_anchor=(1, 1), ncol=len(handles), frameon=False,
+                        borderaxespad=.1, handlelength=1, columnspacing=1.2)
 
     def _draw_panels(self, columns: Dict[str, np.ndarray]) -> None:
         seconds = columns['seconds']
-        inliers, similarity, place, comparisons, sigma, times = self._panels
+        inliers, certainty, similarity, place, comparisons, sigma, times = self._panels
 
         def line(axes, name: str, colour: str, label: Optional[str] = None) -> None:
             marker = '.' if seconds.size < 2 else None
@@ -145,6 +160,10 @@ class Plot:
 
         line(inliers, 'inliers', BLUE)
         inliers.set_title('landmarks that agree with the pose: 0 where it is not metric')
+        line(certainty, 'sigma_position', BLUE)
+        certainty.set_title('sigma of the position [m]: METRIC against the map, PLACE in all')
+        if np.isfinite(columns['sigma_position']).any():
+            certainty.set_yscale('log')
         line(similarity, 'best_similarity', BLUE)
         similarity.set_title('similarity of the best training image')
         line(place, 'place_ratio', BLUE)

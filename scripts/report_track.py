@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Judges and plots a track that record_track.py wrote.
 
-Prints what became of the images, error, cost and states, and draws track, error and state over time as PNG and SVG.
+Prints what became of the images, error, cost and states, and draws track, error and state over time as PNG and SVG;
+with --places also the error of the same drive without landmarks, from what `localize --pose-source place` wrote.
 Exit code 1 when the robot was not localised: no pose, never tracking, or a median error above --max-median-error; and
 when the counts of images do not add up.
 """
@@ -21,6 +22,9 @@ import numpy as np  # noqa: E402
 STATES = ['INITIALIZING', 'TRACKING', 'UNCERTAIN', 'RECOVERING', 'OFF_MAP']
 COLOURS = {'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e', 'RECOVERING': '#d62728',
            'OFF_MAP': '#9467bd'}
+
+
+SOURCES = {'METRIC': '#2166ac', 'PLACE': '#e08214', 'NONE': '#7f7f7f', '': '#1f77b4'}
 
 
 class Track:
@@ -110,6 +114,19 @@ def read_map(path: Optional[Path]) -> Optional[Tuple[np.ndarray, np.ndarray]]:
     return np.array([float(row['east_m']) for row in rows]), np.array([float(row['north_m']) for row in rows])
 
 
+class Places:
+    """The same drive without landmarks: how far each of its poses is from the exact position of the image."""
+
+    def __init__(self, path: Path, track: Track):
+        known = np.flatnonzero(np.isfinite(track.true_east))
+        truth = {round(track.stamps[i], 3): i for i in known}
+        rows = [(truth[round(float(row['stamp']), 3)], row) for row in read_csv(path)
+                if round(float(row['stamp']), 3) in truth]
+        self.seconds = np.array([track.seconds[i] for i, _ in rows])
+        self.error = np.array([math.hypot(float(row['east_m']) - track.true_east[i],
+                                          float(row['north_m']) - track.true_north[i]) for i, row in rows])
+
+
 def summary(track: Track) -> List[str]:
     """What came out, in lines for people."""
     judged = track.error[np.isfinite(track.error)]
@@ -169,11 +186,21 @@ def plot_track(axes: plt.Axes, track: Track, training: Optional[Tuple[np.ndarray
     axes.grid(alpha=.3)
 
 
-def plot_error(axes: plt.Axes, track: Track) -> None:
-    """Error over time; logarithmic, since being lost is worse by magnitudes."""
-    axes.plot(track.seconds, np.maximum(track.error, .01), color='#1f77b4', linewidth=1)
+def plot_error(axes: plt.Axes, track: Track, places: Optional[Places]) -> None:
+    """Error over time, by what the pose rests on; logarithmic, since being lost is worse by magnitudes."""
+    if places is not None and places.error.size:
+        axes.plot(places.seconds, np.maximum(places.error, .01), color='#a0a0a0', linewidth=1,
+                  label=f'without landmarks, median {np.median(places.error):.2f} m')
+    for source, colour in SOURCES.items():
+        chosen = (track.sources == source) & np.isfinite(track.error)
+        if chosen.any():
+            axes.plot(track.seconds[chosen], np.maximum(track.error[chosen], .01), '.', color=colour, markersize=4,
+                      label=f'{source or "pose"}, median {np.median(track.error[chosen]):.2f} m')
     axes.axhline(5, color='black', linewidth=.8, linestyle='--')
     axes.set(yscale='log', ylabel='error [m]', title='Error')
+    if axes.get_legend_handles_labels()[0]:
+        axes.set_ylim(top=6 * axes.get_ylim()[1])  # room for it
+        axes.legend(fontsize='small', loc='upper right')
     axes.grid(alpha=.3, which='both')
 
 
@@ -187,13 +214,14 @@ def plot_states(axes: plt.Axes, track: Track) -> None:
     axes.grid(alpha=.3)
 
 
-def plot(track: Track, training: Optional[Tuple[np.ndarray, np.ndarray]], prefix: Path) -> List[Path]:
+def plot(track: Track, training: Optional[Tuple[np.ndarray, np.ndarray]], places: Optional[Places],
+         prefix: Path) -> List[Path]:
     """Draws everything into PREFIX.png and PREFIX.svg."""
     figure = plt.figure(figsize=(13, 6), constrained_layout=True)
     grid = figure.add_gridspec(2, 2, width_ratios=[1.3, 1], height_ratios=[1.6, 1])
     plot_track(figure.add_subplot(grid[:, 0]), track, training)
     over_time = figure.add_subplot(grid[0, 1])
-    plot_error(over_time, track)
+    plot_error(over_time, track, places)
     plot_states(figure.add_subplot(grid[1, 1], sharex=over_time), track)
     paths = [prefix.with_name(prefix.name + suffix) for suffix in ('.png', '.svg')]
     for path in paths:
@@ -208,6 +236,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('track', type=Path, help='CSV that record_track.py wrote')
     parser.add_argument('--counts', type=Path, help='JSON that record_track.py wrote (default: beside the track)')
     parser.add_argument('--map-csv', type=Path, help='what map_info --export-csv wrote')
+    parser.add_argument('--places', type=Path, help='what localize --pose-source place wrote of the same drive')
     parser.add_argument('--plot', type=Path, help='path of the plots without suffix (default: beside the track)')
     parser.add_argument('--max-median-error', type=float, default=10.0, help='metres (default: %(default)s)')
     return parser.parse_args()
@@ -223,7 +252,8 @@ def main() -> int:
     track = Track(rows)
     counts = Counts(args.counts or args.track.with_suffix('.json'))
     print('\n'.join([counts.line()] + summary(track)))
-    paths = plot(track, read_map(args.map_csv), args.plot or args.track.with_suffix(''))
+    places = Places(args.places, track) if args.places else None
+    paths = plot(track, read_map(args.map_csv), places, args.plot or args.track.with_suffix(''))
     print('plot             ' + ' and '.join(str(path) for path in paths))
     if counts.dropped or counts.never_received:
         print('report_track: images came faster than this machine takes them; play the bag slower', file=sys.stderr)

@@ -2,9 +2,12 @@
 
 #include <chrono>
 #include <cstddef>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "base/files.h"
 
 /// What several programs share.
 namespace visual_localization::apps {
@@ -17,6 +20,30 @@ class UsageError : public std::runtime_error {
 
 /// Throws UsageError, naming the option, when the file to write is one of the files to read.
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
+
+/// Files that belong together, in a folder of their own: all of them, or none and no folder either.
+class NewFolder {
+ public:
+  /// Makes the folder unless it is there and empty. Throws FileError when it cannot or something is in it.
+  explicit NewFolder(std::string path);
+  ~NewFolder();
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+
+  /// Another file in it, empty. Throws FileError.
+  PartialFile& add(const std::string& name);
+  /// Puts all files in their places. Throws FileError.
+  void commit();
+
+ private:
+  std::string pathOf(const std::string& name) const;
+
+  std::string path_;
+  bool made_ = false;
+  bool committed_ = false;
+  std::vector<std::string> names_;
+  std::vector<std::unique_ptr<PartialFile>> files_;
+};
 
 /// "1.2 kB", "3.4 MB".
 std::string humanSize(double bytes);

@@ -77,13 +77,14 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--min-spacing", options.min_spacing_m,
                  "Metres between training images of a session, before the adjustment (parameter 'map/min_spacing')");
   app.add_option("--spacing", options.spacing_m,
-                 "Metres between training images that are kept after the adjustment (parameter 'map/spacing')");
+                 "Metres between training images that are kept after the adjustment (parameters 'map/spacing', "
+                 "'geometry/spacing')");
   app.add_option("--threads", options.threads, "Threads for extraction; the map does not depend on it")
       ->check(CLI::Range(std::size_t{1}, kMostThreads))
       ->capture_default_str();
   app.add_option("--sift-backend", options.sift_backend, "'native' or 'opencv' (parameter 'map/sift_backend')");
   app.add_option("--plot", options.plot,
-                 "Draw fixes and cleaned path of each session into this PNG, SVG or PDF, by the ending")
+                 "Draw fixes, path and landmarks of each session into this PNG, SVG or PDF, by the ending")
       ->check(must(isPicture, "end in .png, .svg or .pdf"));
 }
 
@@ -97,6 +98,9 @@ void declareOptions(CLI::App& app, MapInfoOptions& options) {
       ->capture_default_str();
   app.add_option("--export-geojson", options.geojson, "Write paths, weak stretches and images as GeoJSON (WGS84)");
   app.add_option("--export-csv", options.csv, "Write one line per image");
+  app.add_option("--export-colmap", options.colmap,
+                 "Write cameras, poses and landmarks into this new folder for COLMAP")
+      ->check(must([](const std::string& path) { return !path.empty(); }, "name a folder"));
 }
 
 void declareOptions(CLI::App& app, LocalizeOptions& options) {

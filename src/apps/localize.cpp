@@ -66,6 +66,8 @@ struct Totals {
   std::size_t images = 0;
   std::size_t unusable = 0;
   std::size_t tracking = 0;
+  std::size_t metric = 0;
+  std::string camera_trouble;
   double comparisons = 0.0;
   double swept = 0.0;
   double extract_ms = 0.0;
@@ -75,6 +77,8 @@ struct Totals {
   void add(const Estimate& estimate) {
     ++images;
     if (estimate.state == LocalizationState::kTracking) ++tracking;
+    if (estimate.source == PoseSource::kMetric) ++metric;
+    camera_trouble = estimate.cameraTrouble();
     comparisons += static_cast<double>(estimate.comparisons);
     swept += static_cast<double>(estimate.swept);
     extract_ms += estimate.image.extract_ms;
@@ -85,8 +89,9 @@ struct Totals {
 
 void print(const Totals& totals) {
   const auto images = static_cast<double>(totals.images);
-  std::printf("images %zu, not usable %zu, TRACKING %.1f %%\n", totals.images, totals.unusable,
-              100.0 * static_cast<double>(totals.tracking) / images);
+  std::printf("images %zu, not usable %zu, TRACKING %.1f %%, METRIC %.1f %%\n", totals.images, totals.unusable,
+              100.0 * static_cast<double>(totals.tracking) / images,
+              100.0 * static_cast<double>(totals.metric) / images);
   std::printf("comparisons per image %.1f, swept %.1f\n", totals.comparisons / images, totals.swept / images);
   std::printf("ms per image %.2f (extract %.2f, match %.2f, update %.3f)\n",
               (totals.extract_ms + totals.match_ms + totals.update_ms) / images, totals.extract_ms / images,
@@ -129,9 +134,20 @@ std::optional<cv::Size> recordedSize(const BagImages& images) {
   return std::nullopt;
 }
 
+/// Where the drive's robot carries its camera: as the parameter says, the bag, or the map.
+void setMount(const LocalizeOptions& options, const NodeConfig& config, const BagReader& bag, Localizer& localizer) {
+  std::optional<SensorMount> mount = bag.mount(options.image_topic, "", config.base_frame_id);
+  if (!config.camera_mount.empty()) mount.emplace().camera = parseCameraMount(config.camera_mount);
+  if (!mount) return;
+  localizer.setMount(*mount);
+  std::printf("robot: camera at %.2f %.2f %.2f m in %s\n", mount->camera.position_m.x(), mount->camera.position_m.y(),
+              mount->camera.position_m.z(), config.base_frame_id.c_str());
+}
+
 /// Gives the localizer the camera and the mask that belong to the drive: those of the options, the calibration in the
 /// bag, or the map's. Says which.
-void setCamera(const LocalizeOptions& options, const BagReader& bag, const BagImages& images, Localizer& localizer) {
+void setCamera(const LocalizeOptions& options, const NodeConfig& config, const BagReader& bag, const BagImages& images,
+               Localizer& localizer) {
   const std::optional<cv::Size> size = recordedSize(images);
   std::string from = "the map";
   const std::optional<CameraModel> of_map = localizer.camera();
@@ -150,6 +166,7 @@ void setCamera(const LocalizeOptions& options, const BagReader& bag, const BagIm
     std::printf("camera: no calibration (no camera_info, no --camera-info, none in the map): places only\n");
     return;
   }
+  setMount(options, config, bag, localizer);
   std::printf("camera: %s, from %s\n", describe(camera ? *camera : *localizer.camera()).c_str(), from.c_str());
   const std::string other = of_map ? differences(*localizer.camera(), *of_map) : "";
   if (!other.empty()) std::printf("camera: not the map's: %s\n", other.c_str());
@@ -165,7 +182,7 @@ void run(const LocalizeOptions& options) {
   const BagReader bag(options.bag);
   const BagImages images = bag.images(options.image_topic);
   const std::vector<std::size_t> order = orderOf(options, images.size());
-  setCamera(options, bag, images, localizer);
+  setCamera(options, config.node, bag, images, localizer);
   std::optional<Trajectory> truth;
   if (!options.truth_topic.empty()) truth = trueTrajectory(bag, options.truth_topic, localizer.map().frame());
 
@@ -192,6 +209,7 @@ void run(const LocalizeOptions& options) {
   output.commit();
   if (!first_refusal.empty())
     std::cerr << "localize: " << totals.unusable << " images skipped, first " << first_refusal << '\n';
+  if (!totals.camera_trouble.empty()) std::cerr << "localize: camera: " << totals.camera_trouble << '\n';
   print(totals);
   if (truth) print(summarise(std::move(errors_m)));
 }

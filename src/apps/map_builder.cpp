@@ -19,6 +19,7 @@
 #include "ros/camera_info.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/features/front_end.h"
+#include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/image_conversion.h"
 
@@ -44,7 +45,10 @@ MapBuilderConfig readConfig(const MapBuilderOptions& options) {
     }
   }
   if (options.min_spacing_m) overrideWith(config, "--min-spacing", "map/min_spacing", *options.min_spacing_m);
-  if (options.spacing_m) overrideWith(config, "--spacing", "map/spacing", *options.spacing_m);
+  if (options.spacing_m) {
+    overrideWith(config, "--spacing", "map/spacing", *options.spacing_m);
+    overrideWith(config, "--spacing", "geometry/spacing", *options.spacing_m);
+  }
   if (options.sift_backend) overrideWith(config, "--sift-backend", "map/sift_backend", *options.sift_backend);
   return config;
 }
@@ -97,19 +101,32 @@ void addImages(MapBuilder& builder, const BagReader& bag, const std::string& top
   }
 }
 
+/// That of the parameters, or of the bag.
+std::optional<SensorMount> mountOf(const BagReader& bag, const MapBuilderOptions& options,
+                                   const MapBuilderConfig& config) {
+  std::optional<SensorMount> mount = bag.mount(options.image_topic, options.fix_topic, config.base_frame);
+  if (config.camera_mount.empty() && config.antenna_mount.empty()) return mount;
+  SensorMount given = mount.value_or(SensorMount());
+  if (!config.camera_mount.empty()) given.camera = parseCameraMount(config.camera_mount);
+  if (!mount) given.antenna_m = given.camera.position_m;
+  if (!config.antenna_mount.empty()) given.antenna_m = parseAntennaMount(config.antenna_mount);
+  return given;
+}
+
 /// That of the option, or of the bag.
-SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options) {
+SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options, const MapBuilderConfig& config) {
   SessionCamera camera;
+  camera.mount = mountOf(bag, options, config);
   camera.model = options.camera_info.empty() ? bag.camera(options.image_topic) : readCameraFile(options.camera_info);
   if (!options.mask.empty()) camera.mask = readMask(options.mask);
   return camera;
 }
 
 void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOptions& options,
-                std::vector<PlottedSession>& sessions) {
+                const MapBuilderConfig& config, std::vector<PlottedSession>& sessions) {
   const BagReader bag(path);
-  PlottedSession session{sessionName(path, sessions), bag.fixes(options.fix_topic), {}, {}};
-  const SessionCamera camera = cameraOf(bag, options);
+  PlottedSession session{sessionName(path, sessions), bag.fixes(options.fix_topic), {}};
+  const SessionCamera camera = cameraOf(bag, options, config);
   try {
     builder.beginSession(session.name, session.fixes, camera);
   } catch (const std::exception& error) {
@@ -145,13 +162,19 @@ void printCamera(const SessionImages& session, const MapBuilderOptions& options)
   std::cout << '\n';
 }
 
+void printMount(const SessionImages& session) {
+  if (!session.camera.mount) return;
+  std::cout << session.name << ": " << describe(*session.camera.mount) << '\n';
+}
+
 void printGeometry(const SessionImages& session) {
   const SessionLandmarks& geometry = session.geometry;
   if (!session.camera.model) return;
   if (geometry.contradicts_calibration) {
     std::cout << session.name << ": the images contradict the calibration (they ask for "
-              << 100.0 * geometry.focal_scale << " % of its focal length and move " << 100.0 * geometry.far_share
-              << " % of the images by more than 3 m): a map of places\n";
+              << 100.0 * geometry.focal_scale << " % of its focal length, move " << 100.0 * geometry.far_share
+              << " % of the images by more than 3 m, and explain " << 100.0 * geometry.agreeing_share
+              << " % of the matched features): a map of places\n";
     return;
   }
   std::cout << session.name << ": " << geometry.images << " of " << session.kept
@@ -159,8 +182,12 @@ void printGeometry(const SessionImages& session) {
             << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
             << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "
             << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
-            << " % of the calibration's\n"
-            << std::setprecision(1);
+            << " % of the calibration's\n";
+  if (geometry.tied_apart_m > 0.0) {
+    std::cout << session.name << ": tied to the sessions before, which had the same " << geometry.tied_apart_m
+              << " m away\n";
+  }
+  std::cout << std::setprecision(1);
 }
 
 /// What one session brought, and whether its images were distorted to fit.
@@ -189,6 +216,7 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
                  const std::vector<PlottedSession>& sessions) {
   std::cout << std::fixed << std::setprecision(1);
   for (const SessionImages& session : report.session_images) printCamera(session, options);
+  for (const SessionImages& session : report.session_images) printMount(session);
   for (const PlottedSession& session : sessions) printFixes(session);
   for (const SessionImages& session : report.session_images) printGeometry(session);
   if (sessions.size() > 1) printSessionImages(report.session_images);
@@ -240,8 +268,9 @@ void requireOutputs(const MapBuilderOptions& options) {
 }
 
 /// The map is written whatever becomes of its plot.
-void draw(const MapBuilderOptions& options, const std::vector<PlottedSession>& sessions, const LocalFrame& frame) {
+void draw(const MapBuilderOptions& options, std::vector<PlottedSession>& sessions, const LocalFrame& frame) {
   try {
+    addMap(*loadMap(options.output), sessions);
     drawMapPlot(options.plot, sessions, frame);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(error.what() + ("; the map is written without a plot: " + options.output));
@@ -254,7 +283,7 @@ void buildMap(const MapBuilderOptions& options) {
   requireOutputs(options);
   MapBuilder builder(config, {options.threads, options.output});
   std::vector<PlottedSession> sessions;
-  for (const std::string& bag : options.bags) addSession(builder, bag, options, sessions);
+  for (const std::string& bag : options.bags) addSession(builder, bag, options, config, sessions);
   {
     ProgressBar bar("pruning features");
     builder.save(options.output, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
@@ -262,9 +291,6 @@ void buildMap(const MapBuilderOptions& options) {
   printReport(options, builder.report(), sessions);
   printSummary(options, builder.report(),
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  for (std::size_t s = 0; s < sessions.size(); ++s) {
-    sessions[s].images_m = builder.report().session_images[s].positions_m;
-  }
   if (!options.plot.empty()) draw(options, sessions, builder.frame());
 }
 

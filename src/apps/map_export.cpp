@@ -6,11 +6,14 @@
 #include <cstdlib>
 #include <iomanip>
 #include <sstream>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "apps/app_support.h"
+#include "apps/colmap_model.h"
 #include "base/text.h"
 #include "base/time.h"
 
@@ -160,6 +163,18 @@ std::string toGeoJson(const TrainingMap& map, const MapFindings& findings) {
   addGaps(map, findings, features);
   addImages(map, findings, features);
   return features.text();
+}
+
+ColmapSummary writeColmap(const TrainingMap& map, const std::string& folder) {
+  NewFolder files(folder);
+  ColmapModel model(map);
+  files.add("cameras.txt").write(model.cameras());
+  PartialFile& images = files.add("images.txt");
+  for (std::size_t i = 0; i < map.size(); ++i) images.write(model.image(i));
+  files.add("points3D.txt").write(model.points());
+  if (model.summary().points == 0) throw std::runtime_error(folder + ": not written: the map has no landmarks");
+  files.commit();
+  return model.summary();
 }
 
 }  // namespace visual_localization::apps

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/colmap_model.h"
 #include "survey/ambiguous_places.h"
 #include "survey/landmark_survey.h"
 #include "survey/map_survey.h"
@@ -24,5 +25,10 @@ std::string toCsv(const TrainingMap& map, const MapFindings& findings);
 
 /// The path of each session, weak stretches and gaps as lines, the images as points; WGS84.
 std::string toGeoJson(const TrainingMap& map, const MapFindings& findings);
+
+/// Writes a COLMAP text model into a folder that is new or empty: a camera for each calibrated session, the images with
+/// a geometry as SESSION/STAMP.png, the landmarks as points, in metres of the map frame. Throws std::runtime_error, in
+/// one line, when something is in the folder, the map has no landmarks or cannot be read; then it leaves nothing.
+ColmapSummary writeColmap(const TrainingMap& map, const std::string& folder);
 
 }  // namespace visual_localization::apps

@@ -1,6 +1,8 @@
 #include <filesystem>
+#include <iomanip>
 #include <iostream>
 #include <limits>
+#include <sstream>
 #include <string>
 
 #include "apps/app_support.h"
@@ -25,11 +27,22 @@ std::size_t mostImages(const MapInfoOptions& options) {
   return options.check || in_memory ? std::numeric_limits<std::size_t>::max() : kMostOfALargeMap;
 }
 
+/// In the folder that was asked for; the line that says so.
+std::string exportColmap(const TrainingMap& map, const std::string& folder) {
+  const ColmapSummary model = writeColmap(map, folder);
+  std::ostringstream text;
+  text << "\ncolmap:      " << model.cameras << (model.cameras == 1 ? " camera, " : " cameras, ") << model.images
+       << " images, " << model.points << " points, " << model.observations << " observations, mean reprojection error "
+       << std::setprecision(6) << model.error_px << " px\n";
+  return text.str();
+}
+
 void showMap(const MapInfoOptions& options) {
   if (!options.geojson.empty()) requireNoInput("--export-geojson", options.geojson, {options.map});
   if (!options.csv.empty()) requireNoInput("--export-csv", options.csv, {options.map});
   if (options.check) checkMap(options.map);
   const auto map = loadMap(options.map);
+  const std::string exported = options.colmap.empty() ? "" : exportColmap(*map, options.colmap);
   MapFindings findings;
   findings.config.few_features = options.few_features;
   findings.survey = survey(*map, findings.config);
@@ -37,6 +50,7 @@ void showMap(const MapInfoOptions& options) {
   if (options.ambiguity) findings.ambiguity = lookForAmbiguousPlaces(*map);
   printMapReport(std::cout, options.map, *map, findings);
   if (options.check) std::cout << "\ncheck:       ok\n";
+  std::cout << exported;
   if (!options.geojson.empty()) writeFile(options.geojson, toGeoJson(*map, findings));
   if (!options.csv.empty()) writeFile(options.csv, toCsv(*map, findings));
 }

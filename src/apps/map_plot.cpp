@@ -8,6 +8,7 @@
 
 #include "apps/app_support.h"
 #include "base/files.h"
+#include "survey/landmark_points.h"
 
 namespace visual_localization::apps {
 namespace {
@@ -18,6 +19,12 @@ constexpr std::array<FixVerdict, 5> kVerdicts{FixVerdict::kKept, FixVerdict::kNo
                                               FixVerdict::kSpike, FixVerdict::kMultipath};
 
 json toJson(const Eigen::Vector2d& position_m) { return {position_m.x(), position_m.y()}; }
+
+json toJson(const std::vector<Eigen::Vector2d>& positions_m) {
+  json all = json::array();
+  for (const Eigen::Vector2d& position_m : positions_m) all.push_back(toJson(position_m));
+  return all;
+}
 
 /// Where a fix is drawn: one without usable coordinates where the robot was.
 std::optional<Eigen::Vector2d> positionOf(const Fix& fix, FixVerdict verdict, const Trajectory& path,
@@ -55,17 +62,27 @@ json pathsOf(const Trajectory& trajectory) {
 json toJson(const PlottedSession& session, const LocalFrame& frame) {
   json fixes;
   for (const FixVerdict verdict : kVerdicts) fixes[toString(verdict)] = fixesOf(session, verdict, frame);
-  json images = json::array();
-  for (const Eigen::Vector2d& position_m : session.images_m) images.push_back(toJson(position_m));
   return {{"name", session.name},
           {"fixes", fixes},
           {"paths_m", pathsOf(session.cleaned.trajectory)},
           {"length_m", session.cleaned.trajectory.length()},
           {"gaps_closed", session.cleaned.gaps_closed},
-          {"images_m", images}};
+          {"images_m", toJson(session.images_m)},
+          {"landmarks_m", toJson(session.landmarks_m)}};
 }
 
 }  // namespace
+
+void addMap(const TrainingMap& map, std::vector<PlottedSession>& sessions) {
+  constexpr std::size_t kMostImages = 5000;
+  constexpr std::size_t kMostLandmarks = 20000;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    sessions.at(static_cast<std::size_t>(map.pose(i).session)).images_m.push_back(map.position_m(i));
+  }
+  for (const LandmarkPoint& landmark : landmarkPoints(map, kMostImages, kMostLandmarks)) {
+    sessions.at(static_cast<std::size_t>(landmark.session)).landmarks_m.emplace_back(landmark.position_m.head<2>());
+  }
+}
 
 std::string mapPlotJson(const std::vector<PlottedSession>& sessions, const LocalFrame& frame) {
   json all = json::array();

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "test/support/example_map.h"
 #include "test/support/temporary_folder.h"
 
 namespace visual_localization::apps {
@@ -25,7 +26,7 @@ Fix fixAt(int second) {
 }
 
 PlottedSession sessionOf(const std::vector<Fix>& fixes) {
-  return {"monday", fixes, cleanTrajectory(fixes, kFrame, {}), {{0.5, 1.25}, {0.5, 2.25}}};
+  return {"monday", fixes, cleanTrajectory(fixes, kFrame, {}), {{0.5, 1.25}, {0.5, 2.25}}, {{3.5, 4.5}}};
 }
 
 std::vector<Fix> fixesUntil(int seconds) {
@@ -47,6 +48,7 @@ TEST(MapPlot, DescribesASession) {
   const json shown = drawn(session);
   EXPECT_EQ(shown.at("name"), "monday");
   EXPECT_EQ(shown.at("images_m"), json::parse("[[0.5, 1.25], [0.5, 2.25]]"));
+  EXPECT_EQ(shown.at("landmarks_m"), json::parse("[[3.5, 4.5]]"));
   EXPECT_DOUBLE_EQ(shown.at("length_m").get<double>(), session.cleaned.trajectory.length());
   EXPECT_EQ(shown.at("gaps_closed"), 0);
   ASSERT_EQ(shown.at("paths_m").size(), 1U);
@@ -93,6 +95,19 @@ TEST(MapPlot, APathThatIsLeftOpenHasSeveralParts) {
   EXPECT_EQ(drawn(session).at("paths_m"), json::parse("[[[0, 0], [0, 1], [0, 2], [0, 30], [0, 31]]]"));
   session.cleaned.trajectory = Trajectory(points, 5.0);
   EXPECT_EQ(drawn(session).at("paths_m"), json::parse("[[[0, 0], [0, 1], [0, 2]], [[0, 30], [0, 31]]]"));
+}
+
+TEST(MapPlot, TakesImagesAndLandmarksOfEachSessionFromTheMap) {
+  std::vector<PlottedSession> sessions(2);
+  const TrainingMap map(test::exampleHeader(), test::exampleImages(6));
+  addMap(map, sessions);
+  ASSERT_EQ(sessions[0].images_m.size(), 3U);
+  ASSERT_EQ(sessions[1].images_m.size(), 3U);
+  EXPECT_EQ(sessions[1].images_m[0], map.position_m(3));
+  EXPECT_EQ(sessions[0].landmarks_m.size(), 20U) << "of two images, ten each";
+  const ImageGeometry& geometry = *map.geometry(4);
+  EXPECT_EQ(sessions[1].landmarks_m[0],
+            Eigen::Vector2d((geometry.camera.position_m + geometry.landmarks[0].offset_m.cast<double>()).head<2>()));
 }
 
 TEST(MapPlot, RepairsNamesThatAreNotUtf8) {

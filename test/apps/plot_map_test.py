@@ -21,7 +21,7 @@ def session(name: str = 'monday', east: float = 0.0, **fixes) -> dict:
     """A session of 20 m due north with five training images; fixes by verdict, 'no_fix' for 'no fix'."""
     path = [[east, float(north)] for north in range(21)]
     given = {verdict: fixes.get(verdict.replace(' ', '_'), []) for verdict in VERDICTS}
-    return {'name': name, 'paths_m': [path], 'images_m': path[::5], 'length_m': 20.0, 'gaps_closed': 1,
+    return {'name': name, 'paths_m': [path], 'images_m': path[::5], 'landmarks_m': [], 'length_m': 20.0, 'gaps_closed': 1,
             'fixes': {verdict: {'count': len(rows), 'positions_m': rows} for verdict, rows in given.items()}}
 
 
@@ -104,6 +104,15 @@ class PlotMapTest(unittest.TestCase):
         colours = [text.get_color() for text in panel.get_legend().get_texts()]
         self.assertNotEqual(colours[1], colours[2])
         self.assertEqual(colours[2], colours[4])
+
+    def test_landmarks_are_dots_and_those_far_off_are_left_out(self):
+        one = dict(session(), landmarks_m=[[1, 1], [-1, 19], [500, 3]], images_m=[[.3, 0], [.3, 10]])
+        panel, = self.draw(one)
+        self.assertEqual(self.marks(panel, 'landmarks_0'), [[1, 1], [-1, 19]])
+        self.assertEqual(self.marks(panel, 'images_0'), [[.3, 0], [.3, 10]])
+        self.assertIn('landmarks', self.legend(panel))
+        self.assertIn('2 training images, adjusted', self.legend(panel))
+        self.assertEqual(self.paths(panel, plot_map.SESSION_COLOURS[0]), [], 'the cleaned path is dashed')
 
     def test_a_path_that_was_left_open_is_not_closed(self):
         one = session()

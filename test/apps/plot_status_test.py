@@ -27,7 +27,7 @@ Status = genpy.dynamic.generate_dynamic(TYPE, '\n'.join((
 def status_at(seconds: float, state: str = 'TRACKING', **figures: float):
     """A plausible status."""
     status = Status(state=getattr(Status, state), state_name=state, best_image=7, best_similarity=.2, place_ratio=.99,
-                    comparisons=20, sigma_x=1.5, sigma_y=.8, extract_ms=9.0, match_ms=4.0, update_ms=.3, latency_ms=15.0)
+                    source_name='METRIC', inliers=50, sigma_position=.04, comparisons=20, sigma_x=1.5, sigma_y=.8, extract_ms=9.0, match_ms=4.0, update_ms=.3, latency_ms=15.0)
     status.header.stamp = rospy.Time.from_sec(seconds)
     for name, figure in figures.items():
         setattr(status, name, figure)
@@ -75,6 +75,16 @@ class HistoryTest(unittest.TestCase):
         self.assertTrue(math.isnan(history.columns()['comparisons'][0]))
         self.assertEqual(history.states(), ['UNCERTAIN'])
 
+    def test_sources_and_sigma_are_remembered(self):
+        history = plot_status.History(seconds=10)
+        history.add(status_at(0.0))
+        history.add(status_at(15.0, source_name='PLACE', sigma_position=2.0))
+        history.add(status_at(16.0, source_name='NONE', sigma_position=0.0))
+        self.assertEqual(history.sources(), ['PLACE', 'NONE'])
+        sigma = history.columns()['sigma_position']
+        self.assertEqual(sigma[0], 2.0)
+        self.assertTrue(math.isnan(sigma[1]), 'the axis is logarithmic')
+
     def test_nothing_came_yet(self):
         self.assertEqual(plot_status.History().columns(), {})
 
@@ -105,9 +115,10 @@ class PlotTest(unittest.TestCase):
             self.assertIn(word, result.stderr.splitlines()[-1])
         self.assertEqual([path.name for path in self.folder.iterdir() if path.suffix != '.bag'], [])
 
-    def share_of(self, state: str) -> float:
-        """Of the picture's pixels, how many have the full colour of a state."""
-        wanted = [int(plot_status.COLOURS[state][i:i + 2], 16) / 255 for i in (1, 3, 5)]
+    def share_of(self, word: str) -> float:
+        """Of the picture's pixels, how many have the full colour of a state or a source."""
+        colour = {**plot_status.COLOURS, **plot_status.SOURCES}[word]
+        wanted = [int(colour[i:i + 2], 16) / 255 for i in (1, 3, 5)]
         return (abs(matplotlib.image.imread(str(self.output))[:, :, :3] - wanted).max(axis=2) < .01).mean()
 
     def test_states_are_drawn_in_proportion(self):
@@ -118,6 +129,16 @@ class PlotTest(unittest.TestCase):
         self.assertAlmostEqual(self.share_of('TRACKING') / self.share_of('RECOVERING'), 2.0, delta=.3)
         self.assertEqual(self.share_of('OFF_MAP'), 0.0)
         self.assertEqual(sorted(path.name for path in self.folder.iterdir()), ['drive.bag', 'status.png'])
+
+    def test_sources_are_drawn(self):
+        with rosbag.Bag(str(self.bag), 'w') as bag:
+            for second in range(20):
+                source = 'METRIC' if second < 15 else 'PLACE'
+                bag.write(TOPIC, status_at(1000.0 + second, source_name=source), rospy.Time(1000 + second))
+        result = self.plot()
+        self.assertEqual((result.returncode, result.stderr), (0, ''))
+        self.assertGreater(self.share_of('METRIC'), 2 * self.share_of('PLACE'))
+        self.assertGreater(self.share_of('PLACE'), 0.0)
 
     def test_one_image_is_enough(self):
         self.record(['OFF_MAP'])

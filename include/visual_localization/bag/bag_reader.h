@@ -14,6 +14,7 @@
 
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/ros/image_error.h"
 
 namespace visual_localization {
@@ -74,6 +75,12 @@ class BagReader {
   /// them, by image_transport's naming. Nothing when the bag has none or the camera is not calibrated. Throws BagError
   /// when the calibration cannot be used, or when it changes within the bag: then it holds for a part of the images.
   std::optional<CameraModel> camera(const std::string& image_topic) const;
+
+  /// Where the robot carries camera and antenna, as /tf_static in the bag tells: the frames of the first image and of
+  /// the first fix in `base_frame`. An antenna whose frame is not there is taken to be at the camera. Nothing without
+  /// either frame. Throws BagError when they cannot be used.
+  std::optional<SensorMount> mount(const std::string& image_topic, const std::string& fix_topic,
+                                   const std::string& base_frame) const;
 
   const std::string& path() const { return path_; }
 
