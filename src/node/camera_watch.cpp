@@ -27,7 +27,13 @@ CameraWatch::CameraWatch(ros::NodeHandle node, const NodeConfig& config, const s
       diagnostics_(diagnostics),
       say_(std::move(say)),
       topic_(cameraInfoTopic(image_topic)),
-      rectified_(isRectified(image_topic)) {
+      rectified_(isRectified(image_topic)),
+      base_frame_(config.base_frame_id) {
+  if (!config.camera_mount.empty()) {
+    SensorMount mount;
+    mount.camera = parseCameraMount(config.camera_mount);
+    localizer_.setMount(mount);
+  }
   if (!config.mask_file.empty()) {
     localizer_.setMask(ofParameter("mask_file", [&config] { return readMask(config.mask_file); }));
   }
@@ -36,10 +42,41 @@ CameraWatch::CameraWatch(ros::NodeHandle node, const NodeConfig& config, const s
   report();
   // Last: from here on another thread calls.
   if (file.empty()) subscriber_ = node.subscribe(topic_, 1, &CameraWatch::onCameraInfo, this);
+  if (config.camera_mount.empty()) {
+    static_transforms_ = node.subscribe("/tf_static", 100, &CameraWatch::onStaticTransforms, this);
+  }
+}
+
+void CameraWatch::onStaticTransforms(const tf2_msgs::TFMessageConstPtr& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  transforms_.add(*message);
+  findMount();
+}
+
+/// Once the frame of the camera is known, and the way to it from that of the robot.
+void CameraWatch::findMount() {
+  const auto pose = transforms_.pose(base_frame_, camera_frame_);
+  if (!pose) return;
+  SensorMount mount;
+  mount.camera = {Eigen::Quaterniond(pose->linear()).normalized(), pose->translation()};
+  const bool known = mount_ && mount_->camera.position_m == mount.camera.position_m &&
+                     mount_->camera.rotation.coeffs() == mount.camera.rotation.coeffs();
+  if (known) return;
+  mount_ = mount;
+  try {
+    localizer_.setMount(mount);
+    say_(false, "The robot carries the camera as " + base_frame_ + " to " + camera_frame_ + " on /tf_static says");
+  } catch (const MountError& error) {
+    say_(true, "Mount of the camera refused: /tf_static: " + std::string(error.what()));
+  }
 }
 
 void CameraWatch::onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (info->header.frame_id != camera_frame_) {
+    camera_frame_ = info->header.frame_id;
+    findMount();
+  }
   if (last_ && sameCalibration(*info, *last_)) return;  // comes with every image
   last_ = info;
   try {

@@ -12,14 +12,16 @@
 #include "node/localizer_diagnostics.h"
 #include "node/node_config.h"
 #include "node/shared_localizer.h"
+#include "ros/static_transforms.h"
 #include "visual_localization/camera/camera_model.h"
+#include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 
 /// Keeps the localizer informed about the camera: its calibration, from a file or from the topic beside the images, and
-/// its mask. Says once each what it uses and how that differs from the map's camera. A calibration that cannot be used
-/// changes nothing.
+/// its mask, and where the robot carries it: from a parameter or from /tf_static. Says once each what it uses and how
+/// that differs from the map's camera. A calibration or a mount that cannot be used changes nothing.
 class CameraWatch {
  public:
   /// Tells people something; `warning`: it needs their attention.
@@ -29,7 +31,10 @@ class CameraWatch {
   /// Throws ParameterError, naming the parameter, when a file cannot be used. The others must outlive it.
   CameraWatch(ros::NodeHandle node, const NodeConfig& config, const std::string& image_topic,
               SharedLocalizer& localizer, LocalizerDiagnostics& diagnostics, Say say);
-  ~CameraWatch() { subscriber_.shutdown(); }
+  ~CameraWatch() {
+    subscriber_.shutdown();
+    static_transforms_.shutdown();
+  }
   CameraWatch(const CameraWatch&) = delete;
   CameraWatch& operator=(const CameraWatch&) = delete;
 
@@ -38,6 +43,8 @@ class CameraWatch {
 
  private:
   void onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info);
+  void onStaticTransforms(const tf2_msgs::TFMessageConstPtr& message);
+  void findMount();
   void use(const CameraModel& camera, const std::string& source);
   void refuse(const std::string& reason);
   void compareWithMap();
@@ -56,7 +63,12 @@ class CameraWatch {
   std::string source_;
   std::string trouble_;
   std::string said_;  ///< about the difference from the map's camera
+  std::string base_frame_;
+  std::string camera_frame_;
+  StaticTransforms transforms_;
+  std::optional<SensorMount> mount_;
   ros::Subscriber subscriber_;
+  ros::Subscriber static_transforms_;
 };
 
 }  // namespace visual_localization

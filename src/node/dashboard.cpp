@@ -25,7 +25,7 @@ constexpr int kCurveRight = kWidth - kMargin;
 const cv::Scalar kBackground(30, 26, 24);
 const cv::Scalar kFaint(120, 112, 108);
 const cv::Scalar kLabel(190, 184, 180);
-const cv::Scalar kBright(250, 250, 250);
+const cv::Scalar kBrightColour(250, 250, 250);
 const cv::Scalar kCurve(235, 190, 110);
 
 using Statuses = std::deque<LocalizationStatus>;
@@ -99,11 +99,11 @@ std::vector<Row> rowsOf(const LocalizationStatus& now) {
 
 void drawHeader(cv::Mat& canvas, const LocalizationStatus& now) {
   cv::rectangle(canvas, {0, 0, kWidth, kHeader}, colourOfState(now.state), cv::FILLED);
-  write(canvas, now.state_name, kMargin, 48, 1.25, kBright, Align::kLeft, 3);
+  write(canvas, now.state_name, kMargin, 48, 1.25, kBrightColour, Align::kLeft, 3);
   const std::string lost =
       std::to_string(now.images_dropped) + " dropped, " + std::to_string(now.images_refused) + " refused";
-  write(canvas, "image " + std::to_string(now.images_processed), kCurveRight, 31, 0.65, kBright, Align::kRight);
-  write(canvas, lost, kCurveRight, 56, 0.55, kBright, Align::kRight);
+  write(canvas, "image " + std::to_string(now.images_processed), kCurveRight, 31, 0.65, kBrightColour, Align::kRight);
+  write(canvas, lost, kCurveRight, 56, 0.55, kBrightColour, Align::kRight);
 }
 
 /// From zero to the largest of the shown figures.
@@ -119,12 +119,12 @@ void drawCurve(cv::Mat& canvas, const Statuses& statuses, const Figure& figure, 
     points.emplace_back(columnOf(i, statuses.size()), bottom - cvRound(height));
   }
   cv::polylines(canvas, points, false, kCurve, 2, cv::LINE_AA);
-  cv::circle(canvas, points.back(), 4, kBright, cv::FILLED, cv::LINE_AA);
+  cv::circle(canvas, points.back(), 4, kBrightColour, cv::FILLED, cv::LINE_AA);
 }
 
 void drawRow(cv::Mat& canvas, const Statuses& statuses, const Row& row, int top) {
   write(canvas, row.label, kMargin, top + 33, 0.65, kLabel);
-  write(canvas, row.value, kValueRight, top + 33, 0.8, kBright, Align::kRight, 2);
+  write(canvas, row.value, kValueRight, top + 33, 0.8, kBrightColour, Align::kRight, 2);
   drawCurve(canvas, statuses, row.figure, top + 9, top + kRow - 8);
 }
 

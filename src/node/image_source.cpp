@@ -14,7 +14,7 @@ namespace visual_localization {
 namespace {
 
 const char* const kCompressed = "compressed";
-constexpr unsigned kQueue = 5;  ///< roscpp drops uncounted what does not fit; the worker's own queue of one counts
+constexpr unsigned kImageQueue = 5;  ///< roscpp drops uncounted what does not fit; the worker's own queue of one counts
 
 /// "image_transport/raw" is known to users as "raw".
 std::set<std::string> knownTransports(const image_transport::ImageTransport& image_transport) {
@@ -44,12 +44,12 @@ ImageSource::ImageSource(ros::NodeHandle node, const ros::NodeHandle& private_no
     const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> forward =
         [callback](const sensor_msgs::CompressedImageConstPtr& message) { callback(received(message)); };
     compressed_ =
-        node.subscribe<sensor_msgs::CompressedImage>(node.resolveName("image") + "/compressed", kQueue, forward,
+        node.subscribe<sensor_msgs::CompressedImage>(node.resolveName("image") + "/compressed", kImageQueue, forward,
                                                      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
   } else {
     const image_transport::TransportHints hints(transport, ros::TransportHints().tcpNoDelay(), private_node);
     by_plugin_ = image_transport_.subscribe(
-        "image", kQueue, [callback](const sensor_msgs::ImageConstPtr& message) { callback(received(message)); },
+        "image", kImageQueue, [callback](const sensor_msgs::ImageConstPtr& message) { callback(received(message)); },
         ros::VoidPtr(), hints);
   }
   topic_ = compressed_ ? compressed_.getTopic() : by_plugin_.getTopic();

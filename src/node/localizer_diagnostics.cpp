@@ -214,10 +214,16 @@ void LocalizerDiagnostics::reportTransform(Wrapper& status) {
 
 void LocalizerDiagnostics::reportCamera(Wrapper& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const bool troubled = !camera_trouble_.empty();
-  status.summary(troubled ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
-                 troubled ? "Calibration refused: " + camera_trouble_ : camera_);
-  if (troubled) status.add("In use", camera_);
+  const std::string contradiction = estimate_ ? estimate_->cameraTrouble() : "";
+  if (!camera_trouble_.empty()) {
+    status.summary(DiagnosticStatus::WARN, "Calibration refused: " + camera_trouble_);
+  } else if (!contradiction.empty()) {
+    status.summary(DiagnosticStatus::WARN, "Calibration wrong: " + contradiction);
+  } else {
+    status.summary(DiagnosticStatus::OK, camera_);
+  }
+  status.add("In use", camera_);
+  if (estimate_) status.addf("Focal length by the images (share)", "%.4f", estimate_->focal_scale);
 }
 
 void LocalizerDiagnostics::reportMap(Wrapper& status) {

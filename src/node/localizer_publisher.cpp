@@ -7,13 +7,15 @@
 #include <cv_bridge/cv_bridge.h>
 #include <sensor_msgs/image_encodings.h>
 
+#include "node/camera_marker.h"
+#include "node/map_messages.h"
 #include "node/matches_image.h"
 #include "node/message_conversions.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr unsigned kQueue = 10;
+constexpr unsigned kMessagesQueued = 10;
 
 std_msgs::Header headerOf(const std::string& frame_id, const ros::Time& stamp) {
   std_msgs::Header header;
@@ -35,12 +37,14 @@ LocalizerPublisher::LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHan
                                        const NodeConfig& config, LocalizerDiagnostics& diagnostics, ThrottledLog& log)
     : config_(config), diagnostics_(diagnostics), log_(log), transform_(config, node), image_transport_(private_node) {
   constexpr bool kLatched = true;
-  pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue);
-  fix_ = private_node.advertise<sensor_msgs::NavSatFix>("fix", kQueue);
-  particles_ = private_node.advertise<geometry_msgs::PoseArray>("particles", kQueue);
-  particle_cloud_ = private_node.advertise<sensor_msgs::PointCloud2>("particle_cloud", kQueue);
-  swarm_ = private_node.advertise<Swarm>("swarm", kQueue);
-  status_ = private_node.advertise<LocalizationStatus>("status", kQueue);
+  pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kMessagesQueued);
+  fix_ = private_node.advertise<sensor_msgs::NavSatFix>("fix", kMessagesQueued);
+  path_ = private_node.advertise<nav_msgs::Path>("path", kMessagesQueued);
+  camera_marker_ = private_node.advertise<visualization_msgs::Marker>("camera_marker", kMessagesQueued);
+  particles_ = private_node.advertise<geometry_msgs::PoseArray>("particles", kMessagesQueued);
+  particle_cloud_ = private_node.advertise<sensor_msgs::PointCloud2>("particle_cloud", kMessagesQueued);
+  swarm_ = private_node.advertise<Swarm>("swarm", kMessagesQueued);
+  status_ = private_node.advertise<LocalizationStatus>("status", kMessagesQueued);
   map_path_ = private_node.advertise<nav_msgs::Path>("map_path", 1, kLatched);
   map_markers_ = private_node.advertise<visualization_msgs::MarkerArray>("map_markers", 1, kLatched);
   matches_ = image_transport_.advertise("matches", 1);
@@ -61,13 +65,20 @@ void LocalizerPublisher::publishState(LocalizationState state, const ImageCounts
 void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts& counts) {
   const double latency_ms = latencyOf(image);
   const Estimate& estimate = image.result.estimate;
-  if (map_.lock() != image.result.map) transform_.forgetPose();
+  if (map_.lock() != image.result.map) {
+    transform_.forgetPose();
+    drive_.clear();
+  }
   map_ = image.result.map;
   const std_msgs::Header header = headerOf(config_.global_frame_id, image.header.stamp);
-  if (!estimate.frozen) publishPose(estimate, header);
+  if (!estimate.frozen) {
+    publishPose(estimate, header);
+    publishDrive(image, header);
+  }
   publishParticles(image.result.particles, header);
   publishStatus(toStatus(estimate, header), latency_ms, counts);
   diagnostics_.imageProcessed(estimate, latency_ms);
+  if (estimate.camera_contradicted) log_.warn("calibration", "Calibration wrong: " + estimate.cameraTrouble());
   publishTransform(estimate, image.header.stamp);
   publishMatches(image);
 }
@@ -75,6 +86,20 @@ void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts&
 void LocalizerPublisher::publishPose(const Estimate& estimate, const std_msgs::Header& header) {
   pose_.publish(toPose(estimate, header));
   fix_.publish(toFix(estimate, headerOf(config_.base_frame_id, header.stamp)));
+}
+
+void LocalizerPublisher::publishDrive(const LocalizedImage& image, const std_msgs::Header& header) {
+  const Estimate& estimate = image.result.estimate;
+  drive_.add(estimate, header);  // also without a subscriber: a later one sees the way so far
+  if (path_.getNumSubscribers() > 0) path_.publish(drive_.toPath(header));
+  if (camera_marker_.getNumSubscribers() > 0) {
+    camera_marker_.publish(toCameraMarker(estimate, image.result.camera, header));
+  }
+}
+
+void LocalizerPublisher::timeWentBack() {
+  transform_.forget();
+  drive_.clear();
 }
 
 void LocalizerPublisher::publishTransform(const Estimate& estimate, const ros::Time& stamp) {
@@ -114,7 +139,9 @@ void LocalizerPublisher::publishMatches(const LocalizedImage& image) {
   if (matches_.getNumSubscribers() == 0) return;
   const SharedLocalizer::Result& result = image.result;
   const cv::Mat canvas =
-      drawMatches(image.grey, result.sift, *result.map, result.estimate.tracked.best_image, result.match);
+      result.landmarks.landmarks.empty()
+          ? drawMatches(image.grey, result.sift, *result.map, result.estimate.tracked.best_image, result.match)
+          : drawLandmarks(image.grey, result.landmarks, *result.map);
   matches_.publish(cv_bridge::CvImage(image.header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
 }
 

@@ -10,6 +10,7 @@
 #include <visual_localization/LocalizationStatus.h>
 
 #include "node/dashboard.h"
+#include "node/driven_path.h"
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
 #include "node/node_config.h"
@@ -33,10 +34,11 @@ class LocalizerPublisher : public ImageOutput {
   /// No pose and no transform after an image of a frozen camera.
   void publish(const LocalizedImage& image, const ImageCounts& counts) override;
   void refused(const std::string& reason) override { diagnostics_.imageRefused(reason); }
-  void timeWentBack() override { transform_.forget(); }
+  void timeWentBack() override;
 
  private:
   void publishPose(const Estimate& estimate, const std_msgs::Header& header);
+  void publishDrive(const LocalizedImage& image, const std_msgs::Header& header);
   void publishTransform(const Estimate& estimate, const ros::Time& stamp);
   void publishParticles(const std::vector<Particle>& particles, const std_msgs::Header& header);
   void publishStatus(LocalizationStatus status, double latency_ms, const ImageCounts& counts);
@@ -48,9 +50,12 @@ class LocalizerPublisher : public ImageOutput {
   ThrottledLog& log_;
   TransformPublisher transform_;
   std::weak_ptr<const TrainingMap> map_;  ///< of the last image
+  DrivenPath drive_;
   image_transport::ImageTransport image_transport_;
   ros::Publisher pose_;
   ros::Publisher fix_;
+  ros::Publisher path_;
+  ros::Publisher camera_marker_;
   ros::Publisher particles_;
   ros::Publisher particle_cloud_;
   ros::Publisher swarm_;

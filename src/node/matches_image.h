@@ -4,6 +4,7 @@
 
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/localization/matched_landmarks.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -14,5 +15,9 @@ namespace visual_localization {
 /// dark. Returns an 8-bit BGR image.
 cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
                     const MatchConfig& match);
+
+/// The same with the landmarks of a metric pose beside the training image that shares most of them: green those that
+/// agree with the pose, red those that do not.
+cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, const TrainingMap& map);
 
 }  // namespace visual_localization

@@ -1,13 +1,13 @@
 #include "node/message_conversions.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 
 #include <sensor_msgs/point_cloud2_iterator.h>
+#include <tf2_eigen/tf2_eigen.h>
 
 namespace visual_localization {
 namespace {
@@ -41,16 +41,13 @@ Eigen::Matrix2d positionCovariance(const Estimate& estimate) {
 }
 
 bool isFinite(const MetricPose& metric) {
-  return metric.camera.position_m.allFinite() && metric.camera.rotation.coeffs().allFinite() &&
-         fullCovariance(metric).allFinite() && std::isfinite(metric.reprojection_px);
+  return metric.base.matrix().allFinite() && fullCovariance(metric).allFinite() &&
+         std::isfinite(metric.reprojection_px);
 }
 
 geometry_msgs::PoseWithCovariance withCovariance(const MetricPose& metric) {
   geometry_msgs::PoseWithCovariance pose;
-  pose.pose.position.x = metric.camera.position_m.x();
-  pose.pose.position.y = metric.camera.position_m.y();
-  pose.pose.position.z = metric.camera.position_m.z();
-  pose.pose.orientation = bodyRotation(metric.camera);
+  pose.pose = tf2::toMsg(metric.base);
   Eigen::Map<MetricPose::Covariance>(pose.covariance.data()) = fullCovariance(metric);  // symmetric: rows are columns
   return pose;
 }
@@ -81,68 +78,12 @@ std::uint32_t count(std::size_t number) {
   return static_cast<std::uint32_t>(number < kMax ? number : kMax);
 }
 
-const char* const kPositions = "positions";  ///< namespace of the markers of training images
-constexpr double kImageDiameter_m = 0.6;
-constexpr double kHeadingLength_m = 1.5;
-constexpr double kHeadingWidth_m = 0.12;
-/// Of a larger map only every k-th image is shown: a message of a million poses would stop rviz.
-constexpr std::size_t kMostShown = 20000;
-
-std::size_t strideThrough(const TrainingMap& map) { return (map.size() + kMostShown - 1) / kMostShown; }
-
-struct Colour {
-  float r, g, b;
-};
-
-/// One per session; readable on white and for colour-blind people (Okabe and Ito).
-constexpr std::array<Colour, 6> kSessionColours{{{0.00F, 0.45F, 0.70F},
-                                                 {0.84F, 0.37F, 0.00F},
-                                                 {0.00F, 0.62F, 0.45F},
-                                                 {0.80F, 0.47F, 0.65F},
-                                                 {0.90F, 0.62F, 0.00F},
-                                                 {0.34F, 0.71F, 0.91F}}};
-
-geometry_msgs::Point pointAt(const Eigen::Vector2d& position_m) {
-  geometry_msgs::Point point;
-  point.x = position_m.x();
-  point.y = position_m.y();
-  return point;
-}
-
-visualization_msgs::Marker emptyMarker(const std::string& frame_id, const std::string& name_space, int session,
-                                       int type) {
-  visualization_msgs::Marker marker;
-  marker.header.frame_id = frame_id;
-  marker.ns = name_space;
-  marker.id = session;
-  marker.type = type;
-  marker.action = visualization_msgs::Marker::ADD;
-  marker.pose.orientation.w = 1.0;
-  const Colour& colour = kSessionColours[static_cast<std::size_t>(session) % kSessionColours.size()];
-  marker.color.r = colour.r;
-  marker.color.g = colour.g;
-  marker.color.b = colour.b;
-  marker.color.a = 1.0F;
-  return marker;
-}
-
-visualization_msgs::Marker emptyPositions(int session, const std::string& frame_id) {
-  auto marker = emptyMarker(frame_id, kPositions, session, visualization_msgs::Marker::SPHERE_LIST);
-  marker.scale.x = marker.scale.y = marker.scale.z = kImageDiameter_m;
-  return marker;
-}
-
-visualization_msgs::Marker emptyHeadings(int session, const std::string& frame_id) {
-  auto marker = emptyMarker(frame_id, "headings", session, visualization_msgs::Marker::LINE_LIST);
-  marker.scale.x = kHeadingWidth_m;
-  return marker;
-}
-
 /// What the pose rests on, and how well it is known. Sigmas stay 0 in a status that answers no image.
 void addSource(const Estimate& estimate, LocalizationStatus& message) {
   message.source = static_cast<std::uint8_t>(estimate.source);
   message.source_name = toString(estimate.source);
   message.images_since_metric = count(estimate.images_since_metric);
+  message.focal_scale = estimate.focal_scale;
   if (message.best_image < 0) return;
   message.sigma_position = estimate.sigma_m();
   message.sigma_heading = estimate.sigmaYaw_rad();
@@ -159,18 +100,6 @@ geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad) {
   geometry_msgs::Quaternion rotation;
   rotation.z = std::sin(0.5 * yaw_rad);
   rotation.w = std::cos(0.5 * yaw_rad);
-  return rotation;
-}
-
-geometry_msgs::Quaternion bodyRotation(const CameraPose& camera) {
-  Eigen::Matrix3d body_in_camera;  // columns: ahead, left and up in the optical frame
-  body_in_camera << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
-  const Eigen::Quaterniond body_in_map = (camera.rotation * Eigen::Quaterniond(body_in_camera)).normalized();
-  geometry_msgs::Quaternion rotation;
-  rotation.x = body_in_map.x();
-  rotation.y = body_in_map.y();
-  rotation.z = body_in_map.z();
-  rotation.w = body_in_map.w();
   return rotation;
 }
 
@@ -280,41 +209,6 @@ sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, co
     ++point;
   }
   return message;
-}
-
-nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id) {
-  nav_msgs::Path path;
-  path.header.frame_id = frame_id;
-  path.poses.reserve(std::min(map.size(), kMostShown));
-  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
-    geometry_msgs::PoseStamped pose;
-    pose.header.frame_id = frame_id;
-    pose.pose.position = pointAt(map.position_m(i));
-    pose.pose.orientation = quaternionFromYaw(map.yaw_rad(i));
-    path.poses.push_back(pose);
-  }
-  return path;
-}
-
-visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::string& frame_id) {
-  visualization_msgs::MarkerArray markers;
-  markers.markers.push_back(emptyMarker(frame_id, kPositions, 0, visualization_msgs::Marker::SPHERE_LIST));
-  markers.markers.back().action = visualization_msgs::Marker::DELETEALL;
-  const auto sessions = static_cast<int>(map.header().sessions.size());
-  for (int session = 0; session < sessions; ++session) {
-    markers.markers.push_back(emptyPositions(session, frame_id));
-    markers.markers.push_back(emptyHeadings(session, frame_id));
-  }
-  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
-    const TrainingPose image = map.pose(i);
-    const auto session = static_cast<std::size_t>(image.session);
-    const Eigen::Vector2d direction(std::cos(image.yaw_rad), std::sin(image.yaw_rad));
-    markers.markers[2 * session + 1].points.push_back(pointAt(image.position_m));
-    auto& heading = markers.markers[2 * session + 2].points;
-    heading.push_back(pointAt(image.position_m));
-    heading.push_back(pointAt(image.position_m + kHeadingLength_m * direction));
-  }
-  return markers;
 }
 
 }  // namespace visual_localization

@@ -6,17 +6,14 @@
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <geometry_msgs/Quaternion.h>
-#include <nav_msgs/Path.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
 #include <visual_localization/LocalizationStatus.h>
 #include <visual_localization/Swarm.h>
-#include <visualization_msgs/MarkerArray.h>
 
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/particles.h"
-#include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 
@@ -26,10 +23,6 @@ geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad);
 /// True when every number that would be published is finite.
 bool isFinite(const Estimate& estimate);
 bool isFinite(const Particle& particle);
-
-/// camera_in_map with the axes of a robot that looks along the camera (REP 103): x ahead, y left, z up. Its yaw is the
-/// camera's heading, roll and pitch are those of the camera against the horizon.
-geometry_msgs::Quaternion bodyRotation(const CameraPose& camera);
 
 /// A metric pose: that of the camera, with the covariance of all 6 axes (x, y, z, rotation about x, y, z of the map),
 /// map included. Otherwise position, heading and their covariance; height, roll and pitch are zero. `header`: map
@@ -48,13 +41,5 @@ geometry_msgs::PoseArray toPoseArray(const std::vector<Particle>& particles, con
 Swarm toSwarm(const std::vector<Particle>& particles, const std_msgs::Header& header);
 /// Fields x, y, z and intensity (the weight), 32-bit floats, so that rviz can colour by weight.
 sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, const std_msgs::Header& header);
-
-/// The recorded path, image by image, session by session. Of a map with more than 20000 images only every second one,
-/// or every third, and so on: here and in the markers.
-nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id);
-
-/// Positions and headings of the training images, per session. Begins with a marker that deletes those of an earlier
-/// map.
-visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::string& frame_id);
 
 }  // namespace visual_localization

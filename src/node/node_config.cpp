@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/text.h"
+#include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
@@ -14,6 +15,15 @@ namespace {
 
 constexpr bool kAtStartOnly = true;
 constexpr int kLargestMapCache_mb = 1 << 20;  ///< a tebibyte
+
+bool isCameraMount(const std::string& text) {
+  try {
+    parseCameraMount(text);
+    return true;
+  } catch (const MountError&) {
+    return false;
+  }
+}
 
 /// tf2 accepts no leading slash and no empty name.
 void requireFrame(ParameterVisitor& visitor, const std::string& name, const std::string& frame) {
@@ -63,6 +73,11 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.text({"camera_info_file", "", "calibration of camera_calibration, YAML or INI; empty: the topic camera_info",
                 kAtStartOnly},
                camera_info_file);
+  visitor.text({"camera_mount", "m, rad",
+                "x y z yaw pitch roll of the camera (x ahead) in base_frame_id; empty: from /tf_static, or else as in "
+                "the map",
+                kAtStartOnly},
+               camera_mount);
   visitor.text({"mask_file", "", "grey PNG of the camera's size, features are used where it is white; empty: the map's",
                 kAtStartOnly},
                mask_file);
@@ -80,6 +95,8 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.text({"odom_frame_id", "", "frame of the odometry", kAtStartOnly}, odom_frame_id);
   visitor.text({"base_frame_id", "", "frame of the robot", kAtStartOnly}, base_frame_id);
   requireFrame(visitor, "global_frame_id", global_frame_id);
+  visitor.require(camera_mount.empty() || isCameraMount(camera_mount), "camera_mount", "'" + camera_mount + "'",
+                  "six numbers: x y z yaw pitch roll, metres (at most 100) and radians");
   requireFrame(visitor, "odom_frame_id", odom_frame_id);
   requireFrame(visitor, "base_frame_id", base_frame_id);
   visitor.require(map_directory.empty() || map_directory.front() == '/', "map_directory", "'" + map_directory + "'",

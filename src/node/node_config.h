@@ -17,6 +17,7 @@ struct NodeConfig {
   std::string map_directory;
   std::string image_transport = "raw";
   std::string camera_info_file;
+  std::string camera_mount;
   std::string mask_file;
   std::string tf_mode = "none";
   bool tf_metric_only = true;

@@ -24,7 +24,7 @@ void requireSearchable(const Eigen::Vector2d& centre_m, double radius_m, const A
   throw std::invalid_argument(text.str());
 }
 
-constexpr std::size_t kRow = 6;  ///< x, y, z and three rotations
+constexpr std::size_t kCovarianceRow = 6;  ///< x, y, z and three rotations
 
 void refuseUnless(bool condition, const std::string& reason) {
   if (!condition) throw std::invalid_argument(reason);
@@ -56,6 +56,7 @@ void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
   const std::lock_guard<std::mutex> lock(mutex_);
   localizer->configure(config_);  // it may have changed just now
   if (camera_) localizer->setCamera(*camera_);
+  if (mount_) localizer->setMount(*mount_);
   if (!mask_.empty()) localizer->setMask(mask_);
   if (waiting_prior_) localizer->relocalize(*waiting_prior_);
   waiting_prior_.reset();
@@ -69,6 +70,13 @@ void SharedLocalizer::setCamera(const CameraModel& camera) {
   const std::lock_guard<std::mutex> lock(mutex_);
   camera_ = camera;
   if (localizer_) localizer_->setCamera(camera);
+}
+
+void SharedLocalizer::setMount(const SensorMount& mount) {
+  requireMount(mount);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  mount_ = mount;
+  if (localizer_) localizer_->setMount(mount);
 }
 
 void SharedLocalizer::setMask(const Mask& mask) {
@@ -86,7 +94,9 @@ std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t sta
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return std::nullopt;
   const Estimate estimate = localizer_->process(stamp_ns, grey);
-  return Result{estimate, localizer_->particles(), localizer_->lastSift(), config_.match, map_};
+  return Result{estimate,      localizer_->particles(),     localizer_->lastSift(),
+                config_.match, localizer_->lastLandmarks(), localizer_->camera(),
+                map_};
 }
 
 std::optional<LocalizationState> SharedLocalizer::doubt() {
@@ -133,7 +143,7 @@ SharedLocalizer::Guess guessFrom(const geometry_msgs::PoseWithCovarianceStamped&
 
   SharedLocalizer::Guess guess;
   guess.mean_m = {message.pose.pose.position.x, message.pose.pose.position.y};
-  guess.covariance_m2 << covariance[0], covariance[1], covariance[kRow], covariance[kRow + 1];
+  guess.covariance_m2 << covariance[0], covariance[1], covariance[kCovarianceRow], covariance[kCovarianceRow + 1];
   return guess;
 }
 

@@ -30,8 +30,10 @@ class SharedLocalizer {
   struct Result {
     Estimate estimate;
     std::vector<Particle> particles;
-    SiftFeatures sift;  ///< of the image, after pruning; empty when they were not needed
-    MatchConfig match;  ///< the rule that SIFT features are matched by
+    SiftFeatures sift;                  ///< of the image, after pruning; empty when they were not needed
+    MatchConfig match;                  ///< the rule that SIFT features are matched by
+    MatchedLandmarks landmarks;         ///< see Localizer::lastLandmarks
+    std::optional<CameraModel> camera;  ///< see Localizer::camera
     std::shared_ptr<const TrainingMap> map;
   };
 
@@ -49,6 +51,8 @@ class SharedLocalizer {
 
   /// See Localizer: for this map and all later ones.
   void setCamera(const CameraModel& camera);
+  /// The same for where the robot carries the camera. Throws MountError.
+  void setMount(const SensorMount& mount);
   void setMask(const Mask& mask);
 
   /// See Localizer::process. Nothing without a map. Throws std::invalid_argument for an unusable image.
@@ -72,7 +76,8 @@ class SharedLocalizer {
   mutable std::mutex mutex_;
   LocalizerConfig config_;
   std::optional<CameraModel> camera_;  ///< if somebody has said
-  Mask mask_;                          ///< the same; otherwise empty
+  std::optional<SensorMount> mount_;
+  Mask mask_;  ///< the same; otherwise empty
   std::shared_ptr<const TrainingMap> map_;
   std::unique_ptr<Localizer> localizer_;
   std::optional<Prior> waiting_prior_;

@@ -51,7 +51,7 @@ class RecordedStreet {
   void makeMap() {
     const test::RecordedDrive recorded = test::record(poses_, world_, 0.1, random_);
     const UnadjustedSession session = recorded.unadjusted();
-    SessionGeometry geometry = adjustSession(session, {}, 0, 1);
+    SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
     std::vector<TrainingImage> images(poses_.size());
     for (std::size_t i = 0; i < images.size(); ++i) {
       images[i].stamp_ns = session.images[i].stamp_ns;

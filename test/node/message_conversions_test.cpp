@@ -46,6 +46,7 @@ Estimate metricEstimate() {
   MetricPose metric;
   metric.camera.position_m = {12.5, -3.25, 1.5};
   metric.camera.rotation = Eigen::AngleAxisd(-10.0 * M_PI / 180.0, Eigen::Vector3d::UnitX()) * levelCamera(0.5 * M_PI);
+  metric.base = SensorMount().baseInMap(metric.camera);
   metric.covariance.diagonal() << 0.0009, 0.0004, 0.0016, 1e-5, 2e-5, 3e-5;
   metric.covariance(0, 5) = metric.covariance(5, 0) = 1e-5;
   metric.map_covariance.diagonal() << 0.04, 0.04, 0.09, 1e-6, 1e-6, 4e-6;
@@ -57,8 +58,8 @@ Estimate metricEstimate() {
 
 /// Any single number of a metric pose that is not finite must be seen.
 std::vector<std::function<double&(MetricPose&)>> numbersOf() {
-  return {[](MetricPose& pose) -> double& { return pose.camera.position_m.z(); },
-          [](MetricPose& pose) -> double& { return pose.camera.rotation.w(); },
+  return {[](MetricPose& pose) -> double& { return pose.base.translation().z(); },
+          [](MetricPose& pose) -> double& { return pose.base.linear()(1, 2); },
           [](MetricPose& pose) -> double& { return pose.covariance(2, 4); },
           [](MetricPose& pose) -> double& { return pose.map_covariance(5, 5); },
           [](MetricPose& pose) -> double& { return pose.reprojection_px; }};
@@ -107,7 +108,7 @@ TEST(MessageConversions, PoseHoldsPositionHeadingAndCovariance) {
 
 TEST(MessageConversions, ALevelCameraIsARobotThatLooksTheSameWay) {
   for (const double yaw_rad : {0.0, 0.5 * M_PI, -2.0, M_PI}) {
-    const Eigen::Matrix3d body = matrixOf(bodyRotation({levelCamera(yaw_rad), {}}));
+    const Eigen::Matrix3d body = SensorMount().baseInMap({levelCamera(yaw_rad), {}}).linear();
     EXPECT_LT((body - matrixOf(quaternionFromYaw(yaw_rad))).norm(), 1e-12) << yaw_rad;
   }
 }

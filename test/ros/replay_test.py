@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from nav_msgs.msg import Path
 from sensor_msgs.msg import Image, PointCloud2
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus, Swarm
@@ -33,7 +33,8 @@ class ReplayTest(unittest.TestCase):
         self.localizer = fixture.Localizer()
         self.topics = {name: fixture.Recorder('/localizer/' + name, kind) for name, kind in {
             'pose': PoseWithCovarianceStamped, 'particles': PoseArray, 'swarm': Swarm, 'particle_cloud': PointCloud2,
-            'map_path': Path, 'map_markers': MarkerArray, 'matches': Image, 'dashboard': Image}.items()}
+            'map_path': Path, 'map_markers': MarkerArray, 'path': Path, 'camera_marker': Marker, 'matches': Image,
+            'dashboard': Image}.items()}
         self.diagnostics = fixture.Recorder('/diagnostics', DiagnosticArray)
         self.localizer.wait_until_up()
         self.start_plot()
@@ -57,6 +58,7 @@ class ReplayTest(unittest.TestCase):
         self.check_errors()
         self.check_poses()
         self.check_metric_poses()
+        self.check_drive()
         self.check_particles()
         self.check_map_and_pictures()
         self.check_diagnostics()
@@ -101,6 +103,18 @@ class ReplayTest(unittest.TestCase):
             self.assertGreater(status.inliers, 5)
             self.assertEqual(status.images_since_metric, 0)
 
+    def check_drive(self):
+        poses = {pose.header.stamp: pose.pose.pose for pose in self.topics['pose'].messages()}
+        path = self.topics['path'].last().poses
+        self.assertGreater(len(path), 20)
+        for pose in path:
+            self.assertEqual(pose.pose, poses[pose.header.stamp])
+        shown = [marker for marker in self.topics['camera_marker'].messages() if marker.action == Marker.ADD]
+        self.assertGreater(len(shown), 20)
+        for marker in shown:
+            camera, position = marker.points[0], poses[marker.header.stamp].position
+            self.assertTrue(np.allclose((camera.x, camera.y, camera.z), (position.x, position.y, position.z)))
+
     def check_particles(self):
         swarm = self.topics['swarm'].last()
         self.assertAlmostEqual(sum(particle.weight for particle in swarm.particles), 1.0, places=6)
@@ -109,7 +123,10 @@ class ReplayTest(unittest.TestCase):
 
     def check_map_and_pictures(self):
         self.assertGreater(len(self.topics['map_path'].last().poses), 20)
-        self.assertGreater(len(self.topics['map_markers'].last().markers), 1)
+        markers = {marker.ns: marker for marker in self.topics['map_markers'].last().markers}
+        self.assertGreater(len(markers['positions'].points), 20)
+        self.assertGreater(len(markers['landmarks'].points), 500)
+        self.assertEqual(len(markers['landmarks'].colors), len(markers['landmarks'].points))
         for picture in ('matches', 'dashboard'):
             self.assertEqual(self.topics[picture].last().encoding, 'bgr8')
 
