@@ -101,9 +101,13 @@ PartialFile::PartialFile(const std::string& target)
   requireReplaceable(shown_, target_);
   // A file of this name can only be left over from a killed process that had the same number.
   ::unlink(partial_.c_str());
+  slot_ = enlist(partial_);  // before it is there: a signal may come at any moment
   const int descriptor = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor < 0) refuse(shown_, errno);
-  slot_ = enlist(partial_);
+  if (descriptor < 0) {
+    const int error = errno;
+    strike(slot_);
+    refuse(shown_, error);
+  }
   ::close(descriptor);
 }
 
