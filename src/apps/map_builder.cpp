@@ -177,7 +177,7 @@ void printGeometry(const SessionImages& session) {
               << " % of the matched features): a map of places\n";
     return;
   }
-  std::cout << session.name << ": " << geometry.images << " of " << session.kept
+  std::cout << session.name << ": " << geometry.located << " of " << session.kept
             << " images with landmarks: " << geometry.landmarks << " landmarks, " << geometry.sightings
             << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
             << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "

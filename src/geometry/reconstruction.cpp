@@ -9,6 +9,7 @@
 #include "base/statistics.h"
 #include "geometry/fix_positions.h"
 #include "geometry/triangulation.h"
+#include "geometry/vector_median.h"
 
 namespace visual_localization {
 namespace {
@@ -95,6 +96,12 @@ void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d
   }
 }
 
+void Reconstruction::setMatches(const std::vector<ImagePair>& matches) {
+  std::vector<std::size_t> feature_counts;
+  for (const Image& image : images_) feature_counts.push_back(image.rays.normalised.size());
+  tracks_ = tracksOf(matches, feature_counts, kMinViews);
+}
+
 void Reconstruction::useFixes(double farthest_m, double loss) {
   bundle_.position_loss = loss;
   problem_.positions.clear();
@@ -155,16 +162,15 @@ Eigen::Vector3d Reconstruction::shiftOf_m(std::size_t image) const {
 
 /// How far the adjustment moved the neighbours of an image on the cleaned path, the image itself included.
 Eigen::Vector3d Reconstruction::usualShift_m(std::size_t image) const {
-  std::vector<double> shifts_m[3];
+  std::vector<Eigen::Vector3d> shifts_m;
   const auto last = static_cast<std::ptrdiff_t>(images_.size()) - 1;
   const auto at = static_cast<std::ptrdiff_t>(image);
   for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, at - kNeighbours); i <= std::min(last, at + kNeighbours); ++i) {
     const auto neighbour = static_cast<std::size_t>(i);
     if (images_[neighbour].session != images_[image].session) continue;
-    const Eigen::Vector3d shift_m = shiftOf_m(neighbour);
-    for (int axis = 0; axis < 3; ++axis) shifts_m[axis].push_back(shift_m[axis]);
+    shifts_m.push_back(shiftOf_m(neighbour));
   }
-  return {median(shifts_m[0]), median(shifts_m[1]), median(shifts_m[2])};
+  return medianOf(shifts_m);
 }
 
 bool Reconstruction::isAstray(std::size_t image) const {
@@ -268,15 +274,14 @@ void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vect
     ImageGeometry& image = geometry.images.emplace_back(images[i]).value();
     std::sort(image.landmarks.begin(), image.landmarks.end(),
               [](const SeenLandmark& a, const SeenLandmark& b) { return a.feature < b.feature; });
+    ++geometry.located;
     const double shift_m = shiftOf_m(i).head<2>().norm();
     geometry.mean_shift_m += shift_m;
     geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
     geometry.far_share += shift_m > kFar_m ? 1.0 : 0.0;
   }
   for (SessionGeometry& geometry : geometries) {
-    const auto kept = std::count_if(geometry.images.begin(), geometry.images.end(),
-                                    [](const auto& image) { return image.has_value(); });
-    if (kept > 0) geometry.mean_shift_m /= static_cast<double>(kept);
+    if (geometry.located > 0) geometry.mean_shift_m /= static_cast<double>(geometry.located);
     geometry.far_share /= static_cast<double>(std::max<std::size_t>(1, geometry.images.size()));
   }
 }

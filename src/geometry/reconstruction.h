@@ -19,6 +19,8 @@ namespace visual_localization {
 /// Images of one session or several, and what they show, while they are adjusted.
 class Reconstruction {
  public:
+  static constexpr std::size_t kMinViews = 3;  ///< of a landmark, in the end
+
   explicit Reconstruction(const GeometryConfig& config) : config_(config) {}
 
   /// Appends the images of a session, where the cleaned path has their antenna. `session` must outlive it.
@@ -28,6 +30,11 @@ class Reconstruction {
 
   std::size_t size() const { return images_.size(); }
   std::size_t sessions() const { return sessions_.size(); }
+  /// The first image of a session, and how many it has.
+  std::size_t begin(std::size_t session) const { return problem_.sessions[session].begin; }
+  std::size_t imagesIn(std::size_t session) const { return sessions_[session]->images.size(); }
+  /// The session as it came.
+  const UnadjustedSession& session(std::size_t session) const { return *sessions_[session]; }
   std::uint32_t sessionOf(std::size_t image) const { return images_[image].session; }
   const KeypointRays& rays(std::size_t image) const { return images_[image].rays; }
   double focal_px(std::size_t image) const { return sessions_[images_[image].session]->camera->intrinsics().fx; }
@@ -37,8 +44,8 @@ class Reconstruction {
 
   /// Moves the images of a session, and the landmarks that they were the first to see.
   void move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m);
-  /// What is matched over several images, from now on.
-  void setTracks(std::vector<FeatureTrack> tracks) { tracks_ = std::move(tracks); }
+  /// What landmarks come from, from now on: matches that join at least three images.
+  void setMatches(const std::vector<ImagePair>& matches);
   /// Fixes count from now on: all of them, or those that are at most `farthest_m` from the cleaned path. `loss`: scale
   /// of their robust loss, sigmas.
   void useFixes(double farthest_m, double loss);

@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "base/statistics.h"
+#include "geometry/vector_median.h"
 
 namespace visual_localization {
 namespace {
@@ -19,17 +20,7 @@ struct Offset {
   Eigen::Vector3d shift_m;
 };
 
-Eigen::Vector3d medianOf(const std::vector<Eigen::Vector3d>& all) {
-  Eigen::Vector3d middle;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> values;
-    for (const Eigen::Vector3d& one : all) values.push_back(one[axis]);
-    middle[axis] = median(values);
-  }
-  return middle;
-}
-
-/// Landmarks by what shows them.
+/// Landmarks by what shows them. The reconstruction must keep its landmarks meanwhile; they may move.
 class SeenLandmarks {
  public:
   explicit SeenLandmarks(const Reconstruction& reconstruction) {
@@ -79,26 +70,22 @@ std::vector<Eigen::Vector3d> shiftsAlong(std::size_t images, const std::vector<O
 }  // namespace
 
 std::vector<double> alignSessions(const std::vector<ImagePair>& ties, Reconstruction& reconstruction) {
-  std::vector<std::size_t> begins(reconstruction.sessions(), 0);
-  std::vector<std::size_t> sizes(reconstruction.sessions(), 0);
-  for (std::size_t i = 0; i < reconstruction.size(); ++i) {
-    if (sizes[reconstruction.sessionOf(i)]++ == 0) begins[reconstruction.sessionOf(i)] = i;
-  }
-  std::vector<double> apart_m(sizes.size(), 0.0);
-  for (std::size_t session = 1; session < sizes.size(); ++session) {
-    const SeenLandmarks landmarks(reconstruction);  // those before have been moved
+  const SeenLandmarks landmarks(reconstruction);  // moves with them
+  std::vector<double> apart_m(reconstruction.sessions(), 0.0);
+  for (std::size_t session = 1; session < apart_m.size(); ++session) {
+    const std::size_t begin = reconstruction.begin(session);
     std::vector<Offset> offsets;
     std::vector<double> lengths_m;
     for (const ImagePair& tie : ties) {
       if (reconstruction.sessionOf(tie.b) != session) continue;
       const auto shift_m = landmarks.offset(tie);
       if (!shift_m) continue;
-      offsets.push_back({tie.b - begins[session], *shift_m});
+      offsets.push_back({tie.b - begin, *shift_m});
       lengths_m.push_back(shift_m->norm());
     }
     if (offsets.empty()) continue;
     apart_m[session] = median(lengths_m);
-    reconstruction.move(session, shiftsAlong(sizes[session], offsets));
+    reconstruction.move(session, shiftsAlong(reconstruction.imagesIn(session), offsets));
   }
   return apart_m;
 }

@@ -21,7 +21,6 @@ namespace {
 constexpr double kMaxTurn_rad = 0.6;  ///< from one image to the next
 constexpr double kMaxRevisitTurn_rad = 0.8;
 constexpr std::uint32_t kRotationSpan = 3;  ///< images farther apart say little about each other's rotation
-constexpr std::size_t kMinViews = 3;        ///< of a landmark
 constexpr double kMostFar = 0.05;           ///< share of images far from the cleaned path in a session to be believed
 constexpr double kFocalTolerance = 0.01;
 constexpr double kLeastAgreeing = 2.0 / 3.0;  ///< share of the tracked features that must agree with the adjustment
@@ -51,7 +50,7 @@ class PairMatcher {
  public:
   PairMatcher(const GeometryConfig& config, std::size_t threads) : config_(config), threads_(threads) {}
 
-  /// Those pairs that agree on enough. `view(i)`: features and rays of an image; `turns_rad(a, b)`: most that it turns.
+  /// Those pairs that agree on enough. `viewOf(i)`: features and rays of an image.
   template <class ViewOf>
   std::vector<Pair> match(const std::vector<Indices>& indices, const ViewOf& viewOf) const {
     std::vector<Pair> pairs(indices.size());
@@ -131,15 +130,13 @@ class SessionAdjuster {
     std::vector<double> yaws_rad;
     for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
     std::vector<RelativeRotation> relative;
-    std::vector<std::size_t> feature_counts;
     for (const Pair& pair : pairs_) {
       const auto& [a, b, inliers] = pair.matches;
       if (b - a <= kRotationSpan) relative.push_back({a, b, pair.view->b_from_a});
       matches_.push_back(pair.matches);
     }
-    for (const KeypointRays& of_image : rays) feature_counts.push_back(of_image.normalised.size());
     reconstruction_.add(session_, std::move(rays), averageRotations(yaws_rad, relative));
-    reconstruction_.setTracks(tracksOf(matches_, feature_counts, kMinViews));
+    reconstruction_.setMatches(matches_);
   }
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
@@ -154,7 +151,7 @@ class SessionAdjuster {
     reconstruction_.bringBack();
     reconstruction_.triangulateAll(4.0, kAllViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
-    reconstruction_.adjustAndPrune(kFine, kMinViews);
+    reconstruction_.adjustAndPrune(kFine, Reconstruction::kMinViews);
     focal_scale_ = reconstruction_.freeFocalScale();
   }
 
@@ -177,10 +174,10 @@ class SessionAdjuster {
 /// Sessions that were adjusted on their own, tied to each other where they overlap.
 class SessionTier {
  public:
-  SessionTier(const std::vector<UnadjustedSession>& sessions, const GeometryConfig& config, std::size_t threads)
-      : sessions_(sessions), config_(config), matcher_(config, threads), together_(config) {}
+  SessionTier(const GeometryConfig& config, std::size_t threads)
+      : config_(config), matcher_(config, threads), together_(config) {}
 
-  void add(std::size_t session, const SessionAdjuster& alone) {
+  void add(const SessionAdjuster& alone) {
     const auto begin = static_cast<std::uint32_t>(together_.size());
     for (ImagePair pair : alone.matches()) {
       pair.a += begin;
@@ -188,8 +185,6 @@ class SessionTier {
       matches_.push_back(std::move(pair));
     }
     together_.append(alone.reconstruction());
-    which_.push_back(session);
-    begins_.push_back(begin);
   }
 
   /// Nothing when no two sessions overlap; otherwise that of each session, in the order in which they were added.
@@ -198,17 +193,13 @@ class SessionTier {
     if (ties.empty()) return std::nullopt;
     const std::vector<double> apart_m = alignSessions(ties, together_);
     matches_.insert(matches_.end(), ties.begin(), ties.end());
-    std::vector<std::size_t> feature_counts;
-    for (std::size_t i = 0; i < together_.size(); ++i) {
-      feature_counts.push_back(together_.rays(i).normalised.size());
-    }
-    together_.setTracks(tracksOf(matches_, feature_counts, kMinViews));
+    together_.setMatches(matches_);
     together_.useFixes(kAllFixes_m, config_.fix_loss);
     together_.triangulateAll(20.0, kCoarseViews);
     together_.adjustAndPrune(kCoarse, 2);
     together_.triangulateAll(4.0, kCoarseViews);
     together_.adjustAndPrune(kCoarse, 2);
-    together_.adjustAndPrune(kFine, kMinViews);
+    together_.adjustAndPrune(kFine, Reconstruction::kMinViews);
     std::vector<SessionGeometry> results = together_.results(0);
     for (std::size_t k = 0; k < results.size(); ++k) results[k].tied_apart_m = apart_m[k];
     return results;
@@ -235,17 +226,14 @@ class SessionTier {
 
   PairMatcher::View view(std::uint32_t image) const {
     const std::uint32_t session = together_.sessionOf(image);
-    return {sessions_[which_[session]].features(image - begins_[session]), &together_.rays(image),
+    return {together_.session(session).features(image - together_.begin(session)), &together_.rays(image),
             together_.focal_px(image)};
   }
 
-  const std::vector<UnadjustedSession>& sessions_;
   const GeometryConfig& config_;
   PairMatcher matcher_;
   Reconstruction together_;
   std::vector<ImagePair> matches_;
-  std::vector<std::size_t> which_;  ///< of the sessions
-  std::vector<std::uint32_t> begins_;
 };
 
 }  // namespace
@@ -253,7 +241,7 @@ class SessionTier {
 std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>& sessions,
                                             const GeometryConfig& config, std::size_t threads) {
   std::vector<SessionGeometry> geometries;
-  SessionTier tier(sessions, config, threads);
+  SessionTier tier(config, threads);
   std::vector<std::size_t> believed;
   std::uint32_t next_id = 0;
   for (std::size_t k = 0; k < sessions.size(); ++k) {
@@ -261,7 +249,7 @@ std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>
     geometries.push_back(alone.result(next_id));
     if (geometries.back().contradicts_calibration) continue;
     next_id += static_cast<std::uint32_t>(geometries.back().landmarks);
-    tier.add(k, alone);
+    tier.add(alone);
     believed.push_back(k);
   }
   auto tied = believed.size() > 1 ? tier.run() : std::nullopt;

@@ -15,6 +15,7 @@
 #include "visual_localization/geometry/geometry_config.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/geometry/session_landmarks.h"
 
 namespace visual_localization {
 
@@ -34,19 +35,9 @@ struct UnadjustedSession {
   std::vector<MapFix> fixes;  ///< in order of time
 };
 
-/// What the adjustment of a session came to.
-struct SessionGeometry {
-  std::vector<std::optional<ImageGeometry>> images;  ///< nothing where too few landmarks are seen
-  std::size_t landmarks = 0;
-  std::size_t sightings = 0;
-  double focal_scale = 1.0;              ///< what the images say the focal length is, as a share of the calibration's
-  bool contradicts_calibration = false;  ///< then it is no geometry to rely on
-  double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
-  double agreeing_share = 1.0;           ///< of the features in tracks: those that are sightings of a landmark
-  double tied_apart_m = 0.0;             ///< from what the sessions before see as well, before they were tied
-  double mean_shift_m = 0.0;             ///< of the images from the cleaned path
-  double largest_shift_m = 0.0;
-  double far_share = 0.0;                                  ///< of all images: moved by more than 3 m
+/// What the adjustment of a session came to, with all poses and landmarks.
+struct SessionGeometry : SessionLandmarks {
+  std::vector<std::optional<ImageGeometry>> images;        ///< nothing where too few landmarks are seen
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
 };
 

@@ -10,6 +10,7 @@
 #include "base/files.h"
 #include "base/statistics.h"
 #include "map/extraction_pool.h"
+#include "map/image_spool.h"
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
 #include "map/pruning_neighbours.h"
@@ -106,43 +107,6 @@ void requireMountTexts(ParameterVisitor& visitor, const std::string& camera, con
 }
 
 }  // namespace
-
-/// Where images wait until all are known, because only then their neighbours are: in memory, or in a temporary file.
-class ImageSpool {
- public:
-  /// `beside`: the temporary file is made beside this one; empty: in memory. Throws FileError or MapStoreError.
-  explicit ImageSpool(const std::string& beside) {
-    if (beside.empty()) return;
-    file_ = std::make_unique<PartialFile>(beside);
-    writer_ = std::make_unique<MapWriter>(file_->path());
-  }
-
-  /// Throws MapStoreError, for instance when the disk is full.
-  void append(const TrainingImage& image) {
-    if (writer_) {
-      writer_->append(image);
-    } else {
-      in_memory_.push_back(image);
-    }
-  }
-
-  /// All images, in their order, for as long as the spool lives. Ends it. There must be one; throws MapStoreError.
-  std::shared_ptr<const TrainingMap> finish(const MapHeader& header) {
-    if (!writer_) return std::make_shared<const TrainingMap>(header, std::move(in_memory_));
-    writer_->finish(header);
-    writer_.reset();
-    // An image that cannot be read back is no image without features: the map would be wrong without a word.
-    return loadMap(file_->path(), {kSpoolCache_bytes, [](const std::string& reason) { throw MapStoreError(reason); }});
-  }
-
- private:
-  /// Neighbours are mostly images that were recorded shortly before and after.
-  static constexpr std::size_t kSpoolCache_bytes = std::size_t{64} << 20U;
-
-  std::vector<TrainingImage> in_memory_;
-  std::unique_ptr<PartialFile> file_;
-  std::unique_ptr<MapWriter> writer_;
-};
 
 void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"map/min_spacing", "m", "skip an image closer than this to the last kept one of its session"},
@@ -280,7 +244,7 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   if (adjusts) geometries = geometryOf(*map, header_.sessions, fixes_, config_.geometry, resources_.threads);
   for (std::size_t i = 0; i < geometries.size(); ++i) {
     if (!geometries[i]) continue;
-    report_.session_images[i].geometry = summaryOf(*geometries[i]);
+    report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks
     if (!geometries[i]->contradicts_calibration) continue;
     geometries[i].reset();
     header_.sessions[i].camera.reset();

@@ -60,24 +60,6 @@ std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned
   return geometries;
 }
 
-SessionLandmarks summaryOf(const SessionGeometry& geometry) {
-  const auto images = std::count_if(geometry.images.begin(), geometry.images.end(),
-                                    [](const auto& image) { return image.has_value(); });
-  SessionLandmarks summary;
-  summary.images = static_cast<std::size_t>(images);
-  summary.landmarks = geometry.landmarks;
-  summary.sightings = geometry.sightings;
-  summary.contradicts_calibration = geometry.contradicts_calibration;
-  summary.focal_scale = geometry.focal_scale;
-  summary.far_share = geometry.far_share;
-  summary.tied_apart_m = geometry.tied_apart_m;
-  summary.agreeing_share = geometry.agreeing_share;
-  summary.median_error_px = geometry.median_error_px;
-  summary.mean_shift_m = geometry.mean_shift_m;
-  summary.largest_shift_m = geometry.largest_shift_m;
-  return summary;
-}
-
 std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& sessions,
                          std::vector<std::optional<SessionGeometry>> geometries, const MapBuilderConfig& config,
                          const std::function<void(const TrainingImage&)>& sink) {

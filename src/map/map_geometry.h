@@ -17,9 +17,6 @@ std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned
                                                        const std::vector<std::vector<MapFix>>& fixes,
                                                        const GeometryConfig& config, std::size_t threads);
 
-/// For the report.
-SessionLandmarks summaryOf(const SessionGeometry& geometry);
-
 /// Gives the images to `sink` where the adjustment has the robot, but for those that are too close to the one before
 /// (map/spacing, geometry/spacing); the number of these is returned.
 std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& sessions,

@@ -15,6 +15,7 @@
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
 #include "visual_localization/geometry/geometry_config.h"
+#include "visual_localization/geometry/session_landmarks.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -47,21 +48,6 @@ struct SessionCamera {
   std::optional<CameraModel> model = {};  ///< none: not calibrated
   Mask mask = {};                         ///< features under it are not used; empty: all are
   std::optional<SensorMount> mount = {};  ///< none: camera and antenna are where the robot is
-};
-
-/// What the adjustment of a session came to; all zero when its camera is not calibrated.
-struct SessionLandmarks {
-  std::size_t images = 0;  ///< with a pose and landmarks
-  std::size_t landmarks = 0;
-  std::size_t sightings = 0;             ///< features that show one
-  bool contradicts_calibration = false;  ///< then the session has places only
-  double focal_scale = 1.0;              ///< what the images say the focal length is, as a share of the calibration's
-  double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
-  double mean_shift_m = 0.0;             ///< of these images from the cleaned path
-  double largest_shift_m = 0.0;
-  double far_share = 0.0;       ///< of all images: moved by more than 3 m
-  double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
-  double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
 };
 
 /// What one session brought.
