@@ -17,11 +17,6 @@
 namespace visual_localization::map_schema {
 namespace {
 
-constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
-constexpr const char* kMount = "/mount/";    ///< likewise
-constexpr const char* kMask = "/mask";
-constexpr const char* kGeometryCount = "geometry/images";
-
 static_assert(kPoseBytes + kMaxFeaturesPerImage * landmarkBytes(kMaxFeaturesPerImage) <= kMaxRowBytes);
 
 /// Of every version, in order of name.
@@ -42,127 +37,6 @@ constexpr std::array<Table, 7> kTables{{
     {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
     {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
 }};
-
-/// Removes `key` from `meta` and returns its value.
-template <class T>
-T take(ParameterValues& meta, const std::string& key) {
-  const auto found = meta.find(key);
-  if (found == meta.end()) throw std::runtime_error("meta value '" + key + "' is missing");
-  const T* value = std::get_if<T>(&found->second);
-  if (value == nullptr) throw std::runtime_error("meta value '" + key + "' is of the wrong type");
-  T taken = *value;
-  meta.erase(found);
-  return taken;
-}
-
-int takeSide(ParameterValues& meta, const std::string& key) {
-  const auto side = take<std::int64_t>(meta, key);
-  if (side < kSmallestImageSide_px || side > kMaxImageSide_px) {
-    throw std::runtime_error("meta value '" + key + "' = " + std::to_string(side) + " is not in [" +
-                             std::to_string(kSmallestImageSide_px) + ", " + std::to_string(kMaxImageSide_px) + "]");
-  }
-  return static_cast<int>(side);
-}
-
-SiftConfig takeSift(ParameterValues& meta) {
-  SiftConfig sift;
-  ParameterValues values = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
-  for (auto& [name, value] : values) {
-    const auto found = meta.find(name);
-    if (found == meta.end()) throw std::runtime_error("meta value '" + name + "' is missing");
-    value = found->second;
-    meta.erase(found);
-  }
-  assignParameters(sift, values);
-  return sift;
-}
-
-std::string sessionKey(std::size_t session) { return "session/" + std::to_string(session); }
-
-/// Removes all values whose keys begin with `prefix` and returns them without it.
-ParameterValues takeGroup(ParameterValues& meta, const std::string& prefix) {
-  ParameterValues group;
-  auto value = meta.lower_bound(prefix);
-  while (value != meta.end() && value->first.compare(0, prefix.size(), prefix) == 0) {
-    group.emplace(value->first.substr(prefix.size()), value->second);
-    value = meta.erase(value);
-  }
-  return group;
-}
-
-std::optional<CameraModel> takeCamera(ParameterValues& meta, const std::string& session) {
-  const ParameterValues values = takeGroup(meta, session + kCamera);
-  if (values.empty()) return std::nullopt;
-  try {
-    return cameraOf(values);
-  } catch (const CameraError& error) {
-    throw std::runtime_error("the camera of " + session + ": " + error.what());
-  }
-}
-
-ParameterValues toValues(const SensorMount& mount) {
-  const Eigen::Vector3d& camera_m = mount.camera.position_m;
-  const Eigen::Quaterniond& rotation = mount.camera.rotation;
-  return {{"camera_x_m", camera_m.x()},         {"camera_y_m", camera_m.y()},
-          {"camera_z_m", camera_m.z()},         {"camera_qw", rotation.w()},
-          {"camera_qx", rotation.x()},          {"camera_qy", rotation.y()},
-          {"camera_qz", rotation.z()},          {"antenna_x_m", mount.antenna_m.x()},
-          {"antenna_y_m", mount.antenna_m.y()}, {"antenna_z_m", mount.antenna_m.z()}};
-}
-
-std::optional<SensorMount> takeMount(ParameterValues& meta, const std::string& session) {
-  ParameterValues values = takeGroup(meta, session + kMount);
-  if (values.empty()) return std::nullopt;
-  const auto number = [&values](const char* name) { return take<double>(values, name); };
-  SensorMount mount;
-  mount.camera.position_m = {number("camera_x_m"), number("camera_y_m"), number("camera_z_m")};
-  const double w = number("camera_qw");
-  const double x = number("camera_qx");
-  const double y = number("camera_qy");
-  mount.camera.rotation = Eigen::Quaterniond(w, x, y, number("camera_qz"));
-  mount.antenna_m = {number("antenna_x_m"), number("antenna_y_m"), number("antenna_z_m")};
-  try {
-    requireMount(mount);
-  } catch (const MountError& error) {
-    throw std::runtime_error("the mount of " + session + ": " + error.what());
-  }
-  if (!values.empty())
-    throw std::runtime_error("meta value '" + session + kMount + values.begin()->first + "' is unknown");
-  mount.camera.rotation.normalize();
-  return mount;
-}
-
-Mask takeMask(ParameterValues& meta, std::size_t session, const cv::Size& size, const MaskBits& masks) {
-  const std::string key = sessionKey(session);
-  const auto bits = masks.find(static_cast<std::int64_t>(session));
-  if ((meta.count(key + kMask) == 0) != (bits == masks.end())) {
-    throw std::runtime_error("the mask of " + key + " is missing or unexpected");
-  }
-  if (bits == masks.end()) return {};
-  const sqlite::Bytes bytes{bits->second.data(), bits->second.size()};
-  if (take<std::int64_t>(meta, key + kMask) != crc32Of(bytes)) {
-    throw std::runtime_error("the mask of " + key + " does not agree with its checksum");
-  }
-  return unpackMask(bytes, size);
-}
-
-std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::Size& size, const MaskBits& masks) {
-  std::vector<Session> sessions;
-  std::size_t used = 0;
-  while (meta.count(sessionKey(sessions.size())) != 0) {
-    const std::string key = sessionKey(sessions.size());
-    Session session{take<std::string>(meta, key)};
-    if (version >= kSinceCameras) {
-      session.camera = takeCamera(meta, key);
-      session.mount = takeMount(meta, key);
-      session.mask = takeMask(meta, sessions.size(), size, masks);
-    }
-    if (!session.mask.empty()) ++used;
-    sessions.push_back(std::move(session));
-  }
-  if (used != masks.size()) throw std::runtime_error("there is a mask without a session");
-  return sessions;
-}
 
 std::uint64_t bitsOf(double value) {
   // SQLite does not keep the sign of zero.
@@ -238,54 +112,6 @@ void ImageRow::addTo(Checksum& checksum) const {
     to += sizeof(value);
   }
   checksum.addRaw(bytes.data(), bytes.size());
-}
-
-ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
-  SiftConfig sift = header.sift;
-  ParameterValues meta = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
-  meta["datum/latitude_deg"] = header.datum.latitude_deg;
-  meta["datum/longitude_deg"] = header.datum.longitude_deg;
-  meta["datum/altitude_m"] = header.datum.altitude_m;
-  meta["image/width_px"] = std::int64_t{header.image_size.width};
-  meta["image/height_px"] = std::int64_t{header.image_size.height};
-  meta["package_version"] = std::string(VISUAL_LOCALIZATION_VERSION);
-  meta[kGeometryCount] = static_cast<std::int64_t>(geometry_count);
-  for (std::size_t i = 0; i < header.sessions.size(); ++i) {
-    const Session& session = header.sessions[i];
-    const std::string key = sessionKey(i);
-    meta[key] = session.name;
-    if (session.camera) {
-      for (const auto& [name, value] : toValues(*session.camera)) meta[key + kCamera + name] = value;
-    }
-    if (session.mount) {
-      for (const auto& [name, value] : toValues(*session.mount)) meta[key + kMount + name] = value;
-    }
-    if (session.mask.empty()) continue;
-    const std::vector<std::uint8_t> bits = packMask(session.mask);
-    meta[key + kMask] = crc32Of({bits.data(), bits.size()});
-  }
-  return meta;
-}
-
-std::size_t takeGeometryCount(ParameterValues& meta, int version) {
-  if (version < kSinceLandmarks) return 0;
-  const auto count = take<std::int64_t>(meta, kGeometryCount);
-  if (count >= 0 && count <= kMaxImages) return static_cast<std::size_t>(count);
-  throw std::runtime_error("meta value '" + std::string(kGeometryCount) + "' = " + std::to_string(count) +
-                           " is not in [0, " + std::to_string(kMaxImages) + "]");
-}
-
-MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
-  MapHeader header;
-  header.datum.latitude_deg = take<double>(meta, "datum/latitude_deg");
-  header.datum.longitude_deg = take<double>(meta, "datum/longitude_deg");
-  header.datum.altitude_m = take<double>(meta, "datum/altitude_m");
-  header.image_size = {takeSide(meta, "image/width_px"), takeSide(meta, "image/height_px")};
-  take<std::string>(meta, "package_version");
-  header.sift = takeSift(meta);
-  header.sessions = takeSessions(meta, version, header.image_size, masks);
-  if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");
-  return header;
 }
 
 std::vector<std::uint8_t> packMask(const Mask& mask) {

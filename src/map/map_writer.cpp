@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/files.h"
+#include "map/map_meta.h"
 #include "map/map_schema.h"
 #include "map/packed_geometry.h"
 #include "map/sqlite.h"
