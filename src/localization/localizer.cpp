@@ -2,11 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
-#include <sstream>
 #include <utility>
-
-#include <Eigen/Eigenvalues>
 
 #include "base/time.h"
 #include "localization/pose_verifier.h"
@@ -14,27 +10,11 @@
 
 namespace visual_localization {
 
-double Estimate::sigma_m() const {
-  if (metric) return metric->sigma_m();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(pose.covariance_m2, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
-}
-
-double Estimate::sigmaYaw_rad() const { return metric ? metric->sigmaYaw_rad() : std::sqrt(pose.yaw_variance_rad2); }
-
 namespace {
 
 constexpr std::size_t kSweptImages = 20;  ///< those of the whole map that look most alike: a few positions
 
 }  // namespace
-
-std::string Estimate::cameraTrouble() const {
-  if (!camera_contradicted) return "";
-  std::ostringstream text;
-  text << "the images ask for " << std::fixed << std::setprecision(1) << 100.0 * focal_scale
-       << " % of the calibration's focal length: no metric poses";
-  return text.str();
-}
 
 Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
     : Localizer(
@@ -101,13 +81,15 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.pose = poseOf(tracked, state);
   estimate.metric = metric;
   estimate.images_since_metric = verifier_->imagesSince();
-  estimate.focal_scale = verifier_->focal().scale();
-  estimate.camera_contradicted = verifier_->focal().contradicts();
+  if (isMetric()) {
+    scores_.count(verifier_->compared());
+    estimate.focal_scale = verifier_->focal().scale();
+    estimate.camera_contradicted = verifier_->focal().contradicts();
+  }
   estimate.tracked = tracked;
   choosePose(estimate);
   estimate.evidence = evidence;
   estimate.motion_residual_m = assessor_.motionResidual_m();
-  if (isMetric()) scores_.count(verifier_->compared());
   estimate.comparisons = scores_.comparisons();
   estimate.swept = scores_.swept();
   estimate.image = image_->report();

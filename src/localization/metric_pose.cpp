@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
+#include "localization/covariance.h"
 
 namespace visual_localization {
 namespace {
 
 /// Of the horizontal position.
-double largerSigma_m(const MetricPose::Covariance& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(covariance.topLeftCorner<2, 2>(), Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
-}
+double largerSigma_m(const MetricPose::Covariance& covariance) { return largerSigma(covariance.topLeftCorner<2, 2>()); }
 
 double yawSigma_rad(const MetricPose::Covariance& covariance) { return std::sqrt(std::max(0.0, covariance(5, 5))); }
 
