@@ -23,6 +23,11 @@ T upperMedian(std::vector<T>& values) {
 /// `values`, of which there must be one.
 double nearestRank(std::vector<double>& values, double share);
 
+/// Of `count` items every so many-th is taken, so that at most `most` are: at least 1.
+constexpr std::size_t strideFor(std::size_t count, std::size_t most) {
+  return count <= most ? 1 : (count + most - 1) / most;
+}
+
 /// Value below which `share` of the sorted values lie, linear between neighbours.
 double quantile(const std::vector<double>& sorted, double share);
 

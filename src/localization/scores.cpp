@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/statistics.h"
 #include "base/time.h"
 
 namespace visual_localization {
@@ -190,7 +191,7 @@ MapSweep::MapSweep(const TrainingMap& map, std::size_t max_images, std::size_t m
 }
 
 void MapSweep::configure(std::size_t max_images) {
-  stride_ = map_.size() / max_images + (map_.size() % max_images == 0 ? 0 : 1);
+  stride_ = strideFor(map_.size(), max_images);
   const std::size_t swept = (map_.size() + stride_ - 1) / stride_;
   offsets_ = std::clamp<std::size_t>(max_kept_ / swept, 1, stride_);
   startImage();

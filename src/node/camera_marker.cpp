@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include <tf2_eigen/tf2_eigen.h>
+
 namespace visual_localization {
 namespace {
 
@@ -34,18 +36,10 @@ std::array<Eigen::Vector2d, 4> cornersOf(const CameraModel& camera) {
   return corners;
 }
 
-geometry_msgs::Point toPoint(const Eigen::Vector3d& position_m) {
-  geometry_msgs::Point point;
-  point.x = position_m.x();
-  point.y = position_m.y();
-  point.z = position_m.z();
-  return point;
-}
-
 void addLine(Marker& marker, const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
   if (!from_m.allFinite() || !to_m.allFinite()) return;
-  marker.points.push_back(toPoint(from_m));
-  marker.points.push_back(toPoint(to_m));
+  marker.points.push_back(tf2::toMsg(from_m));
+  marker.points.push_back(tf2::toMsg(to_m));
 }
 
 void addFrustum(Marker& marker, const CameraPose& pose, const CameraModel& camera) {

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <tf2_eigen/tf2_eigen.h>
+
 #include "base/statistics.h"
 #include "node/message_conversions.h"
 #include "survey/landmark_points.h"
@@ -21,8 +23,6 @@ constexpr double kHeadingWidth_m = 0.12;
 constexpr double kLandmarkSize_m = 0.25;
 /// Of a larger map only every k-th image is shown: a message of a million poses would stop rviz.
 constexpr std::size_t kMostShown = 20000;
-
-std::size_t strideThrough(const TrainingMap& map) { return (map.size() + kMostShown - 1) / kMostShown; }
 
 constexpr std::size_t kMostLandmarks = 200000;
 /// Landmarks are read from the map's file, which takes seconds for many more images.
@@ -45,16 +45,7 @@ constexpr std::array<Colour, 6> kSessionColours{{{0.00F, 0.45F, 0.70F},
                                                  {0.34F, 0.71F, 0.91F}}};
 
 geometry_msgs::Point pointAt(const Eigen::Vector2d& position_m) {
-  geometry_msgs::Point point;
-  point.x = position_m.x();
-  point.y = position_m.y();
-  return point;
-}
-
-geometry_msgs::Point pointInSpace(const Eigen::Vector3d& position_m) {
-  geometry_msgs::Point point = pointAt(Eigen::Vector2d(position_m.head<2>()));
-  point.z = position_m.z();
-  return point;
+  return tf2::toMsg(Eigen::Vector3d(position_m.x(), position_m.y(), 0.0));
 }
 
 visualization_msgs::Marker emptyMarker(const std::string& frame_id, const std::string& name_space, int session,
@@ -107,7 +98,7 @@ visualization_msgs::Marker landmarkMarker(const TrainingMap& map, const std::str
   auto marker = emptyMarker(frame_id, "landmarks", 0, visualization_msgs::Marker::POINTS);
   marker.scale.x = marker.scale.y = kLandmarkSize_m;
   for (const LandmarkPoint& landmark : landmarkPoints(map, kMostRead, kMostLandmarks)) {
-    marker.points.push_back(pointInSpace(landmark.position_m));
+    marker.points.push_back(tf2::toMsg(landmark.position_m));
   }
   if (marker.points.empty()) return marker;
   std::vector<double> heights_m;
@@ -126,7 +117,7 @@ nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id) {
   nav_msgs::Path path;
   path.header.frame_id = frame_id;
   path.poses.reserve(std::min(map.size(), kMostShown));
-  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
+  for (std::size_t i = 0; i < map.size(); i += strideFor(map.size(), kMostShown)) {
     geometry_msgs::PoseStamped pose;
     pose.header.frame_id = frame_id;
     pose.pose.position = pointAt(map.position_m(i));
@@ -145,7 +136,7 @@ visualization_msgs::MarkerArray toMarkers(const TrainingMap& map, const std::str
     markers.markers.push_back(emptyPositions(session, frame_id));
     markers.markers.push_back(emptyHeadings(session, frame_id));
   }
-  for (std::size_t i = 0; i < map.size(); i += strideThrough(map)) {
+  for (std::size_t i = 0; i < map.size(); i += strideFor(map.size(), kMostShown)) {
     const TrainingPose image = map.pose(i);
     const auto session = static_cast<std::size_t>(image.session);
     const Eigen::Vector2d direction(std::cos(image.yaw_rad), std::sin(image.yaw_rad));

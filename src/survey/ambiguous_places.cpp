@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "base/statistics.h"
 #include "visual_localization/localization/scores.h"
 
 namespace visual_localization {
@@ -36,7 +37,7 @@ class Search {
         global_(config.similarity),
         sift_(config.match, config.similarity),
         work_left_(config.most_work) {
-    result_.stride = std::max<std::size_t>(1, (map.size() + config.most_images - 1) / config.most_images);
+    result_.stride = strideFor(map.size(), config.most_images);
     for (std::size_t i = 0; i < map.size(); i += result_.stride) globals_.push_back(map.global(i));
   }
 

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <unordered_set>
 
+#include "base/statistics.h"
+
 namespace visual_localization {
 namespace {
-
-std::size_t strideFor(std::size_t count, std::size_t most) { return (count + most - 1) / most; }
 
 std::vector<LandmarkPoint> everyOf(const std::vector<LandmarkPoint>& points, std::size_t stride) {
   std::vector<LandmarkPoint> some;

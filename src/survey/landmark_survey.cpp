@@ -35,7 +35,7 @@ LandmarkSurvey landmarkSurvey(const TrainingMap& map, std::size_t most_images) {
   LandmarkSurvey survey;
   survey.images = map.geometryCount();
   if (survey.images == 0) return survey;
-  const std::size_t stride = (map.size() - 1) / most_images + 1;
+  const std::size_t stride = strideFor(map.size(), most_images);
   std::vector<std::size_t> counts;
   DifferentNumbers ids;
   for (std::size_t i = 0; i < map.size(); i += stride) {
