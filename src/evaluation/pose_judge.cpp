@@ -50,12 +50,8 @@ void judgePose(const Estimate& estimate, const Eigen::Vector2d& truth_m, const s
 
 std::string tumLine(const Estimate& estimate) {
   if (!estimate.metric) return tumLine(estimate.stamp_ns, estimate.pose.position_m, estimate.pose.yaw_rad);
-  Eigen::Matrix3d ahead_in_camera;  // columns: ahead, left and up in the camera's optical frame
-  ahead_in_camera.col(0) = Eigen::Vector3d::UnitZ();
-  ahead_in_camera.col(1) = -Eigen::Vector3d::UnitX();
-  ahead_in_camera.col(2) = -Eigen::Vector3d::UnitY();
-  const CameraPose& camera = estimate.metric->camera;
-  return tumLine(estimate.stamp_ns, camera.position_m, camera.rotation * Eigen::Quaterniond(ahead_in_camera));
+  const Eigen::Isometry3d& base = estimate.metric->base;
+  return tumLine(estimate.stamp_ns, base.translation(), Eigen::Quaterniond(base.linear()));
 }
 
 std::string tumLine(std::int64_t stamp_ns, const Eigen::Vector2d& position_m, double yaw_rad) {

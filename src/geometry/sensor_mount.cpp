@@ -73,12 +73,13 @@ Eigen::Vector3d parseAntennaMount(const std::string& text) {
 
 std::string describe(const SensorMount& mount) {
   const Eigen::Vector3d ahead = mount.camera.ahead();
+  const Eigen::IOFormat row(Eigen::StreamPrecision, Eigen::DontAlignCols);
   std::ostringstream out;
   out.imbue(std::locale::classic());
-  out << std::fixed << std::setprecision(2) << "camera at " << mount.camera.position_m.transpose() << " m, looking "
-      << std::setprecision(1) << std::atan2(ahead.y(), ahead.x()) * 180.0 / kPi << " degrees to the left and "
-      << std::asin(std::min(1.0, std::max(-1.0, ahead.z()))) * 180.0 / kPi << " up; antenna at " << std::setprecision(2)
-      << mount.antenna_m.transpose() << " m";
+  out << std::fixed << std::setprecision(2) << "camera at " << mount.camera.position_m.transpose().format(row)
+      << " m, looking " << std::setprecision(1) << std::atan2(ahead.y(), ahead.x()) * 180.0 / kPi
+      << " degrees to the left and " << std::asin(std::min(1.0, std::max(-1.0, ahead.z()))) * 180.0 / kPi
+      << " up; antenna at " << std::setprecision(2) << mount.antenna_m.transpose().format(row) << " m";
   return out.str();
 }
 

@@ -74,7 +74,7 @@ TEST(PoseJudge, WritesPlacesAsLevelTumPoses) {
 TEST(PoseJudge, WritesSolvedPosesWithXAhead) {
   Estimate estimate = estimateOf(PoseSource::kMetric, LocalizationState::kTracking);
   estimate.metric.emplace();
-  estimate.metric->camera = {levelCamera(0.5 * kPi), {1.0, 2.0, 0.5}};
+  estimate.metric->base = SensorMount().baseInMap({levelCamera(0.5 * kPi), {1.0, 2.0, 0.5}});
   std::istringstream in(tumLine(estimate));
   double stamp = 0.0;
   Eigen::Vector3d position;
