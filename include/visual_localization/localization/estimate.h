@@ -17,7 +17,7 @@ namespace visual_localization {
 /// Position and heading in the map frame.
 struct PoseEstimate {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();         ///< east, north
-  double yaw_rad = 0.0;                                         ///< of the training image, 0 = east, ccw
+  double yaw_rad = 0.0;                                         ///< of the robot, 0 = east, ccw
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();  ///< of the position
   double yaw_variance_rad2 = 0.0;
   GeodeticPoint geodetic;  ///< the same position by the map's datum
@@ -36,7 +36,7 @@ struct Estimate {
   double focal_scale = 1.0;          ///< focal length by the last images with a pose, as a share of the calibration's
   bool camera_contradicted = false;  ///< by them: no pose is metric
   double motion_residual_m = 0.0;    ///< see MotionConsistency; of the last estimates
-  std::size_t comparisons = 0;       ///< distinct training images that particles were compared with
+  std::size_t comparisons = 0;       ///< distinct training images that particles or landmarks were compared with
   std::size_t swept = 0;             ///< distinct training images compared beside these, see MapSweep
   ImageReport image;                 ///< statistics, features, times
   double update_ms = 0.0;            ///< wall-clock time of all but extraction and comparisons
