@@ -24,7 +24,7 @@ geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad);
 bool isFinite(const Estimate& estimate);
 bool isFinite(const Particle& particle);
 
-/// A metric pose: that of the camera, with the covariance of all 6 axes (x, y, z, rotation about x, y, z of the map),
+/// A metric pose: that of the robot, with the covariance of all 6 axes (x, y, z, rotation about x, y, z of the map),
 /// map included. Otherwise position, heading and their covariance; height, roll and pitch are zero. `header`: map
 /// frame.
 geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header);

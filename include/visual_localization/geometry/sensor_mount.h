@@ -42,7 +42,7 @@ CameraPose parseCameraMount(const std::string& text);
 /// "x y z", metres. Throws MountError.
 Eigen::Vector3d parseAntennaMount(const std::string& text);
 
-/// For people: "camera 0.20 0.05 1.10 m, 15.0 degrees to the left, ...; antenna ...".
+/// For people: "camera at 0.20 0.05 1.10 m, looking 15.0 degrees to the left and 0.0 up; antenna at ...".
 std::string describe(const SensorMount& mount);
 
 }  // namespace visual_localization

@@ -39,7 +39,7 @@ struct Estimate {
   std::size_t comparisons = 0;       ///< distinct training images that particles or landmarks were compared with
   std::size_t swept = 0;             ///< distinct training images compared beside these, see MapSweep
   ImageReport image;                 ///< statistics, features, times
-  double update_ms = 0.0;            ///< wall-clock time of all but extraction and comparisons
+  double update_ms = 0.0;            ///< wall-clock time of all but extraction, comparisons and geometry
   std::size_t repeats = 0;           ///< images in a row, this one included, that repeated the one before
   bool frozen = false;               ///< too many of them: the camera must be broken
 

@@ -44,7 +44,7 @@ struct TrainingImage : TrainingPose {
 /// Where the images of a map were taken, image by image: 40 bytes each, all that is always in memory of a large map.
 struct TrainingPoses {
   std::vector<Eigen::Vector2d> positions_m;  ///< east, north in the map frame
-  std::vector<double> yaws_rad;              ///< direction of travel, 0 = east, counter-clockwise
+  std::vector<double> yaws_rad;              ///< see TrainingPose
   std::vector<std::int64_t> stamps_ns;
   std::vector<std::int32_t> sessions;         ///< which of MapHeader::sessions
   std::vector<std::uint32_t> feature_counts;  ///< SIFT features after pruning
