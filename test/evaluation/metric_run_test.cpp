@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <memory>
 #include <random>
-#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -15,8 +14,7 @@ namespace {
 /// A street with landmarks, and a drive along it 0.3 m beside the training images, known by its features.
 class RecordedStreet {
  public:
-  RecordedStreet() : poses_(test::drive({})), world_(test::pointsAlong(poses_, 6.0, random_)) {
-    makeMap();
+  RecordedStreet() {
     drive_.image_size = camera_.size();
     drive_.camera = camera_;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
@@ -48,30 +46,11 @@ class RecordedStreet {
   Drive& drive() { return drive_; }
 
  private:
-  void makeMap() {
-    const test::RecordedDrive recorded = test::record(poses_, world_, 0.1, random_);
-    const UnadjustedSession session = recorded.unadjusted();
-    SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
-    std::vector<TrainingImage> images(poses_.size());
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      images[i].stamp_ns = session.images[i].stamp_ns;
-      images[i].sift = *recorded.views[i];
-      images[i].geometry = std::move(geometry.images[i]);
-      images[i].position_m = images[i].geometry->camera.position_m.head<2>();
-      images[i].yaw_rad = images[i].geometry->camera.yaw_rad();
-    }
-    MapHeader header;
-    header.datum = {48.5, 9.0, 400.0};
-    header.image_size = camera_.size();
-    header.sessions = {{"street", camera_}};
-    map_ = std::make_shared<const TrainingMap>(header, std::move(images));
-  }
-
   CameraModel camera_ = test::streetCamera();
   std::mt19937 random_{3};
-  std::vector<test::DrivenPose> poses_;
-  std::vector<test::WorldPoint> world_;
-  std::shared_ptr<const TrainingMap> map_;
+  std::vector<test::DrivenPose> poses_ = test::drive({});
+  std::vector<test::WorldPoint> world_ = test::pointsAlong(poses_, 6.0, random_);
+  std::shared_ptr<const TrainingMap> map_ = test::mapOf(test::record(poses_, world_, 0.1, random_));
   std::vector<std::optional<TruePose>> truth_;
   Drive drive_;
 };

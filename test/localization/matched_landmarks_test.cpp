@@ -18,25 +18,6 @@ class MatchedLandmarksTest : public testing::Test {
  protected:
   static constexpr std::size_t kImage = 14;
 
-  TrainingMap mapOfStreet() {
-    const test::RecordedDrive drive = test::record(poses_, world_, 0.1, random_);
-    const UnadjustedSession session = drive.unadjusted();
-    SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
-    std::vector<TrainingImage> images(poses_.size());
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      images[i].stamp_ns = session.images[i].stamp_ns;
-      images[i].sift = *drive.views[i];
-      images[i].geometry = std::move(geometry.images[i]);
-      images[i].position_m = images[i].geometry->camera.position_m.head<2>();
-      images[i].yaw_rad = images[i].geometry->camera.yaw_rad();
-    }
-    MapHeader header;
-    header.datum = {48.5, 9.0, 400.0};
-    header.image_size = camera_.size();
-    header.sessions = {{"street", camera_}};
-    return TrainingMap(header, std::move(images));
-  }
-
   /// Every fourth feature lies where it should not.
   SiftFeatures seenWithStrangers() {
     const SiftFeatures seen = test::viewOf(world_, camera_, poses_[kImage].camera, 0.3, random_).features;
@@ -51,9 +32,9 @@ class MatchedLandmarksTest : public testing::Test {
   std::mt19937 random_{1};
   std::vector<test::DrivenPose> poses_ = test::drive({});
   std::vector<test::WorldPoint> world_ = test::pointsAlong(poses_, 6.0, random_);
-  TrainingMap map_ = mapOfStreet();
+  std::shared_ptr<const TrainingMap> map_ = test::mapOf(test::record(poses_, world_, 0.1, random_));
   SiftFeatures seen_ = seenWithStrangers();
-  PoseVerifier verifier_{map_, {}};
+  PoseVerifier verifier_{*map_, {}};
 };
 
 TEST_F(MatchedLandmarksTest, AgreeWhereTheProjectionIsAndDisagreeElsewhere) {
@@ -61,8 +42,8 @@ TEST_F(MatchedLandmarksTest, AgreeWhereTheProjectionIsAndDisagreeElsewhere) {
   const std::optional<MetricPose> pose = verifier_.nearOneOf({kImage});
   ASSERT_TRUE(pose);
   const MatchedLandmarks& matched = verifier_.matched();
-  const auto features = map_.sift(matched.training_image);
-  const auto geometry = map_.geometry(matched.training_image);
+  const auto features = map_->sift(matched.training_image);
+  const auto geometry = map_->geometry(matched.training_image);
   std::size_t inliers = 0;
   for (const MatchedLandmark& landmark : matched.landmarks) {
     ASSERT_LT(landmark.training_feature, features->size());

@@ -21,25 +21,6 @@ constexpr std::size_t kFew = 15;  ///< matches: between the default of 12 near a
 /// A map of a street, its landmarks found by the adjustment of a drive.
 class StreetMap {
  public:
-  StreetMap() : random_(1), poses_(test::drive({})), world_(test::pointsAlong(poses_, 6.0, random_)) {
-    const test::RecordedDrive drive = test::record(poses_, world_, 0.1, random_);
-    const UnadjustedSession session = drive.unadjusted();
-    SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
-    std::vector<TrainingImage> images(poses_.size());
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      images[i].stamp_ns = session.images[i].stamp_ns;
-      images[i].sift = *drive.views[i];
-      images[i].geometry = std::move(geometry.images[i]);
-      images[i].position_m = images[i].geometry->camera.position_m.head<2>();
-      images[i].yaw_rad = images[i].geometry->camera.yaw_rad();
-    }
-    MapHeader header;
-    header.datum = {48.5, 9.0, 400.0};
-    header.image_size = camera_.size();
-    header.sessions = {{"street", camera_}};
-    map_ = std::make_shared<const TrainingMap>(header, std::move(images));
-  }
-
   const TrainingMap& map() const { return *map_; }
   const CameraModel& camera() const { return camera_; }
 
@@ -71,10 +52,10 @@ class StreetMap {
   }
 
   CameraModel camera_ = test::streetCamera();
-  std::mt19937 random_;
-  std::vector<test::DrivenPose> poses_;
-  std::vector<test::WorldPoint> world_;
-  std::shared_ptr<const TrainingMap> map_;
+  std::mt19937 random_{1};
+  std::vector<test::DrivenPose> poses_ = test::drive({});
+  std::vector<test::WorldPoint> world_ = test::pointsAlong(poses_, 6.0, random_);
+  std::shared_ptr<const TrainingMap> map_ = test::mapOf(test::record(poses_, world_, 0.1, random_));
 };
 
 /// Known by its features.

@@ -152,6 +152,24 @@ RecordedDrive record(const std::vector<DrivenPose>& poses, const std::vector<Wor
   return recorded;
 }
 
+std::shared_ptr<const TrainingMap> mapOf(const RecordedDrive& drive) {
+  const UnadjustedSession session = drive.unadjusted();
+  SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  std::vector<TrainingImage> images(drive.views.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    images[i].stamp_ns = session.images[i].stamp_ns;
+    images[i].sift = *drive.views[i];
+    images[i].geometry = std::move(geometry.images[i]);
+    images[i].position_m = images[i].geometry->camera.position_m.head<2>();
+    images[i].yaw_rad = images[i].geometry->camera.yaw_rad();
+  }
+  MapHeader header;
+  header.datum = {48.5, 9.0, 400.0};
+  header.image_size = drive.camera.size();
+  header.sessions = {{"street", drive.camera}};
+  return std::make_shared<const TrainingMap>(header, std::move(images));
+}
+
 void bendFixes(RecordedDrive& drive, double begin, double end, double most_m) {
   const auto count = static_cast<double>(drive.fixes.size());
   for (std::size_t i = 0; i < drive.fixes.size(); ++i) {

@@ -12,6 +12,7 @@
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geometry/camera_pose.h"
+#include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {
 
@@ -77,6 +78,9 @@ struct RecordedDrive {
 /// Images of `world`, and fixes with an error of `fix_noise_m` (one sigma).
 RecordedDrive record(const std::vector<DrivenPose>& poses, const std::vector<WorldPoint>& world, double fix_noise_m,
                      std::mt19937& random);
+
+/// The map that the adjustment of this drive makes: every image of it, with its features and landmarks.
+std::shared_ptr<const TrainingMap> mapOf(const RecordedDrive& drive);
 
 /// Reflected signals: from `begin` to `end` (shares of the drive) the fixes bend aside, by `most_m` in the middle.
 void bendFixes(RecordedDrive& drive, double begin, double end, double most_m);
