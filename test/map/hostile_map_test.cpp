@@ -6,6 +6,7 @@
 #include <sqlite3.h>
 
 #include "test/support/example_map.h"
+#include "test/support/tamper.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
 
@@ -77,16 +78,7 @@ class HostileMap : public testing::Test {
 
   void restore() const { saveMap({test::exampleHeader(), test::exampleImages(6, 10)}, path_); }
 
-  /// Changes the stored map with SQL.
-  void tamper(const std::string& sql) const {
-    sqlite3* database = nullptr;
-    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
-    sqlite3_db_config(database, SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
-    char* message = nullptr;
-    const std::string all = "PRAGMA writable_schema = ON; " + sql;
-    EXPECT_EQ(sqlite3_exec(database, all.c_str(), nullptr, nullptr, &message), SQLITE_OK) << sql << ": " << message;
-    sqlite3_close(database);
-  }
+  void tamper(const std::string& sql) const { test::tamper(path_, "PRAGMA writable_schema = ON; " + sql); }
 
   std::size_t rootOf(const std::string& table) const {
     sqlite3* database = nullptr;

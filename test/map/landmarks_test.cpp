@@ -9,13 +9,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include "map/little_endian.h"
 #include "map/map_schema.h"
 #include "map/map_writer.h"
 #include "map/packed_geometry.h"
 #include "test/support/example_map.h"
+#include "test/support/tamper.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
 
@@ -196,13 +196,7 @@ class Landmarks : public testing::Test {
 
   void restore() const { saveMap({test::exampleHeader(), test::exampleImages(6, kFeatures)}, path_); }
 
-  void tamper(const std::string& sql) const {
-    sqlite3* database = nullptr;
-    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
-    char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << sql << ": " << message;
-    sqlite3_close(database);
-  }
+  void tamper(const std::string& sql) const { test::tamper(path_, sql); }
 
   /// Replaces the row of an image by one whose checksum is right.
   void put(std::int64_t image, const PackedGeometry& packed) const {

@@ -9,10 +9,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include "map/map_writer.h"
 #include "test/support/example_map.h"
+#include "test/support/tamper.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
 
@@ -62,12 +62,7 @@ class LargeMap : public testing::Test {
     }
   }
 
-  void tamper(const std::string& sql) const {
-    sqlite3* database = nullptr;
-    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sql;
-    sqlite3_close(database);
-  }
+  void tamper(const std::string& sql) const { test::tamper(path_, sql); }
 
   /// Uses everything in the map; what comes out is either right or nothing.
   void expectRightOrNothing(const TrainingMap& map) const {

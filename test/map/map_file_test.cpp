@@ -6,12 +6,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sqlite3.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "test/support/example_map.h"
+#include "test/support/tamper.h"
 #include "test/support/temporary_folder.h"
 
 namespace visual_localization {
@@ -91,14 +91,7 @@ class MapStore : public testing::Test {
  protected:
   void SetUp() override { saveMap(exampleMap(), path_); }
 
-  /// Changes the stored map with SQL, as an attacker could.
-  void tamper(const std::string& sql) const {
-    sqlite3* database = nullptr;
-    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
-    char* message = nullptr;
-    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-    sqlite3_close(database);
-  }
+  void tamper(const std::string& sql) const { test::tamper(path_, sql); }
 
   test::TemporaryFolder folder_;
   std::string path_ = folder_ / "a map?#%20.map";
