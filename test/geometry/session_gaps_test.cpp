@@ -1,0 +1,133 @@
+// What a session may lack: motion, texture, images or fixes.
+
+#include <memory>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "test/geometry/recorded_street.h"
+
+namespace visual_localization {
+namespace {
+
+using test::adjusted;
+using test::DrivenPose;
+using test::imagesIn;
+using test::kDensity;
+using test::kFixNoise_m;
+using test::kPathError_m;
+using test::pathError_m;
+using test::recorded;
+using test::RecordedDrive;
+
+/// Cameras at one place for one image a second; each turned by `turn_rad` against the one before.
+RecordedDrive standing(std::size_t images, double turn_rad) {
+  std::mt19937 random(9);
+  auto world = test::pointsAlong(test::drive({}), kDensity, random);
+  std::vector<DrivenPose> poses(images);
+  for (std::size_t i = 0; i < images; ++i) {
+    poses[i].travel_yaw_rad = turn_rad * static_cast<double>(i);
+    poses[i].camera.rotation = levelCamera(poses[i].travel_yaw_rad);
+  }
+  return test::record(poses, world, kFixNoise_m, random);
+}
+
+/// The same session with the true path instead of the cleaned one, which needs a robot that moves.
+UnadjustedSession withTruePath(const RecordedDrive& drive) {
+  UnadjustedSession session;
+  session.camera = &drive.camera;
+  session.fixes = drive.fixes;
+  session.features = [&drive](std::size_t i) { return drive.views[i]; };
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    session.images.push_back({static_cast<std::int64_t>(i) * 1'000'000'000, drive.truth[i].camera.position_m.head<2>(),
+                              drive.truth[i].travel_yaw_rad});
+  }
+  return session;
+}
+
+TEST(SessionGeometry, OfARobotThatStandsIsNone) {
+  const RecordedDrive drive = standing(20, 0.0);
+  const SessionGeometry geometry = adjustSessions({withTruePath(drive)}, {}, 1).front();
+  EXPECT_EQ(geometry.images.size(), 20U);
+  EXPECT_EQ(imagesIn(geometry), 0U);
+}
+
+TEST(SessionGeometry, OfARobotThatTurnsOnTheSpotIsNone) {
+  const RecordedDrive drive = standing(20, 0.05);
+  const SessionGeometry geometry = adjustSessions({withTruePath(drive)}, {}, 1).front();
+  EXPECT_EQ(geometry.images.size(), 20U);
+  EXPECT_EQ(imagesIn(geometry), 0U);
+}
+
+TEST(SessionGeometry, WithoutTextureIsNone) {
+  RecordedDrive drive = recorded({}, 10);
+  for (auto& view : drive.views) view = std::make_shared<const SiftFeatures>();
+  const SessionGeometry geometry = adjusted(drive);
+  EXPECT_EQ(geometry.images.size(), drive.truth.size());
+  EXPECT_EQ(imagesIn(geometry), 0U);
+  EXPECT_EQ(geometry.landmarks, 0U);
+}
+
+// No pair of images bridges it, so the two parts hang on the fixes and the direction of travel alone: straight on,
+// since in turns the cleaned path cuts corners and misses that direction by up to 0.15 rad.
+TEST(SessionGeometry, HasAHoleWhereNothingIsToBeSeen) {
+  test::StreetDrive street;
+  street.turn_rad = 0.0;
+  RecordedDrive drive = recorded(street, 11);
+  for (std::size_t i = 20; i < 25; ++i) drive.views[i] = std::make_shared<const SiftFeatures>();
+  const SessionGeometry geometry = adjusted(drive);
+  EXPECT_EQ(imagesIn(geometry), drive.truth.size() - 5);
+  for (std::size_t i = 20; i < 25; ++i) EXPECT_FALSE(geometry.images[i]) << i;
+  EXPECT_LT(pathError_m(geometry, drive.truth), kPathError_m);
+}
+
+TEST(SessionGeometry, OfNoImagesIsNone) {
+  const CameraModel camera = test::streetCamera();
+  UnadjustedSession session;
+  session.camera = &camera;
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  EXPECT_TRUE(geometry.images.empty());
+  EXPECT_EQ(geometry.landmarks, 0U);
+}
+
+TEST(SessionGeometry, OfASingleImageIsNone) {
+  test::StreetDrive street;
+  street.images = 2;
+  RecordedDrive drive = recorded(street, 14);
+  UnadjustedSession session = withTruePath(drive);
+  session.images.pop_back();
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  ASSERT_EQ(geometry.images.size(), 1U);
+  EXPECT_FALSE(geometry.images[0]);
+}
+
+TEST(SessionGeometry, BridgesImagesWithoutFixes) {
+  RecordedDrive drive = recorded({}, 12);
+  auto& fixes = drive.fixes;
+  const auto third = static_cast<std::ptrdiff_t>(fixes.size() / 3);
+  fixes.erase(fixes.begin() + third, fixes.begin() + 2 * third);
+  EXPECT_LT(pathError_m(adjusted(drive), drive.truth), kPathError_m);
+}
+
+void expectFinite(const SessionGeometry& geometry) {
+  for (const auto& image : geometry.images) {
+    if (!image) continue;
+    EXPECT_TRUE(image->camera.position_m.allFinite());
+    EXPECT_TRUE(image->camera.rotation.coeffs().allFinite());
+    for (const SeenLandmark& landmark : image->landmarks) EXPECT_TRUE(landmark.offset_m.allFinite());
+  }
+}
+
+// Nothing says where the path is then: it only must not fall apart.
+TEST(SessionGeometry, WithoutAnyFixIsFinite) {
+  const RecordedDrive drive = recorded({}, 13);
+  UnadjustedSession session = drive.unadjusted();
+  session.fixes.clear();
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  EXPECT_EQ(geometry.images.size(), drive.truth.size());
+  expectFinite(geometry);
+  EXPECT_LT(pathError_m(geometry, drive.truth), 5.0);
+}
+
+}  // namespace
+}  // namespace visual_localization
