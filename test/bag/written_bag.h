@@ -1,0 +1,106 @@
+#pragma once
+
+#include <csignal>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <rosbag/bag.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "bag/bag_file.h"
+#include "test/support/temporary_folder.h"
+#include "visual_localization/bag/bag_reader.h"
+#include "visual_localization/ros/image_conversion.h"
+
+namespace visual_localization::test {
+
+/// Bags, and bytes that may be none.
+class BagFileTest : public testing::Test {
+ protected:
+  /// Twelve images and fixes in several chunks.
+  std::string writeBag(rosbag::compression::CompressionType compression) {
+    const std::string path = folder_ / ("good" + std::to_string(static_cast<int>(compression)) + ".bag");
+    rosbag::Bag bag(path, rosbag::bagmode::Write);
+    bag.setCompression(compression);
+    bag.setChunkThreshold(2000);
+    for (int i = 0; i < 12; ++i) {
+      const ros::Time stamp(1000.0 + i);
+      sensor_msgs::CompressedImage image;
+      image.header.stamp = stamp;
+      image.format = "jpeg";
+      cv::imencode(".jpg", cv::Mat(32, 48, CV_8UC1, cv::Scalar(10 * i)), image.data);
+      bag.write("/camera/compressed", stamp, image);
+      sensor_msgs::NavSatFix fix;
+      fix.header.stamp = stamp;
+      fix.latitude = 48.5;
+      bag.write("/gps/fix", stamp, fix);
+    }
+    bag.close();
+    return path;
+  }
+
+  std::string writeBytes(const std::string& bytes) {
+    const std::string path = folder_ / "mutated.bag";
+    writeAll(path, bytes);
+    return path;
+  }
+
+  /// Why a bag cannot be read from its beginning to its end.
+  static std::string refusal(const std::string& path) {
+    try {
+      bag::BagFile bag(path);
+      std::set<std::uint32_t> all;
+      for (const auto& [id, connection] : bag.connections()) all.insert(id);
+      for (const bag::Message& message : bag.messages(all)) bag.read(message);
+    } catch (const bag::DamagedBag& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+  /// The signal that ended a process that read the bag; 0 when it came to an end by itself.
+  static int signalWhileReading(const std::string& path) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // these need far more addresses
+      const rlimit memory{1UL << 31U, 1UL << 31U};
+      ::setrlimit(RLIMIT_AS, &memory);
+#endif
+      ::alarm(20);
+      allowRefusal([&] { use(path); });
+      ::_exit(0);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  }
+
+ private:
+  /// `action`; a bag or an image may be refused.
+  template <class Action>
+  static void allowRefusal(Action action) {
+    try {
+      action();
+    } catch (const BagError&) {
+    } catch (const ImageError&) {
+    }
+  }
+
+  /// What programs do with a bag, and they go on where a program would not.
+  static void use(const std::string& path) {
+    const BagReader bag(path);
+    allowRefusal([&] { bag.fixes("/gps/fix"); });
+    const BagImages images = bag.images("/camera");
+    for (std::size_t i = 0; i < images.size(); ++i) allowRefusal([&] { images.read(i).decode(); });
+  }
+
+  TemporaryFolder folder_;
+};
+
+}  // namespace visual_localization::test
