@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "test/node/map_header.h"
 #include "test/support/example_map.h"
 
 namespace visual_localization {
@@ -11,12 +12,7 @@ namespace {
 
 using visualization_msgs::Marker;
 
-std_msgs::Header header() {
-  std_msgs::Header header;
-  header.frame_id = "map";
-  header.stamp = ros::Time(12, 5);
-  return header;
-}
+std_msgs::Header header() { return test::mapHeader({12, 5}); }
 
 /// Level, 2 m up, looking north.
 Estimate metricEstimate() {

@@ -2,15 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include "test/node/map_header.h"
+
 namespace visual_localization {
 namespace {
 
-std_msgs::Header headerAt(double time_s) {
-  std_msgs::Header header;
-  header.frame_id = "map";
-  header.stamp = ros::Time(time_s);
-  return header;
-}
+std_msgs::Header headerAt(double time_s) { return test::mapHeader(ros::Time(time_s)); }
 
 Estimate placeAt(double east_m) {
   Estimate estimate;

@@ -8,18 +8,15 @@
 #include <gtest/gtest.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
 
+#include "test/node/map_header.h"
+
 namespace visual_localization {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std_msgs::Header header() {
-  std_msgs::Header header;
-  header.frame_id = "map";
-  header.stamp = ros::Time(1224840901, 250);
-  return header;
-}
+std_msgs::Header header() { return test::mapHeader({1224840901, 250}); }
 
 Estimate someEstimate() {
   Estimate estimate;
