@@ -1,9 +1,11 @@
-/// A bag file: its structure, its fixes and its images.
+/// A bag file: its structure, its fixes and its images, the camera and where the robot carries it.
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/bag/bag_reader.h"
+#include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
@@ -17,6 +19,22 @@ void readImages(const BagReader& bag, const std::string& topic) {
   }
 }
 
+void readCamera(const BagReader& bag, const std::string& topic) {
+  const std::optional<CameraModel> camera = bag.camera(topic);
+  if (camera && !camera->project(Eigen::Vector3d::UnitZ()).allFinite()) fuzz::fail("a camera that does not see ahead");
+}
+
+void readMount(const BagReader& bag, const std::string& topic) {
+  const std::optional<SensorMount> mount = bag.mount(topic, "/fix", "base_link");
+  if (mount) requireMount(*mount);
+}
+
+void readTopic(const BagReader& bag, const std::string& topic) {
+  fuzz::expect<BagError>([&] { readImages(bag, topic); });
+  fuzz::expect<BagError>([&] { readCamera(bag, topic); });
+  fuzz::expect<BagError>([&] { readMount(bag, topic); });
+}
+
 }  // namespace
 }  // namespace visual_localization
 
@@ -26,7 +44,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::expect<BagError>([&] {
     const BagReader bag(path);
     fuzz::expect<BagError>([&] { bag.fixes("/fix"); });
-    for (const char* topic : {"/raw", "/jpeg"}) fuzz::expect<BagError>([&] { readImages(bag, topic); });
+    for (const char* topic : {"/raw", "/jpeg"}) readTopic(bag, topic);
   });
   return 0;
 }

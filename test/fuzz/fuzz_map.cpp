@@ -4,6 +4,7 @@
 #include <string>
 
 #include "test/fuzz/fuzz_support.h"
+#include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
@@ -25,6 +26,9 @@ void use(const TrainingMap& map) {
     if (map.nearest(image.position_m).image >= map.size()) fuzz::fail("an image that there is not");
     if (image.sift.keypoints().size() != image.sift.size()) fuzz::fail("features do not fit together");
     if (image.geometry) requireFitting(*image.geometry, image.sift.size());
+  }
+  for (const Session& session : map.header().sessions) {
+    if (session.mount) requireMount(*session.mount);
   }
   if (map.geometryCount() > map.size()) fuzz::fail("more images with landmarks than there are");
   map.nearest(map.area().min_m, 3);
