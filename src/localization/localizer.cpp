@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/time.h"
+#include "localization/path_interpolation.h"
 #include "localization/pose_verifier.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -78,16 +79,15 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   Estimate estimate;
   estimate.stamp_ns = stamp_ns;
   estimate.state = state;
-  estimate.pose = poseOf(tracked, state);
   estimate.metric = metric;
   estimate.images_since_metric = verifier_->imagesSince();
+  estimate.tracked = tracked;
+  choosePose(estimate);
   if (isMetric()) {
     scores_.count(verifier_->compared());
     estimate.focal_scale = verifier_->focal().scale();
     estimate.camera_contradicted = verifier_->focal().contradicts();
   }
-  estimate.tracked = tracked;
-  choosePose(estimate);
   estimate.evidence = evidence;
   estimate.motion_residual_m = assessor_.motionResidual_m();
   estimate.comparisons = scores_.comparisons();
@@ -199,12 +199,13 @@ void Localizer::bringTracker(const TrackerEstimate& tracked, const MetricPose& m
 
 /// The solved pose; without one where the motion so far leads to, if the tracker is not elsewhere; or what the tracker
 /// has.
-void Localizer::choosePose(Estimate& estimate) const {
+void Localizer::choosePose(Estimate& estimate) {
   if (estimate.metric) {
     estimate.pose = poseOf(*estimate.metric);
     estimate.source = PoseSource::kMetric;
     return;
   }
+  estimate.pose = poseOf(estimate.tracked, estimate.state);
   estimate.source = estimate.tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
   const auto predicted = isMetric() ? verifier_->predicted() : std::nullopt;
   if (!predicted) return;
@@ -233,17 +234,22 @@ PoseEstimate Localizer::poseOf(const MetricPose& metric) const {
 /// about it, so that nothing downstream trusts a guess.
 PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) {
   const double floor_m2 = config_.min_position_std_m * config_.min_position_std_m;
+  const bool recognised = tracked.best.recognised && tracked.best_distance_m <= config_.state.max_distance_m;
   PoseEstimate pose;
-  pose.position_m = tracked.position_m;
+  pose.position_m = positionOf_m(tracked, recognised);
   pose.covariance_m2 = state == LocalizationState::kTracking ? tracked.mode_covariance_m2 : tracked.cloud_covariance_m2;
   pose.covariance_m2 += floor_m2 * Eigen::Matrix2d::Identity();
-  const bool recognised = tracked.best.recognised && tracked.best_distance_m <= config_.state.max_distance_m;
   const Heading heading =
-      headingAt(*map_, tracked.position_m, recognised ? std::optional(tracked.best_image) : std::nullopt, neighbours_);
+      headingAt(*map_, pose.position_m, recognised ? std::optional(tracked.best_image) : std::nullopt, neighbours_);
   pose.yaw_rad = heading.yaw_rad;
   pose.yaw_variance_rad2 = heading.variance_rad2 + config_.min_yaw_std_rad * config_.min_yaw_std_rad;
-  pose.geodetic = map_->frame().toGeodetic(tracked.position_m);
+  pose.geodetic = map_->frame().toGeodetic(pose.position_m);
   return pose;
+}
+
+Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool recognised) {
+  const bool by_size = config_.estimate == "interpolated" && scores_.kind() == FeatureKind::kSift;
+  return recognised && by_size ? interpolateOnPath(*map_, scores_, tracked.best_image) : tracked.position_m;
 }
 
 void Localizer::configure(const LocalizerConfig& config) {

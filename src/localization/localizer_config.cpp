@@ -15,6 +15,11 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
                  features, {"sift", "global", "hybrid"});
   visitor.choice(
+      {"estimate", "",
+       "position without landmarks: that of the best particle, as in the papers (image), or on the path of the "
+       "most similar training image, by how large things look (interpolated; SIFT only)"},
+      estimate, {"image", "interpolated"});
+  visitor.choice(
       {"sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any map", kAtStartOnly},
       sift_backend, siftBackends());
   visitor.integer(

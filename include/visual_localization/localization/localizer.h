@@ -95,9 +95,10 @@ class Localizer {
   std::optional<MetricPose> poseNearProposal(const TrackerEstimate& tracked);
   TrackerEstimate track(const std::optional<MetricPose>& metric);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
+  void choosePose(Estimate& estimate);
   PoseEstimate poseOf(const MetricPose& metric) const;
-  void choosePose(Estimate& estimate) const;
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
+  Eigen::Vector2d positionOf_m(const TrackerEstimate& tracked, bool recognised);
   void configureTracker(const std::string& tracker_before);
   void forgetEvidence();
 

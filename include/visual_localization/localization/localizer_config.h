@@ -18,6 +18,7 @@ namespace visual_localization {
 /// says it.
 struct LocalizerConfig : TrackerConfig {
   std::string features = "sift";
+  std::string estimate = "interpolated";
   std::string sift_backend = kNativeSift;
   int seed = 1;
   bool prune = true;
