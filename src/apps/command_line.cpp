@@ -83,6 +83,8 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
       ->check(CLI::Range(std::size_t{1}, kMostThreads))
       ->capture_default_str();
   app.add_option("--sift-backend", options.sift_backend, "'native' or 'opencv' (parameter 'map/sift_backend')");
+  app.add_flag("--self-calibrate", options.self_calibrate,
+               "Without a calibration find the focal length by the images (parameter 'geometry/self_calibration')");
   app.add_option("--plot", options.plot,
                  "Draw fixes, path and landmarks of each session into this PNG, SVG or PDF, by the ending")
       ->check(must(isPicture, "end in .png, .svg or .pdf"));

@@ -28,6 +28,7 @@ struct MapBuilderOptions {
   std::optional<double> spacing_m;
   std::size_t threads = allCores();
   std::optional<std::string> sift_backend;
+  bool self_calibrate = false;
 };
 
 struct MapInfoOptions {

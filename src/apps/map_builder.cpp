@@ -26,6 +26,8 @@
 namespace visual_localization::apps {
 namespace {
 
+const char* const kNoCalibration = "no calibration (no camera_info, no --camera-info)";
+
 void overrideWith(MapBuilderConfig& config, const char* option, const char* parameter, const ParameterValue& value) {
   try {
     assignParameters(config, {{parameter, value}});
@@ -49,6 +51,7 @@ MapBuilderConfig readConfig(const MapBuilderOptions& options) {
     overrideWith(config, "--spacing", "map/spacing", *options.spacing_m);
     overrideWith(config, "--spacing", "geometry/spacing", *options.spacing_m);
   }
+  if (options.self_calibrate) overrideWith(config, "--self-calibrate", "geometry/self_calibration", true);
   if (options.sift_backend) overrideWith(config, "--sift-backend", "map/sift_backend", *options.sift_backend);
   return config;
 }
@@ -149,13 +152,16 @@ void printFixes(const PlottedSession& session) {
             << " s; path " << session.cleaned.trajectory.length() << " m\n";
 }
 
-void printCamera(const SessionImages& session, const MapBuilderOptions& options) {
+void printCamera(const SessionImages& session, const MapBuilderOptions& options, bool self_calibrates) {
   std::cout << session.name << ": ";
-  if (session.camera.model) {
+  if (session.calibrated_by_images) {
+    std::cout << kNoCalibration << "; by its images: camera " << describe(*session.camera.model);
+  } else if (session.camera.model) {
     std::cout << "camera " << describe(*session.camera.model) << ", from "
               << (options.camera_info.empty() ? cameraInfoTopic(options.image_topic) : options.camera_info);
   } else {
-    std::cout << "no calibration (no camera_info, no --camera-info): a map of places";
+    std::cout << kNoCalibration << ": a map of places";
+    std::cout << (self_calibrates ? " (its images are not certain about one)" : "; --self-calibrate looks for one");
   }
   if (!options.mask.empty())
     std::cout << "; mask uses " << 100.0 * session.camera.mask.usedShare() << " % of the image";
@@ -212,10 +218,10 @@ void printSessionImages(const std::vector<SessionImages>& sessions) {
   for (const SessionImages& session : sessions) printImages(session, first->recorded);
 }
 
-void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
+void printReport(const MapBuilderOptions& options, const MapBuildReport& report, bool self_calibrates,
                  const std::vector<PlottedSession>& sessions) {
   std::cout << std::fixed << std::setprecision(1);
-  for (const SessionImages& session : report.session_images) printCamera(session, options);
+  for (const SessionImages& session : report.session_images) printCamera(session, options, self_calibrates);
   for (const SessionImages& session : report.session_images) printMount(session);
   for (const PlottedSession& session : sessions) printFixes(session);
   for (const SessionImages& session : report.session_images) printGeometry(session);
@@ -288,7 +294,7 @@ void buildMap(const MapBuilderOptions& options) {
     ProgressBar bar("pruning features");
     builder.save(options.output, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
   }
-  printReport(options, builder.report(), sessions);
+  printReport(options, builder.report(), config.geometry.self_calibration, sessions);
   printSummary(options, builder.report(),
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   if (!options.plot.empty()) draw(options, sessions, builder.frame());

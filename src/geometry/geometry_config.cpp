@@ -5,6 +5,9 @@ namespace visual_localization {
 void GeometryConfig::declare(ParameterVisitor& visitor) {
   visitor.flag({"geometry/enabled", "", "triangulate landmarks and adjust poses where the camera is calibrated"},
                enabled);
+  visitor.flag({"geometry/self_calibration", "",
+                "of a session without calibration find the focal length by its images; takes minutes"},
+               self_calibration);
   visitor.integer({"geometry/pair_span", "1", "each image is matched with this number of the next ones"}, pair_span, 1,
                   100);
   visitor.real({"geometry/match_ratio", "1", "largest ratio of the angles to the nearest and second nearest"},

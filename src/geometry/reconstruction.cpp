@@ -21,6 +21,7 @@ constexpr double kFarthest_m = 1000.0;     ///< a landmark farther away has no p
 constexpr double kFar_m = 3.0;             ///< an image moved by more than this is far from the cleaned path
 constexpr std::size_t kEnoughTracked =
     20;  ///< tracked features of an image on average, for their share to say anything
+constexpr int kMostFocalSteps = 100;
 constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
 
 Eigen::Vector3d level(const Eigen::Vector2d& position_m) { return {position_m.x(), position_m.y(), 0.0}; }
@@ -188,11 +189,12 @@ void Reconstruction::bringBack() {
   for (const auto& [image, pose] : back) problem_.cameras[image] = pose;
 }
 
-double Reconstruction::freeFocalScale() const {
+double Reconstruction::freeFocalScale(double tolerance) const {
   BundleProblem problem = problem_;
   BundleConfig config = bundle_;
   config.focal_is_free = true;
-  config.tolerance = 1e-3;
+  config.tolerance = tolerance;
+  config.max_iterations = kMostFocalSteps;
   adjust(problem, config);
   return problem.focal_scale;
 }

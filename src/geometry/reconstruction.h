@@ -56,8 +56,8 @@ class Reconstruction {
   void adjustAndPrune(double tolerance, std::size_t min_views);
   /// A single image may end in a minimum of its own, metres off. It starts again among its neighbours.
   void bringBack();
-  /// What the images make of the focal length of all cameras, when they may.
-  double freeFocalScale() const;
+  /// What the images make of the focal length of all cameras, when they may. `tolerance`: as of adjustAndPrune().
+  double freeFocalScale(double tolerance) const;
   /// What it came to, session by session; landmark ids begin with `first_id`.
   std::vector<SessionGeometry> results(std::uint32_t first_id) const;
 

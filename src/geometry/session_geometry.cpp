@@ -31,6 +31,7 @@ constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 /// looks aside or the road climbs.
 constexpr double kCoarse = 1e-5;
 constexpr double kFine = 1e-6;
+constexpr double kRough = 1e-3;  ///< tells a focal length that is a hundredth off
 /// Landmarks that many images show tie all of these to each other, which costs time. Until positions are about right
 /// their tracks are cut.
 constexpr std::size_t kCoarseViews = 20;
@@ -102,7 +103,7 @@ class SessionAdjuster {
   /// Of a single session; landmark ids begin with `first_id`.
   SessionGeometry result(std::uint32_t first_id) const {
     SessionGeometry geometry = std::move(reconstruction_.results(first_id).front());
-    geometry.focal_scale = focal_scale_;
+    geometry.focal_scale = reconstruction_.freeFocalScale(kRough);
     geometry.contradicts_calibration = !isBelievable(geometry);
     return geometry;
   }
@@ -152,7 +153,6 @@ class SessionAdjuster {
     reconstruction_.triangulateAll(4.0, kAllViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
     reconstruction_.adjustAndPrune(kFine, Reconstruction::kMinViews);
-    focal_scale_ = reconstruction_.freeFocalScale();
   }
 
   /// A wrong calibration bends the path away from the fixes, or the images would rather have another one; one that is
@@ -168,7 +168,6 @@ class SessionAdjuster {
   Reconstruction reconstruction_;
   std::vector<Pair> pairs_;
   std::vector<ImagePair> matches_;
-  double focal_scale_ = 1.0;
 };
 
 /// Sessions that were adjusted on their own, tied to each other where they overlap.
@@ -258,6 +257,10 @@ std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>
     geometries[believed[i]] = std::move((*tied)[i]);
   }
   return geometries;
+}
+
+double focalScaleOf(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads) {
+  return SessionAdjuster(session, config, threads).reconstruction().freeFocalScale(kCoarse);
 }
 
 }  // namespace visual_localization

@@ -49,4 +49,8 @@ struct SessionGeometry : SessionLandmarks {
 std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>& sessions,
                                             const GeometryConfig& config, std::size_t threads);
 
+/// What the images of a session say the focal length is, as a share of its camera's. Where that is far off, so is this:
+/// ask again with what it says.
+double focalScaleOf(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads);
+
 }  // namespace visual_localization

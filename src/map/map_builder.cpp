@@ -159,7 +159,7 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   header_.datum = frame_->datum();
   header_.sessions.push_back({name, {}, {}, camera.mount});
   fixes_.push_back(inFrame(fixes, *frame_));
-  report_.session_images.push_back({name, 0, {}, camera});
+  report_.session_images.push_back({name, 0, {}, camera, false, {}});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
 }
@@ -231,8 +231,7 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
   extractWaiting();
   const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
-  const bool adjusts = config_.geometry.enabled && hasCalibratedSession();
-  if (!adjusts && !(config_.spacing_m > 0.0) && !hasMount()) {
+  if (!adjusts() && !(config_.spacing_m > 0.0) && !hasMount()) {
     prune(*unpruned, sink, progress);
     return;
   }
@@ -240,8 +239,9 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   prune(
       *unpruned, [&pruned](const TrainingImage& image) { pruned.append(image); }, progress);
   const std::shared_ptr<const TrainingMap> map = pruned.finish(header_);
+  if (config_.geometry.enabled && config_.geometry.self_calibration) calibrate(*map);
   std::vector<std::optional<SessionGeometry>> geometries(header_.sessions.size());
-  if (adjusts) geometries = geometryOf(*map, header_.sessions, fixes_, config_.geometry, resources_.threads);
+  if (adjusts()) geometries = geometryOf(*map, header_.sessions, fixes_, config_.geometry, resources_.threads);
   for (std::size_t i = 0; i < geometries.size(); ++i) {
     if (!geometries[i]) continue;
     report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks
@@ -250,6 +250,22 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
     header_.sessions[i].camera.reset();
   }
   report_.images_thinned += writeThinned(*map, header_.sessions, std::move(geometries), config_, sink);
+}
+
+/// Those sessions that nobody has calibrated, as far as their images say how.
+void MapBuilder::calibrate(const TrainingMap& pruned) {
+  const auto cameras = calibrateByImages(pruned, header_.sessions, fixes_, config_.geometry, resources_.threads);
+  for (std::size_t k = 0; k < cameras.size(); ++k) {
+    if (!cameras[k]) continue;
+    SessionImages& session = report_.session_images[k];
+    header_.sessions[k].camera = cameras[k];
+    session.camera.model = cameras[k]->scaledTo(session.recorded);
+    session.calibrated_by_images = true;
+  }
+}
+
+bool MapBuilder::adjusts() const {
+  return config_.geometry.enabled && (config_.geometry.self_calibration || hasCalibratedSession());
 }
 
 bool MapBuilder::hasCalibratedSession() const {

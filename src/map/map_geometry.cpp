@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "geometry/self_calibration.h"
+
 namespace visual_localization {
 namespace {
 
@@ -14,7 +16,7 @@ UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::siz
     session.images.push_back({map.pose(i).stamp_ns, map.position_m(i), map.yaw_rad(i)});
   }
   session.features = [&map, begin](std::size_t i) { return map.sift(begin + i); };
-  session.camera = &of.camera.value();
+  session.camera = of.camera ? &*of.camera : nullptr;
   session.mount = of.mount.value_or(SensorMount());
   session.fixes = fixes;
   return session;
@@ -58,6 +60,20 @@ std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned
   std::vector<std::optional<SessionGeometry>> geometries(sessions.size());
   for (std::size_t i = 0; i < which.size(); ++i) geometries[which[i]] = std::move(adjusted[i]);
   return geometries;
+}
+
+std::vector<std::optional<CameraModel>> calibrateByImages(const TrainingMap& pruned,
+                                                          const std::vector<Session>& sessions,
+                                                          const std::vector<std::vector<MapFix>>& fixes,
+                                                          const GeometryConfig& config, std::size_t threads) {
+  const std::vector<std::size_t> begin = begins(pruned, sessions.size());
+  std::vector<std::optional<CameraModel>> cameras(sessions.size());
+  for (std::size_t k = 0; k < sessions.size(); ++k) {
+    if (sessions[k].camera) continue;
+    cameras[k] = calibrateByImages(unadjusted(pruned, begin[k], begin[k + 1], sessions[k], fixes[k]),
+                                   pruned.header().image_size, config, threads);
+  }
+  return cameras;
 }
 
 std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& sessions,

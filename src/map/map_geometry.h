@@ -17,6 +17,12 @@ std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned
                                                        const std::vector<std::vector<MapFix>>& fixes,
                                                        const GeometryConfig& config, std::size_t threads);
 
+/// Cameras of the sessions that have none, by their images: see calibrateByImages() of a single one.
+std::vector<std::optional<CameraModel>> calibrateByImages(const TrainingMap& pruned,
+                                                          const std::vector<Session>& sessions,
+                                                          const std::vector<std::vector<MapFix>>& fixes,
+                                                          const GeometryConfig& config, std::size_t threads);
+
 /// Gives the images to `sink` where the adjustment has the robot, but for those that are too close to the one before
 /// (map/spacing, geometry/spacing); the number of these is returned.
 std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& sessions,

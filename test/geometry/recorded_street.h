@@ -16,10 +16,11 @@ constexpr double kDensity = 5.0;  ///< points for a metre of street
 // of them: 0.03 m. The images' own errors along the path add as much.
 constexpr double kPathError_m = 0.1;
 
-inline RecordedDrive recorded(const StreetDrive& street, std::uint32_t seed) {
+inline RecordedDrive recorded(const StreetDrive& street, std::uint32_t seed,
+                              const CameraModel& camera = streetCamera()) {
   std::mt19937 random(seed);
   const auto poses = drive(street);
-  return record(poses, pointsAlong(poses, kDensity, random), kFixNoise_m, random);
+  return record(poses, pointsAlong(poses, kDensity, random), kFixNoise_m, random, camera);
 }
 
 inline SessionGeometry adjusted(const RecordedDrive& drive) {

@@ -141,8 +141,9 @@ UnadjustedSession RecordedDrive::unadjusted() const {
 }
 
 RecordedDrive record(const std::vector<DrivenPose>& poses, const std::vector<WorldPoint>& world, double fix_noise_m,
-                     std::mt19937& random) {
+                     std::mt19937& random, const CameraModel& camera) {
   RecordedDrive recorded;
+  recorded.camera = camera;
   recorded.truth = poses;
   recorded.fixes = fixesOf(poses, fix_noise_m, random);
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -77,7 +77,7 @@ struct RecordedDrive {
 
 /// Images of `world`, and fixes with an error of `fix_noise_m` (one sigma).
 RecordedDrive record(const std::vector<DrivenPose>& poses, const std::vector<WorldPoint>& world, double fix_noise_m,
-                     std::mt19937& random);
+                     std::mt19937& random, const CameraModel& camera = streetCamera());
 
 /// The map that the adjustment of this drive makes: every image of it, with its features and landmarks.
 std::shared_ptr<const TrainingMap> mapOf(const RecordedDrive& drive);

@@ -7,6 +7,7 @@ namespace visual_localization {
 /// How landmarks and poses of a map come from its images and fixes.
 struct GeometryConfig {
   bool enabled = true;
+  bool self_calibration = false;
   int pair_span = 5;
   double match_ratio = 0.75;
   double epipolar_tolerance_px = 1.0;

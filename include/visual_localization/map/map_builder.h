@@ -56,7 +56,8 @@ struct SessionImages {
   std::size_t kept = 0;
   cv::Size recorded;  ///< size of its first image, pixels; the map's is that of the first session
   SessionCamera camera;
-  SessionLandmarks geometry = {};  ///< complete when the map is built
+  bool calibrated_by_images = false;  ///< nobody gave `camera` a model: its images did
+  SessionLandmarks geometry = {};     ///< complete when the map is built
 };
 
 /// A map is flat: farther from its datum north and lengths are wrong by more than a degree and a part in 8000.
@@ -114,9 +115,11 @@ class MapBuilder {
   using Sink = std::function<void(const TrainingImage& image)>;
   void fitCamera(cv::Size recorded);
   void extractWaiting();
+  void calibrate(const TrainingMap& pruned);
   void finish(const Sink& sink, const Progress& progress);
   void prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress);
   bool hasCalibratedSession() const;
+  bool adjusts() const;
   bool hasMount() const;
 
   MapBuilderConfig config_;
