@@ -152,7 +152,7 @@ void printFixes(const PlottedSession& session) {
             << " s; path " << session.cleaned.trajectory.length() << " m\n";
 }
 
-void printCamera(const SessionImages& session, const MapBuilderOptions& options, bool self_calibrates) {
+void printCamera(const SessionImages& session, const MapBuilderOptions& options, const GeometryConfig& geometry) {
   std::cout << session.name << ": ";
   if (session.calibrated_by_images) {
     std::cout << kNoCalibration << "; by its images: camera " << describe(*session.camera.model);
@@ -161,7 +161,8 @@ void printCamera(const SessionImages& session, const MapBuilderOptions& options,
               << (options.camera_info.empty() ? cameraInfoTopic(options.image_topic) : options.camera_info);
   } else {
     std::cout << kNoCalibration << ": a map of places";
-    std::cout << (self_calibrates ? " (its images are not certain about one)" : "; --self-calibrate looks for one");
+    std::cout << (geometry.self_calibration ? " (its images are not certain about one)"
+                                            : "; --self-calibrate looks for one");
   }
   if (!options.mask.empty())
     std::cout << "; mask uses " << 100.0 * session.camera.mask.usedShare() << " % of the image";
@@ -218,13 +219,15 @@ void printSessionImages(const std::vector<SessionImages>& sessions) {
   for (const SessionImages& session : sessions) printImages(session, first->recorded);
 }
 
-void printReport(const MapBuilderOptions& options, const MapBuildReport& report, bool self_calibrates,
+void printReport(const MapBuilderOptions& options, const MapBuildReport& report, const GeometryConfig& geometry,
                  const std::vector<PlottedSession>& sessions) {
   std::cout << std::fixed << std::setprecision(1);
-  for (const SessionImages& session : report.session_images) printCamera(session, options, self_calibrates);
+  for (const SessionImages& session : report.session_images) printCamera(session, options, geometry);
   for (const SessionImages& session : report.session_images) printMount(session);
   for (const PlottedSession& session : sessions) printFixes(session);
-  for (const SessionImages& session : report.session_images) printGeometry(session);
+  for (const SessionImages& session : report.session_images) {
+    if (geometry.enabled) printGeometry(session);
+  }
   if (sessions.size() > 1) printSessionImages(report.session_images);
   std::cout << "images: " << (report.images_kept - report.images_thinned) << " kept, " << report.images_without_position
             << " without position, " << report.images_too_close << " too close, " << report.images_thinned
@@ -294,7 +297,7 @@ void buildMap(const MapBuilderOptions& options) {
     ProgressBar bar("pruning features");
     builder.save(options.output, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
   }
-  printReport(options, builder.report(), config.geometry.self_calibration, sessions);
+  printReport(options, builder.report(), config.geometry, sessions);
   printSummary(options, builder.report(),
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   if (!options.plot.empty()) draw(options, sessions, builder.frame());

@@ -28,9 +28,10 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);
   visitor.real({"max_image_gap", "s", "after a longer pause the image before is not used for pruning"}, max_image_gap_s,
                0.001, 3600.0);
-  visitor.real({"min_position_std", "m", "no pose claims to be more accurate than this"}, min_position_std_m, 0.0,
-               1000.0);
-  visitor.real({"min_yaw_std", "rad", "no heading claims to be more accurate than this"}, min_yaw_std_rad, 0.0, 3.2);
+  visitor.real({"min_position_std", "m", "no position without landmarks claims to be more accurate than this"},
+               min_position_std_m, 0.0, 1000.0);
+  visitor.real({"min_yaw_std", "rad", "no heading without landmarks claims to be more accurate than this"},
+               min_yaw_std_rad, 0.0, 3.2);
   visitor.integer({"sweep_images", "1",
                    "of a larger map, guided recovery and the place check compare at most this number per image"},
                   sweep_images, 1, std::numeric_limits<int>::max());

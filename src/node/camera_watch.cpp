@@ -53,6 +53,13 @@ void CameraWatch::onStaticTransforms(const tf2_msgs::TFMessageConstPtr& message)
   findMount();
 }
 
+void CameraWatch::imageFrameIs(const std::string& frame) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (frame == camera_frame_) return;
+  camera_frame_ = frame;
+  findMount();
+}
+
 /// Once the frame of the camera is known, and the way to it from that of the robot.
 void CameraWatch::findMount() {
   const auto pose = transforms_.pose(base_frame_, camera_frame_);
@@ -73,10 +80,6 @@ void CameraWatch::findMount() {
 
 void CameraWatch::onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (info->header.frame_id != camera_frame_) {
-    camera_frame_ = info->header.frame_id;
-    findMount();
-  }
   if (last_ && sameCalibration(*info, *last_)) return;  // comes with every image
   last_ = info;
   try {

@@ -40,6 +40,8 @@ class CameraWatch {
 
   /// The localizer has another map now.
   void mapIs(const MapHeader& map);
+  /// What images say where they were taken: /tf_static knows where the robot carries that.
+  void imageFrameIs(const std::string& frame);
 
  private:
   void onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info);

@@ -65,12 +65,7 @@ void LocalizerNodelet::start() {
       [this] { return worker_->counts(); });
   publisher_ = std::make_unique<LocalizerPublisher>(node, private_node, parameters_.node, *diagnostics_, log_);
   worker_ = std::make_unique<ImageWorker>(*localizer_, *publisher_, log_);
-  images_ =
-      std::make_unique<ImageSource>(node, private_node, parameters_.node.image_transport, [this](ReceivedImage image) {
-        diagnostics_->imageArrived();
-        worker_->push(std::move(image));
-      });
-  camera_ = std::make_unique<CameraWatch>(node, parameters_.node, images_->topic(), *localizer_, *diagnostics_,
+  camera_ = std::make_unique<CameraWatch>(node, parameters_.node, node.resolveName("image"), *localizer_, *diagnostics_,
                                           [this](bool warning, const std::string& text) {
                                             if (warning) {
                                               NODELET_WARN_STREAM(text);
@@ -78,6 +73,12 @@ void LocalizerNodelet::start() {
                                               NODELET_INFO_STREAM(text);
                                             }
                                           });
+  images_ =
+      std::make_unique<ImageSource>(node, private_node, parameters_.node.image_transport, [this](ReceivedImage image) {
+        diagnostics_->imageArrived();
+        camera_->imageFrameIs(image.header.frame_id);
+        worker_->push(std::move(image));
+      });
   if (!parameters_.node.map.empty()) {
     try {
       useMap(parameters_.node.map);

@@ -29,7 +29,7 @@ tf2::Transform odomInMap(const tf2::Transform& base_in_map, const tf2::Transform
 }
 
 bool movesRobot(const Estimate& estimate, bool metric_only) {
-  const bool is_verifiable = estimate.evidence.verified.has_value();
+  const bool is_verifiable = estimate.evidence.verified.has_value() || estimate.camera_contradicted;
   if (!metric_only || !is_verifiable) return true;
   return estimate.source == PoseSource::kMetric && estimate.state == LocalizationState::kTracking;
 }

@@ -43,6 +43,13 @@ TEST(MovesRobot, OnlyAVerifiedPoseDoesWhereLandmarksCanVerifyIt) {
   }
 }
 
+TEST(MovesRobot, NoPlaceDoesWhenTheImagesContradictTheCalibration) {
+  Estimate estimate = estimateOf(PoseSource::kPlace, LocalizationState::kTracking, std::nullopt);
+  estimate.camera_contradicted = true;
+  EXPECT_FALSE(movesRobot(estimate, true));
+  EXPECT_TRUE(movesRobot(estimate, false));
+}
+
 TEST(MovesRobot, EveryPoseDoesInAMapOfPlacesAndWhenAsked) {
   for (const auto state : {LocalizationState::kTracking, LocalizationState::kRecovering}) {
     EXPECT_TRUE(movesRobot(estimateOf(PoseSource::kPlace, state, std::nullopt), true));

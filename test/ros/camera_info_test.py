@@ -5,7 +5,9 @@ import unittest
 
 import rospy
 import rostest
-from sensor_msgs.msg import CameraInfo
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import CameraInfo, Image
+from tf2_msgs.msg import TFMessage
 
 import localizer_fixture as fixture
 
@@ -83,6 +85,26 @@ class CameraInfoTest(unittest.TestCase):
         by_file.wait_for('camera', by_file.OK, DEADLINE_S)
         self.assertIn('calibration/campus.yaml', by_file.last_of('camera').message)
         self.assertEqual(self.publisher.get_num_connections(), 1)
+
+    def test_6_where_the_robot_carries_it_is_known_by_the_frame_of_the_images(self):
+        transform = TransformStamped(child_frame_id='stereo_left')
+        transform.header.frame_id = 'base_link'
+        transform.transform.translation.x = 0.25
+        transform.transform.rotation.w = 1.0
+        static = rospy.Publisher('/tf_static', TFMessage, queue_size=1, latch=True)
+        static.publish(TFMessage([transform]))
+        images = rospy.Publisher('/camera/image_raw', Image, queue_size=1)
+        fixture.wait_for(images.get_num_connections, DEADLINE_S, 'a subscriber of /camera/image_raw')
+        image = Image(width=320, height=240, step=320, encoding='mono8', data=bytes(320 * 240))
+        image.header.frame_id = 'stereo_left'
+
+        def told():
+            image.header.stamp = rospy.Time.now()
+            images.publish(image)
+            rospy.sleep(0.1)
+            return [line for line in self.log.messages()
+                    if 'carries the camera as base_link to stereo_left' in line.msg and line.name == '/by_file']
+        fixture.wait_for(told, DEADLINE_S, 'the mount of the camera')
 
 
 if __name__ == '__main__':
