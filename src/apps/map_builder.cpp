@@ -189,7 +189,8 @@ void printGeometry(const SessionImages& session) {
             << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
             << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "
             << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
-            << " % of the calibration's\n";
+            << " % of the calibration's; fixes come " << std::showpos << geometry.fix_delay_s << std::noshowpos
+            << " s late\n";
   if (geometry.tied_apart_m > 0.0) {
     std::cout << session.name << ": tied to the sessions before, which had the same " << geometry.tied_apart_m
               << " m away\n";

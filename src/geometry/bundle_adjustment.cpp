@@ -93,31 +93,33 @@ class GemanMcClureLoss final : public ceres::LossFunction {
 };
 
 struct PositionResidual {
-  Eigen::Vector2d measured_m;
-  double sigma_m;
+  PositionObservation fix;
   Eigen::Matrix3d map_from_start;
   Eigen::Vector3d antenna_m;  ///< in the camera's frame
 
   template <class T>
-  bool operator()(const T* camera, const T* bias, T* residual) const {
+  bool operator()(const T* camera, const T* bias, const T* delay, T* residual) const {
     const T antenna[3] = {T(antenna_m.x()), T(antenna_m.y()), T(antenna_m.z())};
     T turned[3];
     ceres::AngleAxisRotatePoint(camera, antenna, turned);
     for (int i = 0; i < 2; ++i) {
       T antenna_in_map = camera[3 + i];
       for (int k = 0; k < 3; ++k) antenna_in_map += T(map_from_start(i, k)) * turned[k];
-      residual[i] = (antenna_in_map + bias[i] - T(measured_m[i])) / T(sigma_m);
+      const T then = antenna_in_map - delay[0] * T(fix.velocity_m_s[i]);
+      residual[i] = (then + bias[i] - T(fix.east_north_m[i])) / T(fix.sigma_m);
     }
     return true;
   }
 };
 
-struct BiasResidual {
-  double sigma_m;
+/// Unknowns that are near zero.
+template <int kSize>
+struct ZeroResidual {
+  double sigma;
 
   template <class T>
-  bool operator()(const T* bias, T* residual) const {
-    for (int i = 0; i < 2; ++i) residual[i] = bias[i] / T(sigma_m);
+  bool operator()(const T* unknown, T* residual) const {
+    for (int i = 0; i < kSize; ++i) residual[i] = unknown[i] / T(sigma);
     return true;
   }
 };
@@ -235,15 +237,17 @@ class Adjustment {
   void addPositions() {
     for (const PositionObservation& position : problem_.positions) {
       BundleSession& session = problem_.sessions[sessions_[position.image]];
-      const PositionResidual residual{position.east_north_m, position.sigma_m, starts_[position.image],
-                                      session.antenna_m};
-      ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6, 2>(residual), &position_loss_,
-                              cameras_[position.image].data(), session.fix_bias_m.data());
+      const PositionResidual residual{position, starts_[position.image], session.antenna_m};
+      ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6, 2, 1>(residual), &position_loss_,
+                              cameras_[position.image].data(), session.fix_bias_m.data(), &session.fix_delay_s);
     }
     for (BundleSession& session : problem_.sessions) {
       double* bias = session.fix_bias_m.data();
-      ceres_.AddResidualBlock(automatic<BiasResidual, 2, 2>({config_.fix_bias_sigma_m}), nullptr, bias);
+      ceres_.AddResidualBlock(automatic<ZeroResidual<2>, 2, 2>({config_.fix_bias_sigma_m}), nullptr, bias);
       if (problem_.sessions.size() == 1) ceres_.SetParameterBlockConstant(bias);
+      double* delay = &session.fix_delay_s;
+      if (!ceres_.HasParameterBlock(delay)) continue;
+      ceres_.AddResidualBlock(automatic<ZeroResidual<1>, 1, 1>({config_.fix_delay_sigma_s}), nullptr, delay);
     }
   }
 
@@ -280,8 +284,10 @@ class Adjustment {
     for (BundleSession& session : problem_.sessions) {
       options.linear_solver_ordering->AddElementToGroup(session.mounting_rad.data(), 2);
       options.linear_solver_ordering->AddElementToGroup(session.fix_bias_m.data(), 3);
+      double* delay = &session.fix_delay_s;
+      if (ceres_.HasParameterBlock(delay)) options.linear_solver_ordering->AddElementToGroup(delay, 4);
     }
-    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 4);
+    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 5);
     return options;
   }
 

@@ -30,6 +30,7 @@ struct PositionObservation {
   std::uint32_t image = 0;
   Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();
   double sigma_m = 0.3;
+  Eigen::Vector2d velocity_m_s = Eigen::Vector2d::Zero();  ///< of the antenna
 };
 
 /// What the images of one recording have in common.
@@ -38,6 +39,7 @@ struct BundleSession {
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
   Eigen::Vector2d fix_bias_m = Eigen::Vector2d::Zero();    ///< its fixes are this far off; not for a single session
   Eigen::Vector3d antenna_m = Eigen::Vector3d::Zero();     ///< in the camera's optical frame; known
+  double fix_delay_s = 0.0;  ///< a fix says where the antenna was this long before its stamp, by the clock of images
 };
 
 /// Cameras session by session, each in order of time, what they saw, and what is known besides.
@@ -56,14 +58,15 @@ struct BundleConfig {
   Eigen::Vector3d tilt_sigma_rad{0.02, 0.1, 0.02};  ///< of a camera about the mounting: pitch, yaw, roll
   double slope_sigma = 0.1;                         ///< rise over run
   double fix_bias_sigma_m = 0.3;                    ///< per axis, of a session's fixes
+  double fix_delay_sigma_s = 0.1;
   int max_iterations = 30;
   double tolerance = 1e-4;  ///< relative change of the cost at which it ends
   bool focal_is_free = false;
   int threads = 1;  ///< the last digits depend on it: Ceres adds up in the order in which threads end
 };
 
-/// Moves cameras, landmarks, mountings and biases, and the focal length when it is free, to where all observations
-/// agree best. Returns the final cost.
+/// Moves cameras, landmarks, mountings, biases and delays, and the focal length when it is free, to where all
+/// observations agree best. Returns the final cost.
 double adjust(BundleProblem& problem, const BundleConfig& config);
 
 /// Distance of where a landmark is seen from where it projects to, normalised coordinates; infinite behind the camera.

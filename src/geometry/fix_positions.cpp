@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/statistics.h"
+#include "base/time.h"
 
 namespace visual_localization {
 namespace {
@@ -13,6 +14,14 @@ constexpr double kLargestSigma_m = 10.0;
 
 /// Half the way from one stamp to another, at most kReach_ns.
 std::int64_t reach(std::int64_t from_ns, std::int64_t to_ns) { return std::min(kReach_ns, (to_ns - from_ns) / 2); }
+
+Eigen::Vector2d velocityAt_m_s(const std::vector<TrajectoryPoint>& path, std::size_t i) {
+  const TrajectoryPoint& before = path[i == 0 ? 0 : i - 1];
+  const TrajectoryPoint& after = path[std::min(i + 1, path.size() - 1)];
+  const double elapsed_s = secondsBetween(before.stamp_ns, after.stamp_ns);
+  if (!(elapsed_s > 0.0)) return Eigen::Vector2d::Zero();
+  return (after.position_m - before.position_m) / elapsed_s;
+}
 
 }  // namespace
 
@@ -38,7 +47,8 @@ std::vector<PositionObservation> positionsAt(const std::vector<TrajectoryPoint>&
       sigmas_m.push_back(fix->sigma_m > 0.0 ? std::clamp(fix->sigma_m, kSmallestSigma_m, kLargestSigma_m) : sigma_m);
     }
     if (east.empty()) continue;
-    positions.push_back({static_cast<std::uint32_t>(i), {median(east), median(north)}, median(sigmas_m)});
+    positions.push_back(
+        {static_cast<std::uint32_t>(i), {median(east), median(north)}, median(sigmas_m), velocityAt_m_s(images, i)});
   }
   return positions;
 }

@@ -235,6 +235,7 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
     }
     geometry.median_error_px = median(errors_px[k]);
     geometry.mounting_rad = problem_.sessions[k].mounting_rad;
+    geometry.fix_delay_s = problem_.sessions[k].fix_delay_s;
   }
   return geometries;
 }

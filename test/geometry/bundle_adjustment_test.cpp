@@ -102,6 +102,22 @@ TEST(BundleAdjustment, FindsHowTheCameraIsMounted) {
   EXPECT_LT((problem.sessions.front().mounting_rad - expected.angle() * expected.axis()).norm(), 1e-4);
 }
 
+// The images know when the robot turned, the fixes where.
+TEST(BundleAdjustment, FindsHowLateTheFixesAre) {
+  std::mt19937 random(5);
+  const auto poses = test::drive({});
+  BundleProblem problem = truthOf(poses, 0.0, random);
+  for (PositionObservation& position : problem.positions) {
+    const double yaw_rad = poses[position.image].travel_yaw_rad;
+    position.velocity_m_s = 4.0 * Eigen::Vector2d(std::cos(yaw_rad), std::sin(yaw_rad));
+    position.east_north_m -= 0.15 * position.velocity_m_s;
+    position.sigma_m = 0.1;
+  }
+  adjust(problem, thorough());
+  EXPECT_NEAR(problem.sessions.front().fix_delay_s, 0.15, 0.01);
+  EXPECT_LT(pathError_m(problem, poses), 0.05);
+}
+
 /// Positions that bend aside by 8 m on a third of the way.
 void bendPositions(BundleProblem& problem) {
   const std::size_t count = problem.positions.size();

@@ -15,6 +15,7 @@ struct SessionLandmarks {
   double mean_shift_m = 0.0;             ///< of these images from the cleaned path
   double largest_shift_m = 0.0;
   double far_share = 0.0;       ///< of all images: moved by more than 3 m
+  double fix_delay_s = 0.0;     ///< fixes say where the antenna was this long before their stamps
   double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
   double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
 };
