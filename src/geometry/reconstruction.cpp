@@ -8,17 +8,19 @@
 
 #include "base/statistics.h"
 #include "geometry/fix_positions.h"
+#include "geometry/rotation_vector.h"
 #include "geometry/triangulation.h"
 #include "geometry/vector_median.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr double kMinAngle_rad = 0.01;     ///< between two rays to a landmark
-constexpr std::ptrdiff_t kNeighbours = 7;  ///< on each side of an image
-constexpr double kAstray_m = 2.0;          ///< an image moved by this more or less than its neighbours lost its way
-constexpr double kFarthest_m = 1000.0;     ///< a landmark farther away has no position to rely on
-constexpr double kFar_m = 3.0;             ///< an image moved by more than this is far from the cleaned path
+constexpr double kMinAngle_rad = 0.01;  ///< between two rays to a landmark
+constexpr std::size_t kNeighbours = 7;  ///< on each side of an image
+constexpr double kAstray_m = 2.0;       ///< an image moved by this more or less than its neighbours lost its way
+constexpr double kAstray_rad = 0.1;     ///< so did one that was turned by this more or less
+constexpr double kFarthest_m = 1000.0;  ///< a landmark farther away has no position to rely on
+constexpr double kFar_m = 3.0;          ///< an image moved by more than this is far from the cleaned path
 constexpr std::size_t kEnoughTracked =
     20;  ///< tracked features of an image on average, for their share to say anything
 constexpr int kMostFocalSteps = 100;
@@ -161,30 +163,46 @@ Eigen::Vector3d Reconstruction::shiftOf_m(std::size_t image) const {
   return antennaInMap_m(problem_.cameras[image], image) - level(images_[image].cleaned.position_m);
 }
 
-/// How far the adjustment moved the neighbours of an image on the cleaned path, the image itself included.
+/// How far the adjustment turned it: a rotation vector in the camera's frame.
+Eigen::Vector3d Reconstruction::turnOf_rad(std::size_t image) const {
+  const Eigen::AngleAxisd turn(images_[image].start.conjugate() * problem_.cameras[image].rotation);
+  return turn.angle() * turn.axis();
+}
+
+/// On the path of its session, the image itself included.
+std::vector<std::size_t> Reconstruction::neighboursOf(std::size_t image) const {
+  std::vector<std::size_t> neighbours;
+  for (std::size_t i = image - std::min(image, kNeighbours); i < images_.size() && i <= image + kNeighbours; ++i) {
+    if (images_[i].session == images_[image].session) neighbours.push_back(i);
+  }
+  return neighbours;
+}
+
+/// How far the adjustment moved the neighbours of an image on the cleaned path.
 Eigen::Vector3d Reconstruction::usualShift_m(std::size_t image) const {
   std::vector<Eigen::Vector3d> shifts_m;
-  const auto last = static_cast<std::ptrdiff_t>(images_.size()) - 1;
-  const auto at = static_cast<std::ptrdiff_t>(image);
-  for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, at - kNeighbours); i <= std::min(last, at + kNeighbours); ++i) {
-    const auto neighbour = static_cast<std::size_t>(i);
-    if (images_[neighbour].session != images_[image].session) continue;
-    shifts_m.push_back(shiftOf_m(neighbour));
-  }
+  for (const std::size_t neighbour : neighboursOf(image)) shifts_m.push_back(shiftOf_m(neighbour));
   return medianOf(shifts_m);
 }
 
+Eigen::Vector3d Reconstruction::usualTurn_rad(std::size_t image) const {
+  std::vector<Eigen::Vector3d> turns_rad;
+  for (const std::size_t neighbour : neighboursOf(image)) turns_rad.push_back(turnOf_rad(neighbour));
+  return medianOf(turns_rad);
+}
+
 bool Reconstruction::isAstray(std::size_t image) const {
-  return !((shiftOf_m(image) - usualShift_m(image)).norm() <= kAstray_m);
+  return !((shiftOf_m(image) - usualShift_m(image)).norm() <= kAstray_m &&
+           (turnOf_rad(image) - usualTurn_rad(image)).norm() <= kAstray_rad);
 }
 
 void Reconstruction::bringBack() {
   std::vector<std::pair<std::size_t, CameraPose>> back;
   for (std::size_t i = 0; i < images_.size(); ++i) {
     if (!isAstray(i)) continue;
-    const CameraPose turned{images_[i].start, Eigen::Vector3d::Zero()};
-    back.emplace_back(i, CameraPose{turned.rotation, level(images_[i].cleaned.position_m) + usualShift_m(i) -
-                                                         antennaInMap_m(turned, i)});
+    CameraPose pose{images_[i].start * Eigen::Quaterniond(exponential(usualTurn_rad(i))), Eigen::Vector3d::Zero()};
+    pose.position_m = level(images_[i].cleaned.position_m) + usualShift_m(i) - antennaInMap_m(pose, i);
+    back.emplace_back(i, pose);
   }
   for (const auto& [image, pose] : back) problem_.cameras[image] = pose;
 }

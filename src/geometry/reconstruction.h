@@ -71,7 +71,10 @@ class Reconstruction {
 
   Eigen::Vector3d antennaInMap_m(const CameraPose& camera, std::size_t image) const;
   Eigen::Vector3d shiftOf_m(std::size_t image) const;
+  Eigen::Vector3d turnOf_rad(std::size_t image) const;
+  std::vector<std::size_t> neighboursOf(std::size_t image) const;
   Eigen::Vector3d usualShift_m(std::size_t image) const;
+  Eigen::Vector3d usualTurn_rad(std::size_t image) const;
   bool isAstray(std::size_t image) const;
   double error(const Landmark& landmark, const LandmarkSighting& sighting) const;
   double distance_m(const Landmark& landmark) const;
