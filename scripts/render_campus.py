@@ -2,7 +2,7 @@
 
 blender -b -P scripts/render_campus.py -- --seed 1 --day sunny --round 0 --out DIR
 
-Writes DIR/frame_%04d.png (320x240, grey) and DIR/pose.csv (index,t,x,y,z,yaw: seconds, metres and radians of
+Writes DIR/frame_%04d.png (grey) and DIR/pose.csv (index,t,x,y,z,yaw: seconds, metres and radians of
 the camera in a local east-north-up frame). Needs Blender 3.4. Frames that exist already are not rendered
 again, so an interrupted round can be continued.
 """
@@ -10,7 +10,9 @@ import argparse
 import csv
 import math
 import random
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -20,7 +22,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from campus.drive import CameraPose, Drive  # noqa: E402
 from campus.world import BUILDING, World  # noqa: E402
 
-IMAGE_SIZE = (320, 240)
+
+def image_size(text: str) -> tuple:
+    """Pixels from WIDTHxHEIGHT."""
+    match = re.fullmatch(r'([1-9][0-9]{1,3})x([1-9][0-9]{1,3})', text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"'{text}' is not WIDTHxHEIGHT, each 10 to 9999")
+    return int(match[1]), int(match[2])
 
 
 def parse_arguments() -> argparse.Namespace:
@@ -32,6 +40,11 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--round', type=int, default=0, help='people, path offsets, height of the sun')
     parser.add_argument('--out', type=Path, required=True, help='folder to write to')
     parser.add_argument('--spacing', type=float, default=0.65, help='metres between images (default: %(default)s)')
+    parser.add_argument('--size', type=image_size, default=(320, 240), help='of the image, pixels (default: 320x240)')
+    parser.add_argument('--field-of-view', type=float, default=62, help='horizontal, degrees (default: %(default)s)')
+    parser.add_argument('--raise', dest='raise_m', type=float, default=0,
+                        help='the camera by so many metres (default: %(default)s)')
+    parser.add_argument('--pitch', type=float, default=0, help='the camera upwards, degrees (default: %(default)s)')
     parser.add_argument('--samples', type=int, default=12, help='light samples a pixel (default: %(default)s)')
     parser.add_argument('--first', type=int, default=0, help='first frame to render')
     parser.add_argument('--last', type=int, default=10**9, help='last frame to render')
@@ -64,18 +77,18 @@ def add_light(scene: 'bpy.types.Scene', day: str, round_: int) -> None:
     scene.collection.objects.link(lamp)
 
 
-def add_camera(scene: 'bpy.types.Scene') -> 'bpy.types.Object':
-    """A camera with a field of view of 62 degrees."""
+def add_camera(scene: 'bpy.types.Scene', field_of_view_deg: float) -> 'bpy.types.Object':
+    """A pinhole camera."""
     data = bpy.data.cameras.new('camera')
     data.lens_unit = 'FOV'
-    data.angle = math.radians(62)
+    data.angle = math.radians(field_of_view_deg)
     camera = bpy.data.objects.new('camera', data)
     scene.collection.objects.link(camera)
     scene.camera = camera
     return camera
 
 
-def configure_renderer(scene: 'bpy.types.Scene', samples: int) -> None:
+def configure_renderer(scene: 'bpy.types.Scene', size: tuple, samples: int) -> None:
     """Path tracing on the CPU, few samples and no denoising: what is left is the sensor's noise."""
     cycles = scene.cycles
     scene.render.engine = 'CYCLES'
@@ -86,7 +99,7 @@ def configure_renderer(scene: 'bpy.types.Scene', samples: int) -> None:
     cycles.diffuse_bounces = 1
     cycles.use_adaptive_sampling = True
     cycles.adaptive_threshold = .05
-    scene.render.resolution_x, scene.render.resolution_y = IMAGE_SIZE
+    scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.image_settings.file_format = 'PNG'
     scene.render.image_settings.color_mode = 'BW'
     scene.render.use_persistent_data = True
@@ -116,8 +129,8 @@ def main() -> None:
     scene = bpy.context.scene
     World(plan, noise, day, round_).build()
     add_light(scene, args.day, args.round)
-    camera = add_camera(scene)
-    configure_renderer(scene, args.samples)
+    camera = add_camera(scene, args.field_of_view)
+    configure_renderer(scene, args.size, args.samples)
 
     drive = Drive(BUILDING, args.spacing, round_)
     args.out.mkdir(parents=True, exist_ok=True)
@@ -125,6 +138,8 @@ def main() -> None:
         writer = csv.writer(file)
         writer.writerow(['index', 't', 'x', 'y', 'z', 'yaw'])
         for pose in drive.poses():
+            pose = replace(pose, z_m=round(pose.z_m + args.raise_m, 4),
+                           pitch_rad=pose.pitch_rad + math.radians(args.pitch))
             writer.writerow([pose.index, f'{pose.time_s:.3f}', f'{pose.x_m:.4f}', f'{pose.y_m:.4f}', pose.z_m,
                              f'{pose.yaw_rad:.5f}'])
             if args.first <= pose.index <= args.last and pose.index % args.every == 0:
