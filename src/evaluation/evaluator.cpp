@@ -84,7 +84,11 @@ class Evaluation {
     for (const std::size_t method : missingMethods(pair)) {
       const MethodSpec& how = experiment_.methods[method];
       const PartialMap partial = partOf(map, how.map_gap, how.map_spacing_m);
-      const RunContext context{partial, drive, table, experiment_.closed,
+      const RunContext context{partial,
+                               drive,
+                               table,
+                               experiment_.closed,
+                               experiment_.found_within_m,
                                mapErrors(partial, rounds_[spec.map].map_truth, drive)};
       results_.save(pair, method, summariseRuns(runMethod(context, how, startsOf(pair)), costs));
     }

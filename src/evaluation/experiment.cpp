@@ -104,6 +104,7 @@ Experiment parse(YamlMap yaml) {
   rounds.requireNoMore();
   experiment.pairs = readPairs(yaml, experiment.rounds);
   if (yaml.text("starts", "all") != "all") experiment.starts = yaml.count("starts", 0, 1, kMostStarts);
+  experiment.found_within_m = yaml.real("found_within", experiment.found_within_m, 0.001, 1000.0);
   experiment.trace_start = yaml.count("trace_start", 0, 0, kMostStarts);
   experiment.map = configured(yaml, "map_parameters", placesOnly());
   experiment.front_end = configured<LocalizerConfig>(yaml, "parameters");

@@ -52,6 +52,7 @@ struct Experiment {
   std::vector<RoundSpec> rounds;
   std::vector<PairSpec> pairs;
   std::size_t starts = 0;       ///< runs per pair, spread evenly over the start images; 0 = one for every image
+  double found_within_m = 5.0;  ///< how near the truth an estimate is that counts as localised
   std::size_t trace_start = 0;  ///< the run whose track is written out
   MapBuilderConfig map;
   LocalizerConfig front_end;  ///< extraction, pruning and matching, the same for all methods

@@ -19,9 +19,10 @@ const char* const kMeasures =
     "lost_recall,off_map_precision,off_map_recall,heading_err_deg,wrong_1m_share,wrong_5m_share,inside_95_share,"
     "metric_share,p95_err_m,recall_025m_2deg,recall_05m_5deg,recall_5m_10deg,nees,relative_err_m,relative_p95_err_m,"
     "relative_heading_err_deg,relative_recall_025m_2deg,relative_recall_05m_5deg,relative_recall_5m_10deg,"
-    "relative_nees";
+    "relative_nees,steps_to_localise_p95,steps_to_relocalise_p95";
 
 constexpr int kDigits = 6;
+constexpr double kMostRuns = 0.95;
 
 std::ostringstream table(const std::string& header) {
   std::ostringstream out = numberStream(kDigits);
@@ -144,7 +145,9 @@ std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
                              trust.offMapPrecision(), trust.offMapRecall()}) {
     out << ',' << Known{share};
   }
-  return out.str() + poseMeasuresOf(units);
+  out << poseMeasuresOf(units) << ',' << nearestRank(localised, kMostRuns) << ',';
+  if (kidnapped) out << nearestRank(relocalised, kMostRuns);
+  return out.str();
 }
 
 using Groups = std::pair<std::string, std::string>;

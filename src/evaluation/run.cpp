@@ -105,12 +105,13 @@ class RecogniserContestant final : public Contestant {
   std::vector<double> row_;
 };
 
-/// Images from step `begin` on until the first of three right estimates in a row; all of them when that never comes.
-std::size_t stepsUntilRight(const std::vector<StepRecord>& steps, std::size_t begin, std::size_t end) {
+/// Images from step `begin` on until the first of three estimates in a row that are right; all of them when that never
+/// comes.
+std::size_t stepsUntilFound(const std::vector<StepRecord>& steps, double within_m, std::size_t begin, std::size_t end) {
   constexpr std::size_t kInARow = 3;
   std::size_t right = 0;
   for (std::size_t i = begin; i < end; ++i) {
-    right = steps[i].error_m < kRight_m ? right + 1 : 0;
+    right = static_cast<double>(steps[i].error_m) < within_m ? right + 1 : 0;
     if (right == kInARow) return i + 2 - kInARow - begin;
   }
   return end - begin;
@@ -218,8 +219,8 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
     }
   }
   const std::size_t half = method.kidnapped ? order.size() / 2 : order.size();
-  record.steps_to_localise = stepsUntilRight(record.steps, 0, half);
-  record.steps_to_relocalise = stepsUntilRight(record.steps, half, order.size());
+  record.steps_to_localise = stepsUntilFound(record.steps, context.found_within_m, 0, half);
+  record.steps_to_relocalise = stepsUntilFound(record.steps, context.found_within_m, half, order.size());
   return record;
 }
 

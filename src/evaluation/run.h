@@ -71,6 +71,7 @@ struct RunContext {
   const Drive& drive;
   const ScoreTable& table;  ///< of the whole map
   bool closed = true;
+  double found_within_m = kRight_m;                      ///< of three estimates in a row: then the robot is localised
   std::vector<std::optional<MapError>> map_errors = {};  ///< of each image of the drive; empty when nothing is known
 };
 
