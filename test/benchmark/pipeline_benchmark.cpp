@@ -45,8 +45,10 @@ const cv::Mat& imageAt(std::size_t at) {
   return scene().images[place < kImages ? place : 2 * kImages - 1 - place];
 }
 
-void localize(benchmark::State& state, const std::string& features, const std::string& backend) {
+void localize(benchmark::State& state, const std::string& features, const std::string& backend,
+              const std::string& pose_source = "place") {
   LocalizerConfig config;
+  config.metric.pose_source = pose_source;
   config.features = features;
   config.sift_backend = backend;
   Localizer localizer(scene().map, config);
@@ -66,6 +68,7 @@ void localize(benchmark::State& state, const std::string& features, const std::s
   state.counters["update_ms"] = benchmark::Counter(total.update_ms, mean);
 }
 
+void metricDpso80(benchmark::State& state) { localize(state, "sift", kNativeSift, "metric"); }
 void siftDpso80(benchmark::State& state) { localize(state, "sift", kNativeSift); }
 void siftDpso80WithOpenCvExtraction(benchmark::State& state) { localize(state, "sift", kOpenCvSift); }
 void hybridDpso80(benchmark::State& state) { localize(state, "hybrid", kNativeSift); }
@@ -84,6 +87,7 @@ void opencvExtractionAlone(benchmark::State& state) {
 }
 
 BENCHMARK(opencvExtractionAlone)->Unit(benchmark::kMillisecond);
+BENCHMARK(metricDpso80)->Unit(benchmark::kMillisecond);
 BENCHMARK(siftDpso80)->Unit(benchmark::kMillisecond);
 BENCHMARK(siftDpso80WithOpenCvExtraction)->Unit(benchmark::kMillisecond);
 BENCHMARK(hybridDpso80)->Unit(benchmark::kMillisecond);
