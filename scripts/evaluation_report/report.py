@@ -6,7 +6,7 @@ from .data import Results, read_results
 from .figures import Figures
 from .files import written_whole
 from .papers import Papers
-from .tables import escape, pose_tables, relative_tables, result_tables, tracking_tables, trust_tables
+from .tables import escape, filtered_tables, pose_tables, relative_tables, result_tables, tracking_tables, trust_tables
 from .words import in_words
 
 
@@ -39,7 +39,8 @@ def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]]
     """The whole report in Markdown."""
     text = introduction(results) + '## Results\n\n' + result_tables(results, papers)
     for title, tables in (('Poses: recall within position and heading', pose_tables(results)),
-                          ('Poses in relation to the map', relative_tables(results))):
+                          ('Poses in relation to the map', relative_tables(results)),
+                          ('Poses behind a filter', filtered_tables(results))):
         text += f'\n## {title}\n\n{tables}' if tables else ''
     text += '\n## Comparison with the papers\n\n' + in_words(results, papers)
     discussion = results.description.get('discussion')

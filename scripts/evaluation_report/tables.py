@@ -58,6 +58,12 @@ RELATIVE_POSES = (Measure('relative_err_m', 'mean error [m]', 2),
                   Measure('relative_recall_05m_5deg', '(0.5 m, 5°) [%]', 1, 100),
                   Measure('relative_recall_5m_10deg', '(5 m, 10°) [%]', 1, 100),
                   Measure('relative_nees', 'NEES', 2))
+FILTERED_POSES = (Measure('filtered_err_m', 'mean error [m]', 2),
+                  Measure('filtered_inside_95_share', 'inside the 95 % ellipse [%]', 1, 100),
+                  Measure('filtered_nees', 'NEES', 2),
+                  Measure('relative_filtered_err_m', 'to the map: mean error [m]', 3),
+                  Measure('relative_filtered_inside_95_share', 'inside the 95 % ellipse [%]', 1, 100),
+                  Measure('relative_filtered_nees', 'NEES', 2))
 ERROR = MAIN[0]
 NOTHING = '–'
 
@@ -259,6 +265,13 @@ def relative_tables(results: Results) -> str:
     if all(outcome.get('relative_heading_err_deg') is None for outcome in results.outcomes):
         return ''
     return group_tables(results, Papers(None), RELATIVE_POSES)
+
+
+def filtered_tables(results: Results) -> str:
+    """Behind a filter; empty when no method solves poses."""
+    if all(outcome.get('filtered_err_m') is None for outcome in results.outcomes):
+        return ''
+    return group_tables(results, Papers(None), FILTERED_POSES)
 
 
 def trust_tables(results: Results) -> str:

@@ -55,6 +55,8 @@ double PoseErrors::meanNees() const { return mean(nees, claims); }
 void PoseFigures::add(const StepRecord& step) {
   absolute.add({step.error_m, step.heading_err_deg, step.nees});
   relative.add(step.relative);
+  filtered.add(step.filtered);
+  relative_filtered.add(step.relative_filtered);
   if (std::isnan(step.error_m) || step.state == LocalizationState::kNoMap) return;
   ++images;
   metric += step.source == PoseSource::kMetric ? 1 : 0;
@@ -70,6 +72,8 @@ PoseFigures& PoseFigures::operator+=(const PoseFigures& other) {
   wrong_5m += other.wrong_5m;
   absolute += other.absolute;
   relative += other.relative;
+  filtered += other.filtered;
+  relative_filtered += other.relative_filtered;
   return *this;
 }
 

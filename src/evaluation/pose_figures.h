@@ -44,6 +44,8 @@ struct PoseFigures {
   std::size_t wrong_5m = 0;
   PoseErrors absolute;
   PoseErrors relative;  ///< to the map
+  PoseErrors filtered;  ///< see StepRecord
+  PoseErrors relative_filtered;
 
   /// Images without a true position are left out.
   void add(const StepRecord& step);

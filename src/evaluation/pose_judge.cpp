@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Geometry>
 
@@ -12,6 +13,7 @@
 namespace visual_localization {
 namespace {
 
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 constexpr double kMostNees = 1e9;  ///< of a covariance that leaves no room for an error
 
 float degreesApart(double yaw_rad, double other_rad) {
@@ -46,6 +48,20 @@ void judgePose(const Estimate& estimate, const Eigen::Vector2d& truth_m, const s
   if (metric && estimate.metric) {
     step.relative.nees = neesOf(error_m - map_error->position_m, estimate.metric->covariance.topLeftCorner<2, 2>());
   }
+}
+
+void judgeFiltered(const Estimate& estimate, const Eigen::Vector2d& truth_m, const std::optional<MapError>& map_error,
+                   VelocityFilter& filter, StepRecord& step) {
+  if (!estimate.metric || estimate.state != LocalizationState::kTracking) return;
+  const MetricPose& metric = *estimate.metric;
+  filter.add(estimate.stamp_ns, estimate.pose.position_m, metric.covariance.topLeftCorner<2, 2>());
+  const Eigen::Vector2d error_m = filter.position_m() - truth_m;
+  const Eigen::Matrix2d of_map_m2 = metric.map_covariance.topLeftCorner<2, 2>();
+  step.filtered = {static_cast<float>(error_m.norm()), kUnknown, neesOf(error_m, filter.covariance_m2() + of_map_m2)};
+  if (!map_error) return;
+  const Eigen::Vector2d relative_m = error_m - map_error->position_m;
+  step.relative_filtered = {static_cast<float>(relative_m.norm()), kUnknown,
+                            neesOf(relative_m, filter.covariance_m2())};
 }
 
 std::string tumLine(const Estimate& estimate) {

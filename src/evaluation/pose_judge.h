@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "evaluation/run.h"
+#include "evaluation/velocity_filter.h"
 
 namespace visual_localization {
 
@@ -14,6 +15,10 @@ namespace visual_localization {
 /// the map's own error. `map_error`: none when it is not known.
 void judgePose(const Estimate& estimate, const Eigen::Vector2d& truth_m, const std::optional<double>& true_yaw_rad,
                const std::optional<MapError>& map_error, StepRecord& step);
+
+/// What the filter makes of a METRIC pose while TRACKING; of other estimates nothing.
+void judgeFiltered(const Estimate& estimate, const Eigen::Vector2d& truth_m, const std::optional<MapError>& map_error,
+                   VelocityFilter& filter, StepRecord& step);
 
 /// One step as a line of a TUM trajectory: "stamp tx ty tz qx qy qz qw", x ahead, y left, z up in the map frame. Level
 /// and at height 0 but for poses solved from landmarks.

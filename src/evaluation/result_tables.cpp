@@ -19,7 +19,8 @@ const char* const kMeasures =
     "lost_recall,off_map_precision,off_map_recall,heading_err_deg,wrong_1m_share,wrong_5m_share,inside_95_share,"
     "metric_share,p95_err_m,recall_025m_2deg,recall_05m_5deg,recall_5m_10deg,nees,relative_err_m,relative_p95_err_m,"
     "relative_heading_err_deg,relative_recall_025m_2deg,relative_recall_05m_5deg,relative_recall_5m_10deg,"
-    "relative_nees,steps_to_localise_p95,steps_to_relocalise_p95";
+    "relative_nees,filtered_err_m,filtered_inside_95_share,filtered_nees,relative_filtered_err_m,"
+    "relative_filtered_inside_95_share,relative_filtered_nees,steps_to_localise_p95,steps_to_relocalise_p95";
 
 constexpr int kDigits = 6;
 constexpr double kMostRuns = 0.95;
@@ -104,12 +105,29 @@ std::string poseMeasuresOf(const std::vector<UnitResult>& units) {
   const PoseErrors& absolute = poses.absolute;
   const PoseErrors& relative = poses.relative;
   std::ostringstream out = numberStream(kDigits);
-  for (const double figure :
-       {absolute.meanHeading_deg(), poses.wrong1mShare(), poses.wrong5mShare(), absolute.insideShare(),
-        poses.metricShare(), meanOfPairs(units, &UnitResult::p95_err_m), absolute.recall(0), absolute.recall(1),
-        absolute.recall(2), absolute.meanNees(), relative.meanPosition_m(),
-        meanOfPairs(units, &UnitResult::p95_relative_err_m, relativeOf), relative.meanHeading_deg(), relative.recall(0),
-        relative.recall(1), relative.recall(2), relative.meanNees()}) {
+  for (const double figure : {absolute.meanHeading_deg(),
+                              poses.wrong1mShare(),
+                              poses.wrong5mShare(),
+                              absolute.insideShare(),
+                              poses.metricShare(),
+                              meanOfPairs(units, &UnitResult::p95_err_m),
+                              absolute.recall(0),
+                              absolute.recall(1),
+                              absolute.recall(2),
+                              absolute.meanNees(),
+                              relative.meanPosition_m(),
+                              meanOfPairs(units, &UnitResult::p95_relative_err_m, relativeOf),
+                              relative.meanHeading_deg(),
+                              relative.recall(0),
+                              relative.recall(1),
+                              relative.recall(2),
+                              relative.meanNees(),
+                              poses.filtered.meanPosition_m(),
+                              poses.filtered.insideShare(),
+                              poses.filtered.meanNees(),
+                              poses.relative_filtered.meanPosition_m(),
+                              poses.relative_filtered.insideShare(),
+                              poses.relative_filtered.meanNees()}) {
     out << ',' << Known{figure};
   }
   return out.str();

@@ -142,7 +142,7 @@ class ExtractionCounter {
 
 /// Compares the verdict with the truth, if that is known.
 void judge(const DriveImage& image, const TrainingMap& map, const std::optional<MapError>& map_error,
-           const Verdict& verdict, StepRecord& step) {
+           const Verdict& verdict, VelocityFilter& filter, StepRecord& step) {
   if (!image.truth) return;
   const Eigen::Vector2d truth_m = map.frame().toEastNorth(image.truth->position);
   step.error_m = static_cast<float>((verdict.position_m - truth_m).norm());
@@ -150,7 +150,9 @@ void judge(const DriveImage& image, const TrainingMap& map, const std::optional<
   if (map_error) {
     step.relative.position_m = static_cast<float>((verdict.position_m - truth_m - map_error->position_m).norm());
   }
-  if (verdict.estimate) judgePose(*verdict.estimate, truth_m, image.truth->yaw_rad, map_error, step);
+  if (!verdict.estimate) return;
+  judgePose(*verdict.estimate, truth_m, image.truth->yaw_rad, map_error, step);
+  judgeFiltered(*verdict.estimate, truth_m, map_error, filter, step);
 }
 
 StepRecord stepOf(const Verdict& verdict) {
@@ -200,6 +202,7 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
   RunRecord record;
   record.start = start;
   ExtractionCounter counter;
+  VelocityFilter filter;
   const auto covered_from = order.size() / 2;
   const auto covered_until =
       covered_from + static_cast<std::size_t>(method.covered * static_cast<double>(order.size()));
@@ -212,7 +215,7 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
     counter.add(*image, record);
     const TrainingMap& map = *context.map.map;
     record.steps.push_back(stepOf(verdict));
-    judge(shown, map, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]], verdict,
+    judge(shown, map, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]], verdict, filter,
           record.steps.back());
     if (trace && verdict.estimate) {
       record.trace.push_back(traced(order[i], shown, map, contestant->diversity_m(), *verdict.estimate));

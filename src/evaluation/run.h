@@ -40,6 +40,10 @@ struct StepRecord {
   float heading_err_deg = std::numeric_limits<float>::quiet_NaN();  ///< NaN without a true heading or an estimate of it
   float nees = std::numeric_limits<float>::quiet_NaN();  ///< by the published covariance; METRIC or TRACKING only
   StepErrors relative = {};  ///< to the map, NEES by the covariance of METRIC poses in relation to it
+  /// The same two behind a filter that fuses TRACKING METRIC poses by their covariance in relation to the map: against
+  /// the truth with that of the map added.
+  StepErrors filtered = {};
+  StepErrors relative_filtered = {};
 };
 
 /// A closer look at one step, for the track of a single run.

@@ -105,8 +105,9 @@ void read(const std::string& line, PoseErrors& errors) {
 
 void write(const PoseFigures& poses, std::ostringstream& out) {
   out << "\nposes\n" << poses.images << ',' << poses.metric << ',' << poses.wrong_1m << ',' << poses.wrong_5m << '\n';
-  write(poses.absolute, out);
-  write(poses.relative, out);
+  for (const PoseErrors* errors : {&poses.absolute, &poses.relative, &poses.filtered, &poses.relative_filtered}) {
+    write(*errors, out);
+  }
 }
 
 void readPoses(SectionReader& sections, PoseFigures& poses) {
@@ -115,11 +116,11 @@ void readPoses(SectionReader& sections, PoseFigures& poses) {
   NumberReader counts(line);
   counts >> poses.images >> poses.metric >> poses.wrong_1m >> poses.wrong_5m;
   counts.finish();
-  for (PoseErrors* errors : {&poses.absolute, &poses.relative}) {
+  for (PoseErrors* errors : {&poses.absolute, &poses.relative, &poses.filtered, &poses.relative_filtered}) {
     sections.next(line);
     read(line, *errors);
   }
-  if (sections.next(line)) throw std::runtime_error("has more than three lines of poses");
+  if (sections.next(line)) throw std::runtime_error("has more than five lines of poses");
 }
 
 /// One line of the trajectory and, behind it, of the true one.

@@ -40,7 +40,8 @@ class RecordedStreet {
     method.covered = covered;
     const ScoreTable table(drive_, *map_, MatchConfig(), 1);
     const PartialMap whole = partOf(map_, 0.0);
-    return visual_localization::run({whole, drive_, table, false, mapErrors(whole, truth_, drive_)}, method, 0, true);
+    return visual_localization::run({whole, drive_, table, false, 5.0, mapErrors(whole, truth_, drive_)}, method, 0,
+                                    true);
   }
 
   Drive& drive() { return drive_; }

@@ -103,7 +103,8 @@ TEST(UnitResult, RefusesATextThatLostALineOrHasOneTwice) {
 TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
   const std::string good =
       "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\ntrajectory\n\ntrust\n1,2,3,4,5,6,7\n\n"
-      "poses\n9,8,6,5\n1,2,3,4,5,6,7,8,9,10\n0,0,0,0,0,0,0,0,0,0.5\n\nall\n2,1,3,0\n\n";
+      "poses\n9,8,6,5\n1,2,3,4,5,6,7,8,9,10\n0,0,0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0,0,0.5\n\n"
+      "all\n2,1,3,0\n\n";
   ASSERT_EQ(refusal(good), "accepted");
   const auto with = [&good](const std::string& part, const std::string& replacement) {
     return std::string(good).replace(good.find(part), part.size(), replacement);
@@ -123,7 +124,7 @@ TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
   EXPECT_THAT(refusal(with("trajectory\n", "trajectory\n1 2 3 4 5 6 7 8\n")),
               HasSubstr("a trajectory that do not fit"));
   EXPECT_THAT(refusal(with("9,8,6,5\n", "9,8,6,5\n1\n")), HasSubstr("no list of numbers"));
-  EXPECT_THAT(refusal(with("0.5\n", "0.5\n1\n")), HasSubstr("more than three lines of poses"));
+  EXPECT_THAT(refusal(with("0.5\n", "0.5\n1\n")), HasSubstr("more than five lines of poses"));
   EXPECT_THAT(refusal(with("0,1,1,2,1,7,1,1,1,0,0,0\n", "")), HasSubstr("has no run"));
   EXPECT_THAT(refusal("something else\n"), HasSubstr("'runs' is missing"));
 }
