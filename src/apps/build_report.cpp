@@ -1,0 +1,151 @@
+#include "apps/build_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+
+#include "apps/app_support.h"
+#include "ros/camera_info.h"
+#include "visual_localization/features/front_end.h"
+
+namespace visual_localization::apps {
+namespace {
+
+const char* const kNoCalibration = "no calibration (no camera_info, no --camera-info)";
+
+void printFixes(const PlottedSession& session) {
+  constexpr std::array<FixVerdict, 5> verdicts{FixVerdict::kKept, FixVerdict::kNoFix, FixVerdict::kDisordered,
+                                               FixVerdict::kSpike, FixVerdict::kMultipath};
+  std::cout << session.name << ": " << session.fixes.size() << " fixes:";
+  for (const FixVerdict verdict : verdicts) {
+    const auto count = std::count(session.cleaned.verdicts.begin(), session.cleaned.verdicts.end(), verdict);
+    std::cout << (verdict == FixVerdict::kKept ? " " : ", ") << count << ' ' << toString(verdict);
+  }
+  std::cout << "; " << session.cleaned.gaps_closed << " gaps closed, the longest " << session.cleaned.longest_gap_s
+            << " s; path " << session.cleaned.trajectory.length() << " m\n";
+}
+
+void printCamera(const SessionImages& session, const MapBuilderOptions& options, const GeometryConfig& geometry) {
+  std::cout << session.name << ": ";
+  if (session.calibrated_by_images) {
+    std::cout << kNoCalibration << "; by its images: camera " << describe(*session.camera.model);
+  } else if (session.camera.model) {
+    std::cout << "camera " << describe(*session.camera.model) << ", from "
+              << (options.camera_info.empty() ? cameraInfoTopic(options.image_topic) : options.camera_info);
+  } else {
+    std::cout << kNoCalibration << ": a map of places";
+    std::cout << (geometry.self_calibration ? " (its images are not certain about one)"
+                                            : "; --self-calibrate looks for one");
+  }
+  if (!options.mask.empty())
+    std::cout << "; mask uses " << 100.0 * session.camera.mask.usedShare() << " % of the image";
+  std::cout << '\n';
+}
+
+void printMount(const SessionImages& session) {
+  if (!session.camera.mount) return;
+  std::cout << session.name << ": " << describe(*session.camera.mount) << '\n';
+}
+
+void printGeometry(const SessionImages& session) {
+  const SessionLandmarks& geometry = session.geometry;
+  if (!session.camera.model) return;
+  if (geometry.contradicts_calibration) {
+    std::cout << session.name << ": the images contradict the calibration (they ask for "
+              << 100.0 * geometry.focal_scale << " % of its focal length, move " << 100.0 * geometry.far_share
+              << " % of the images by more than 3 m, and explain " << 100.0 * geometry.agreeing_share
+              << " % of the matched features): a map of places\n";
+    return;
+  }
+  std::cout << session.name << ": " << geometry.located << " of " << session.kept
+            << " images with landmarks: " << geometry.landmarks << " landmarks, " << geometry.sightings
+            << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
+            << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "
+            << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
+            << " % of the calibration's; fixes come " << std::showpos << geometry.fix_delay_s << std::noshowpos
+            << " s late\n";
+  if (geometry.tied_apart_m > 0.0) {
+    std::cout << session.name << ": tied to the sessions before, which had the same " << geometry.tied_apart_m
+              << " m away\n";
+  }
+  std::cout << std::setprecision(1);
+}
+
+/// What one session brought, and whether its images were distorted to fit.
+void printImages(const SessionImages& session, cv::Size in_map) {
+  std::cout << session.name << ": " << session.kept << " images";
+  if (session.kept != 0) std::cout << " of " << session.recorded.width << 'x' << session.recorded.height << " px";
+  if (session.kept != 0 && session.recorded != in_map) {
+    std::cout << ", resized to " << in_map.width << 'x' << in_map.height;
+    const double stretch = stretchOf(session.recorded, in_map);
+    constexpr double kHarmless = 0.02;
+    if (std::abs(stretch - 1.0) > kHarmless) {
+      std::cout << "; this distorts them (width times " << std::setprecision(2) << stretch << std::setprecision(1)
+                << "): only the same camera will recognise them";
+    }
+  }
+  std::cout << '\n';
+}
+
+/// The size of the map's images is that of the first.
+void printSessionImages(const std::vector<SessionImages>& sessions) {
+  const auto first = std::find_if(sessions.begin(), sessions.end(), [](const auto& session) { return session.kept; });
+  for (const SessionImages& session : sessions) printImages(session, first->recorded);
+}
+
+std::size_t fixesKept(const MapBuildReport& report) {
+  std::size_t kept = 0;
+  for (const CleanedTrajectory& session : report.sessions) {
+    kept += static_cast<std::size_t>(std::count(session.verdicts.begin(), session.verdicts.end(), FixVerdict::kKept));
+  }
+  return kept;
+}
+
+}  // namespace
+
+void announceCalibration(const MapBuildReport& report) {
+  for (const SessionImages& session : report.session_images) {
+    if (session.camera.model) continue;
+    std::cerr << session.name << ": " << kNoCalibration << ": looking for one by its images, which takes minutes"
+              << std::endl;
+  }
+}
+
+void printReport(const MapBuilderOptions& options, const MapBuildReport& report, const GeometryConfig& geometry,
+                 const std::vector<PlottedSession>& sessions) {
+  std::cout << std::fixed << std::setprecision(1);
+  for (const SessionImages& session : report.session_images) printCamera(session, options, geometry);
+  for (const SessionImages& session : report.session_images) printMount(session);
+  for (const PlottedSession& session : sessions) printFixes(session);
+  for (const SessionImages& session : report.session_images) {
+    if (geometry.enabled) printGeometry(session);
+  }
+  if (sessions.size() > 1) printSessionImages(report.session_images);
+  std::cout << "images: " << (report.images_kept - report.images_thinned) << " kept, " << report.images_without_position
+            << " without position, " << report.images_too_close << " too close, " << report.images_thinned
+            << " left out after the adjustment, " << report.images_disordered << " out of order, "
+            << report.images_unusable << " unusable\n";
+  const double dropped = report.features_extracted == 0 ? 0.0
+                                                        : 100.0 - 100.0 * static_cast<double>(report.features_kept) /
+                                                                      static_cast<double>(report.features_extracted);
+  std::cout << "features: " << report.features_extracted << " extracted, " << report.features_kept
+            << " kept after pruning (" << dropped << " % dropped)\n";
+}
+
+void printSummary(const MapBuilderOptions& options, const MapBuildReport& report, double seconds) {
+  std::size_t fixes = 0;
+  std::size_t gaps = 0;
+  for (const CleanedTrajectory& session : report.sessions) {
+    fixes += session.verdicts.size();
+    gaps += session.gaps_closed;
+  }
+  std::cout << options.output << ": " << (report.images_kept - report.images_thinned) << " images, "
+            << fixesKept(report) << " of " << fixes << " fixes, " << gaps << " gaps closed, features "
+            << report.features_extracted << " -> " << report.features_kept << ", "
+            << humanSize(static_cast<double>(std::filesystem::file_size(options.output))) << ", " << seconds << " s\n";
+}
+
+}  // namespace visual_localization::apps
