@@ -34,8 +34,7 @@ Trajectory truePoses(const BagReader& bag, const RoundSpec& recording, const Tra
 /// True poses at any time. The topic that maps are made from is no better than a map: it is cleaned like one.
 Truth truthOf(const BagReader& bag, const RoundSpec& recording, const TrajectoryCleanerConfig& config) {
   const std::vector<Fix> fixes = bag.fixes(recording.truth_topic);
-  const auto first =
-      std::find_if(fixes.begin(), fixes.end(), [](const Fix& fix) { return fix.has_fix && isValid(fix.position); });
+  const auto first = std::find_if(fixes.begin(), fixes.end(), hasPosition);
   if (first == fixes.end())
     throw BagError(bag.path() + ": topic " + recording.truth_topic + " holds no believable fix");
   const GeodeticPoint datum{first->position.latitude_deg, first->position.longitude_deg, 0.0};
@@ -125,7 +124,7 @@ std::string besideBag(const std::string& bag, const std::string& file) {
 Trajectory trueTrajectory(const BagReader& bag, const std::string& topic, const LocalFrame& frame) {
   std::vector<TrajectoryPoint> points;
   for (const Fix& fix : bag.fixes(topic)) {
-    if (!fix.has_fix || !isValid(fix.position)) continue;
+    if (!hasPosition(fix)) continue;
     if (!points.empty() && fix.stamp_ns <= points.back().stamp_ns) continue;
     points.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), 0.0});
   }

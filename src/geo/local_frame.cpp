@@ -19,6 +19,11 @@ bool isValid(const GeodeticPoint& point) {
   return std::abs(point.latitude_deg) <= 90.0 && std::abs(point.longitude_deg) <= 180.0;
 }
 
+bool hasPosition(const Fix& fix) {
+  const bool is_origin = fix.position.latitude_deg == 0.0 && fix.position.longitude_deg == 0.0;
+  return fix.has_fix && isValid(fix.position) && !is_origin;
+}
+
 LocalFrame::LocalFrame(const GeodeticPoint& datum)
     : datum_(checked(datum)), projection_(datum.latitude_deg, datum.longitude_deg, datum.altitude_m) {}
 

@@ -33,7 +33,7 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
   UsableFixes usable;
   std::int64_t last_ns = 0;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
-    if (!fixes[i].has_fix || !isValid(fixes[i].position)) {
+    if (!hasPosition(fixes[i])) {
       verdicts[i] = FixVerdict::kNoFix;
     } else if (!usable.indices.empty() && fixes[i].stamp_ns <= last_ns) {
       verdicts[i] = FixVerdict::kDisordered;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <GeographicLib/Geodesic.hpp>
 
 #include "base/files.h"
@@ -36,12 +37,25 @@ GeodeticPoint middleOf(const std::vector<Fix>& fixes) {
   std::vector<double> latitudes;
   std::vector<double> longitudes;
   for (const Fix& fix : fixes) {
-    if (!fix.has_fix || !isValid(fix.position)) continue;
+    if (!hasPosition(fix)) continue;
     latitudes.push_back(fix.position.latitude_deg);
     longitudes.push_back(fix.position.longitude_deg);
   }
-  if (latitudes.empty()) throw std::runtime_error("none of its " + std::to_string(fixes.size()) + " fixes is valid");
+  if (latitudes.empty()) {
+    throw std::runtime_error("none of its " + std::to_string(fixes.size()) +
+                             " fixes is valid (latitude 0, longitude 0 is none)");
+  }
   return {upperMedian(latitudes), upperMedian(longitudes), 0.0};
+}
+
+/// A path that stays where it is would put all images of the drive on one spot.
+void requireMotion(const CleanedTrajectory& cleaned) {
+  Eigen::AlignedBox2d box;
+  for (const TrajectoryPoint& point : cleaned.trajectory.points()) box.extend(point.position_m);
+  if (box.diagonal().norm() >= kSmallestSession_m) return;
+  const auto kept = std::count(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
+  throw std::runtime_error("its " + std::to_string(kept) + " believable fixes are all at one point: the receiver was " +
+                           "stuck, or the robot stood; a session spans at least 0.1 m");
 }
 
 /// A frame around the first believable fix.
@@ -75,8 +89,7 @@ std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, con
 std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
   std::vector<MapFix> found;
   for (const Fix& fix : fixes) {
-    if (fix.has_fix && isValid(fix.position))
-      found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m});
+    if (hasPosition(fix)) found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m});
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const MapFix& a, const MapFix& b) { return a.stamp_ns < b.stamp_ns; });
@@ -150,9 +163,12 @@ MapBuilder::~MapBuilder() = default;
 
 void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera) {
   try {
-    if (!frame_) frame_ = frameFor(fixes, config_.trajectory);
-    requireNear(middleOf(fixes), frame_->datum());
-    report_.sessions.push_back(cleanTrajectory(fixes, *frame_, config_.trajectory));
+    const LocalFrame frame = frame_ ? *frame_ : frameFor(fixes, config_.trajectory);
+    requireNear(middleOf(fixes), frame.datum());
+    CleanedTrajectory cleaned = cleanTrajectory(fixes, frame, config_.trajectory);
+    requireMotion(cleaned);
+    report_.sessions.push_back(std::move(cleaned));
+    frame_ = frame;
   } catch (const std::exception& error) {
     throw std::runtime_error("session '" + name + "': " + error.what());
   }

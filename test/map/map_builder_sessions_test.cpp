@@ -104,6 +104,43 @@ TEST(MapBuilder, ARoundOfAnotherCityIsRefused) {
   }
 }
 
+/// What the builder answers to a session with these fixes. One that is refused leaves no trace.
+std::string refusalOf(const std::vector<Fix>& fixes) {
+  MapBuilder builder({});
+  std::string refusal = "accepted";
+  try {
+    builder.beginSession("stuck", fixes);
+  } catch (const std::runtime_error& error) {
+    refusal = error.what();
+  }
+  builder.beginSession("good", straightRound());
+  builder.addImage(kSecond_ns, scene(1, 0));
+  EXPECT_EQ(builder.build()->header().sessions.size(), refusal == "accepted" ? 2U : 1U);
+  EXPECT_NEAR(builder.frame().datum().latitude_deg, straightRound().front().position.latitude_deg, 1e-6);
+  return refusal;
+}
+
+TEST(MapBuilder, AReceiverThatIsStuckIsRefused) {
+  std::vector<Fix> stuck = straightRound();
+  for (Fix& fix : stuck) fix.position = {52.5, 13.4, 30.0};
+  EXPECT_THAT(refusalOf(stuck), testing::StartsWith("session 'stuck': its 40 believable fixes are all at one point"));
+  stuck[7].position.latitude_deg += 0.01;  // an outlier is no motion
+  EXPECT_THAT(refusalOf(stuck), testing::HasSubstr("fixes are all at one point"));
+  for (Fix& fix : stuck) fix.position = {0.0, 0.0, 0.0};
+  EXPECT_THAT(refusalOf(stuck), testing::HasSubstr("none of its 40 fixes is valid"));
+}
+
+TEST(MapBuilder, FixesAtTheOriginAreNone) {
+  std::vector<Fix> fixes = straightRound();
+  for (std::size_t i = 0; i < 25; ++i) fixes[i].position = {0.0, 0.0, 0.0};  // the receiver starts
+  MapBuilder builder({});
+  builder.beginSession("round", fixes);
+  EXPECT_FALSE(builder.wants(kSecond_ns));
+  EXPECT_TRUE(builder.wants(6 * kSecond_ns));
+  EXPECT_EQ(builder.report().sessions.front().verdicts.front(), FixVerdict::kNoFix);
+  EXPECT_EQ(builder.report().sessions.front().verdicts.back(), FixVerdict::kKept);
+}
+
 SessionCamera exampleCamera(cv::Size size) {
   cv::Mat grey(size, CV_8U, cv::Scalar(255));
   grey.rowRange(size.height / 2, size.height).setTo(0);

@@ -30,5 +30,8 @@ class LocalFrame {
 
 /// True when latitude and longitude are finite and in range.
 bool isValid(const GeodeticPoint& point);
+/// True when the receiver claims a fix and its position is valid. Latitude 0 with longitude 0 is what a receiver
+/// without a position sends, whatever it claims: a point of the ocean that no fix hits to the last digit.
+bool hasPosition(const Fix& fix);
 
 }  // namespace visual_localization

@@ -62,6 +62,8 @@ struct SessionImages {
 
 /// A map is flat: farther from its datum north and lengths are wrong by more than a degree and a part in 8000.
 constexpr double kFarthestSession_m = 1e5;
+/// A session spans at least this: a receiver that always reports the same point is stuck.
+constexpr double kSmallestSession_m = 0.1;
 
 /// What was kept and why the rest was dropped.
 struct MapBuildReport {
@@ -91,8 +93,8 @@ class MapBuilder {
   ~MapBuilder();
 
   /// Starts a session: cleans its fixes. The first believable fix ever given becomes the datum. Throws
-  /// std::runtime_error naming the session when the fixes are not enough for a path, or when it lies farther than
-  /// kFarthestSession_m from the datum.
+  /// std::runtime_error naming the session when the fixes are not enough for a path, when the path spans less than
+  /// kSmallestSession_m, or when it lies farther than kFarthestSession_m from the datum; the builder is as before.
   void beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera = {});
   /// True when the image at `stamp_ns` has a position and is far enough from the last one: only then is it
   /// worth decoding and giving to addImage. Counts the reasons otherwise.
