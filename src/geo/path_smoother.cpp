@@ -32,10 +32,12 @@ GridPosition locate(const SmoothedPath& grid, double time_s) {
 SmoothedPath gridOver(const std::vector<PathSample>& samples, double smoothing_time_s) {
   constexpr double kStepsPerSmoothingTime = 3.0;
   constexpr double kMostPoints = 1e6;
+  constexpr double kMostPointsPerSample = 100.0;  // a path between two samples has no more details
   const double duration_s = samples.back().time_s - samples.front().time_s;
   SmoothedPath grid;
   grid.start_s = samples.front().time_s;
-  const double wanted_s = std::max(smoothing_time_s / kStepsPerSmoothingTime, duration_s / kMostPoints);
+  const double most_points = std::min(kMostPoints, kMostPointsPerSample * static_cast<double>(samples.size()));
+  const double wanted_s = std::max(smoothing_time_s / kStepsPerSmoothingTime, duration_s / most_points);
   const double steps = std::max(2.0, std::ceil(duration_s / wanted_s));
   grid.step_s = duration_s / steps;
   grid.positions_m.resize(static_cast<std::size_t>(steps) + 1);

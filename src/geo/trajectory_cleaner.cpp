@@ -40,11 +40,23 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
     } else {
       last_ns = fixes[i].stamp_ns;
       const std::int64_t start_ns = fixes[usable.indices.empty() ? i : usable.indices.front()].stamp_ns;
-      usable.samples.push_back({secondsBetween(start_ns, last_ns), frame.toEastNorth(fixes[i].position)});
+      const double time_s = secondsBetween(start_ns, last_ns);
+      if (!usable.samples.empty() && time_s - usable.samples.back().time_s < kShortestInterval_s) {
+        verdicts[i] = FixVerdict::kTooFast;
+        continue;
+      }
+      usable.samples.push_back({time_s, frame.toEastNorth(fixes[i].position)});
       usable.indices.push_back(i);
     }
   }
   return usable;
+}
+
+/// For a refusal: why so few are left.
+std::string tooFastOf(const std::vector<FixVerdict>& verdicts) {
+  const auto count = std::count(verdicts.begin(), verdicts.end(), FixVerdict::kTooFast);
+  if (count == 0) return "";
+  return " (" + std::to_string(count) + " of " + std::to_string(verdicts.size()) + " are faster than 50 Hz)";
 }
 
 double typicalInterval(const std::vector<PathSample>& samples) {
@@ -204,6 +216,8 @@ std::string toString(FixVerdict verdict) {
       return "no fix";
     case FixVerdict::kDisordered:
       return "out of order";
+    case FixVerdict::kTooFast:
+      return "faster than 50 Hz";
     case FixVerdict::kSpike:
       return "spike";
     case FixVerdict::kMultipath:
@@ -241,7 +255,7 @@ CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFram
   const UsableFixes usable = usableFixes(fixes, frame, cleaned.verdicts);
   if (usable.samples.size() < 2) {
     throw std::runtime_error("only " + std::to_string(usable.samples.size()) + " of " + std::to_string(fixes.size()) +
-                             " fixes are valid, a path needs at least 2");
+                             " fixes are valid, a path needs at least 2" + tooFastOf(cleaned.verdicts));
   }
 
   const double interval_s = typicalInterval(usable.samples);
@@ -263,7 +277,10 @@ CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFram
     append(smoothPath(part, smoother), motion.speed_mps, fixes[usable.indices.front()].stamp_ns, points);
     countGaps(part, interval_s, cleaned);
   }
-  if (points.size() < 2) throw std::runtime_error("the fixes contradict each other: no two of them make a path");
+  if (points.size() < 2) {
+    throw std::runtime_error("the fixes contradict each other: no two of them make a path" +
+                             tooFastOf(cleaned.verdicts));
+  }
   cleaned.trajectory = Trajectory(std::move(points), config.max_bridge_s);
   return cleaned;
 }

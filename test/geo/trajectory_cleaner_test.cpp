@@ -233,6 +233,48 @@ TEST(TrajectoryCleaner, StampsThatStandStillOrGoBackAreDropped) {
   EXPECT_EQ(countOf(cleaned, FixVerdict::kDisordered), 2u);
 }
 
+TEST(TrajectoryCleaner, FixesFasterThanFiftyHertzAreThinned) {
+  std::vector<Fix> fixes = record(block, 60.0, 100.0);
+  const CleanedTrajectory cleaned = clean(fixes);
+  EXPECT_EQ(countOf(cleaned, FixVerdict::kTooFast), fixes.size() / 2);
+  EXPECT_EQ(countOf(cleaned, FixVerdict::kKept), (fixes.size() + 1) / 2);
+  EXPECT_LT(largestOf(errorsOf(cleaned, block, 60.0)), 0.3);
+  fixes = record(block, 60.0, 50.0);
+  for (std::size_t i = 0; i < fixes.size(); ++i) fixes[i].stamp_ns += i % 2 == 0 ? 2'000'000 : -2'000'000;
+  EXPECT_EQ(countOf(clean(fixes), FixVerdict::kKept), fixes.size()) << "stamps may waver";
+}
+
+/// The finest path that smoothing may ask for; more would be work without end.
+void expectFewPoints(const std::vector<Fix>& fixes) {
+  constexpr std::size_t kMostPerFix = 101;
+  const CleanedTrajectory cleaned = clean(fixes);
+  EXPECT_LE(cleaned.trajectory.points().size(), kMostPerFix * countOf(cleaned, FixVerdict::kKept));
+}
+
+TEST(TrajectoryCleaner, ARefusalTellsThatFixesWereTooFast) {
+  std::vector<Fix> burst = record(block, 600.0);
+  for (std::size_t i = 0; i < burst.size(); ++i) burst[i].stamp_ns = static_cast<std::int64_t>(i) * 1000;
+  burst.back().stamp_ns += 80'000'000'000;
+  try {
+    clean(burst);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("(2999 of 3001 are faster than 50 Hz)"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(TrajectoryCleaner, AFewFixesMakeAFewPointsWhateverTheirStamps) {
+  std::vector<Fix> burst = record(block, 60.0);
+  burst.insert(burst.begin(), 3000, burst.front());
+  for (std::size_t i = 0; i < 3000; ++i) burst[i].stamp_ns -= 1000 * static_cast<std::int64_t>(3000 - i);
+  expectFewPoints(burst);
+  EXPECT_EQ(countOf(clean(burst), FixVerdict::kTooFast), 3000U);
+  std::vector<Fix> supersonic = record([](double time_s) { return Eigen::Vector2d(1000.0 * time_s, 0.0); }, 100.0);
+  supersonic.erase(supersonic.begin() + 50, supersonic.begin() + 450);  // 80 s
+  expectFewPoints(supersonic);
+}
+
 TEST(TrajectoryCleaner, TooFewFixesAreAnError) {
   std::vector<Fix> fixes = record(block, 10.0);
   EXPECT_THROW(clean({}), std::runtime_error);

@@ -16,11 +16,15 @@ enum class FixVerdict {
   kKept,
   kNoFix,       ///< the receiver said so, or the coordinates are not finite or out of range
   kDisordered,  ///< stamp not after the one before
+  kTooFast,     ///< less than kShortestInterval_s after the one that was used before
   kSpike,       ///< single outlier
   kMultipath,   ///< slow deviation from the smooth path although the receiver claims a fix: a reflected signal
 };
 
 std::string toString(FixVerdict verdict);
+
+/// Fixes come at up to 50 Hz, and stamps waver. More say nothing more: they would be noise over hardly any time.
+constexpr double kShortestInterval_s = 0.015;
 
 /// What is known of the robot's motion and of its receiver. The speed itself is estimated from the fixes.
 struct TrajectoryCleanerConfig {
@@ -47,8 +51,8 @@ struct CleanedTrajectory {
 
 /// Turns raw DGPS fixes into the smooth path that a robot at nearly constant speed must have driven (Kronfeld et
 /// al. (journal), section 6, where people did this by hand): drops invalid fixes, spikes and multipath,
-/// closes gaps along the smoothest path between their ends. Throws std::runtime_error, in one line, when fewer
-/// than two believable fixes remain.
+/// closes gaps along the smoothest path between their ends, in linear time whatever the stamps. Throws
+/// std::runtime_error, in one line, when fewer than two believable fixes remain.
 CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFrame& frame,
                                   const TrajectoryCleanerConfig& config);
 
