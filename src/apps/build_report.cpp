@@ -105,6 +105,11 @@ std::size_t fixesKept(const MapBuildReport& report) {
   return kept;
 }
 
+/// What recordings rarely have.
+void printIfAny(std::size_t images, const char* what) {
+  if (images > 0) std::cout << ", " << images << ' ' << what;
+}
+
 }  // namespace
 
 void announceCalibration(const MapBuildReport& report) {
@@ -128,7 +133,9 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
   std::cout << "images: " << (report.images_kept - report.images_thinned) << " kept, " << report.images_without_position
             << " without position, " << report.images_too_close << " too close, " << report.images_thinned
             << " left out after the adjustment, " << report.images_disordered << " out of order, "
-            << report.images_unusable << " unusable\n";
+            << report.images_unusable << " unusable";
+  printIfAny(report.images_standing, "left out while the robot stood (within 0.5 m for more than 10 s)");
+  std::cout << '\n';
   const double dropped = report.features_extracted == 0 ? 0.0
                                                         : 100.0 - 100.0 * static_cast<double>(report.features_kept) /
                                                                       static_cast<double>(report.features_extracted);

@@ -10,6 +10,7 @@
 
 #include "base/files.h"
 #include "base/statistics.h"
+#include "base/time.h"
 #include "map/extraction_pool.h"
 #include "map/image_spool.h"
 #include "map/map_geometry.h"
@@ -178,6 +179,7 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   report_.session_images.push_back({name, 0, {}, camera, false, {}});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
+  came_to_.reset();
 }
 
 bool MapBuilder::wants(std::int64_t stamp_ns) {
@@ -196,7 +198,17 @@ bool MapBuilder::wants(std::int64_t stamp_ns) {
     ++report_.images_too_close;
     return false;
   }
+  if (stands(*point)) {
+    ++report_.images_standing;
+    return false;
+  }
   return true;
+}
+
+/// Also of a robot that turns on its spot, kStandingTime_s of images are wanted.
+bool MapBuilder::stands(const TrajectoryPoint& at) {
+  if (!came_to_ || (at.position_m - came_to_->position_m).norm() >= kStandingReach_m) came_to_ = at;
+  return secondsBetween(came_to_->stamp_ns, at.stamp_ns) > kStandingTime_s;
 }
 
 void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {

@@ -69,27 +69,51 @@ class OrderedResults {
   std::vector<Neighbour>& found_;
 };
 
-/// The indices of the positions nearer than a radius, in the order of the search. The elements of nanoflann's own
-/// result set changed their type between its versions 1.4 and 1.7.
+/// The indices of the positions nearer than a radius, in the order of the search; the search ends as soon as there are
+/// more than `most`. The elements of nanoflann's own result set changed their type between its versions 1.4 and 1.7.
 class IndicesWithin {
  public:
   using DistanceType = double;
 
-  IndicesWithin(double squared_radius_m2, std::vector<std::uint32_t>& found)
-      : squared_radius_m2_(squared_radius_m2), found_(found) {}
+  IndicesWithin(double squared_radius_m2, std::size_t most, std::vector<std::uint32_t>& found)
+      : squared_radius_m2_(squared_radius_m2), most_(most), found_(found) {}
 
   std::size_t size() const { return found_.size(); }
   bool full() const { return true; }
   bool addPoint(double squared_m2, std::uint32_t index) {
     if (squared_m2 < squared_radius_m2_) found_.push_back(index);
-    return true;
+    return found_.size() <= most_;
   }
-  double worstDist() const { return squared_radius_m2_; }
+  double worstDist() const { return found_.size() <= most_ ? squared_radius_m2_ : -1.0; }
   void sort() {}
 
  private:
   double squared_radius_m2_;
+  std::size_t most_;
   std::vector<std::uint32_t>& found_;
+};
+
+/// The distance to the nearest position, or a billionth more: positions that are hardly nearer than the best so far are
+/// not looked at, so that many on one spot take no longer than one.
+class NearlyLeastDistance {
+ public:
+  using DistanceType = double;
+
+  std::size_t size() const { return 1; }
+  bool full() const { return true; }
+  bool addPoint(double squared_m2, std::uint32_t) {
+    squared_m2_ = std::min(squared_m2_, squared_m2);
+    return true;
+  }
+  double worstDist() const {
+    constexpr double kHardlyNearer = 1.0 - 1e-9;
+    return kHardlyNearer * squared_m2_ - std::numeric_limits<double>::min();
+  }
+  void sort() {}
+  double distance_m() const { return std::sqrt(squared_m2_); }
+
+ private:
+  double squared_m2_ = std::numeric_limits<double>::max();
 };
 
 /// Positions up to this number get a grid; building one for a city would take longer than it saves.
@@ -153,13 +177,19 @@ class PositionIndex::Tree {
 
   const std::vector<Eigen::Vector2d>& positions() const { return points_.positions_m; }
 
-  /// In order of index.
-  std::vector<std::uint32_t> within(const Eigen::Vector2d& centre_m, double radius_m) const {
+  /// In order of index; when there are more than `most`, any of them, but more than `most`.
+  std::vector<std::uint32_t> within(const Eigen::Vector2d& centre_m, double radius_m, std::size_t most) const {
     std::vector<std::uint32_t> indices;
-    IndicesWithin results(radius_m * radius_m, indices);
+    IndicesWithin results(radius_m * radius_m, most, indices);
     tree_.findNeighbors(results, centre_m.data(), {});
     std::sort(indices.begin(), indices.end());
     return indices;
+  }
+
+  double nearlyLeastDistance_m(const Eigen::Vector2d& position_m) const {
+    NearlyLeastDistance result;
+    tree_.findNeighbors(result, position_m.data(), {});
+    return result.distance_m();
   }
 
   void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
@@ -192,8 +222,11 @@ PositionIndex::PositionIndex(std::vector<Eigen::Vector2d> positions_m) {
   tree_ = std::make_unique<Tree>(std::move(positions_m));
   if (tree_->positions().size() > kLargestGrid) return;
   grid_ = std::make_unique<NearestGrid>(
-      tree_->positions(), [this](const Eigen::Vector2d& position_m) { return tree_->nearest(position_m).distance_m; },
-      [this](const Eigen::Vector2d& centre_m, double radius_m) { return tree_->within(centre_m, radius_m); });
+      tree_->positions(),
+      [this](const Eigen::Vector2d& position_m) { return tree_->nearlyLeastDistance_m(position_m); },
+      [this](const Eigen::Vector2d& centre_m, double radius_m) {
+        return tree_->within(centre_m, radius_m, kMostCandidates);
+      });
 }
 
 PositionIndex::~PositionIndex() = default;

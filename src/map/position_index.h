@@ -19,9 +19,9 @@ namespace visual_localization {
 /// answer here.
 class NearestGrid {
  public:
-  /// All positions within `radius_m` of `centre_m`, in order of index.
+  /// All positions within `radius_m` of `centre_m`, in order of index; when those are too many for a cell, too many.
   using Within = std::function<std::vector<std::uint32_t>(const Eigen::Vector2d& centre_m, double radius_m)>;
-  /// Distance to the nearest position.
+  /// Distance to the nearest position, up to a billionth more.
   using Distance = std::function<double(const Eigen::Vector2d& position_m)>;
 
   /// `positions_m` must outlive the grid.

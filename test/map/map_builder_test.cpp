@@ -93,6 +93,30 @@ TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
 
+/// Drives for 20 s, stands for 30 s, drives for 20 s: 0.7 m/s, fixes with millimetres of noise.
+std::vector<Fix> roundWithAStop() {
+  const LocalFrame frame({48.5, 9.05, 0.0});
+  std::vector<Fix> fixes;
+  for (int i = 0; i < 350; ++i) {
+    const double driven_s = 0.2 * (i < 100 ? i : i < 250 ? 100 : i - 150);
+    fixes.push_back({i * kSecond_ns / 5, frame.toGeodetic({0.7 * driven_s, 0.001 * (i % 3)}), true});
+  }
+  return fixes;
+}
+
+TEST(MapBuilder, ARobotThatStandsGivesImagesForTenSeconds) {
+  MapBuilder builder({});
+  builder.beginSession("round", roundWithAStop());
+  std::vector<int> wanted_s;
+  for (int time_s = 0; time_s < 69; ++time_s) {
+    if (builder.wants(time_s * kSecond_ns)) wanted_s.push_back(time_s);
+  }
+  EXPECT_NEAR(static_cast<double>(builder.report().images_standing), 20.0, 3.0);
+  ASSERT_EQ(wanted_s.size() + builder.report().images_standing, 69U);
+  EXPECT_EQ(wanted_s[27], 27) << "a robot may turn on its spot";
+  EXPECT_EQ(wanted_s[wanted_s.size() - 16], 53) << "it drives on";
+}
+
 TEST(MapBuilder, GlobalFeaturesAreThoseOfTheImageInTheMapsSize) {
   MapBuilder builder({});
   builder.beginSession("round", straightRound());

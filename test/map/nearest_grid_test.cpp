@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/time.h"
 #include "map/position_index.h"
 #include "test/support/synthetic.h"
 
@@ -109,6 +110,27 @@ TEST(NearestGrid, GivesTheFirstOfAFewOnOneSpotAndNoneOfMany) {
   EXPECT_EQ(gridOf(few).nearest({1.0, 1.0})->index, 0U);
   const Positions many(100, Eigen::Vector2d(1.0, 1.0));
   EXPECT_FALSE(gridOf(many).nearest({1.0, 1.0}));
+}
+
+/// A street of 100 m in whose middle the robot was parked: `parked` images within `reach_m`.
+Positions parkedOnStreet(std::size_t parked, double reach_m) {
+  Positions positions_m = test::street(100, 1.0);
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> offset_m(-reach_m, reach_m);
+  for (std::size_t i = 0; i < parked; ++i) positions_m.emplace_back(50.0 + offset_m(random), offset_m(random));
+  return positions_m;
+}
+
+TEST(PositionIndex, ManyImagesOnOneSpotTakeNoLongerThanOthers) {
+  for (const double reach_m : {0.0, 1e-9, 0.01}) {
+    const Positions positions_m = parkedOnStreet(19000, reach_m);
+    const CpuStopwatch watch;
+    const PositionIndex index(positions_m);
+    EXPECT_LT(watch.elapsed_ms(), 10000.0) << "half a second; it was an hour";
+    for (const Eigen::Vector2d& place_m : Positions{{50.0, 0.0}, {50.4, 3.0}, {10.2, 0.3}, {50.001, 0.002}}) {
+      EXPECT_EQ(index.nearest(place_m).image, nearestOf(positions_m, place_m)) << place_m.transpose();
+    }
+  }
 }
 
 TEST(NearestGrid, AnswersBetweenPositionsThatAreFarApart) {

@@ -64,12 +64,16 @@ struct SessionImages {
 constexpr double kFarthestSession_m = 1e5;
 /// A session spans at least this: a receiver that always reports the same point is stuck.
 constexpr double kSmallestSession_m = 0.1;
+/// A robot that does not come as far as this in kStandingTime_s stands.
+constexpr double kStandingReach_m = 0.5;
+constexpr double kStandingTime_s = 10.0;
 
 /// What was kept and why the rest was dropped.
 struct MapBuildReport {
   std::size_t images_kept = 0;
   std::size_t images_without_position = 0;  ///< before the first or after the last believable fix
   std::size_t images_too_close = 0;         ///< nearer than min_spacing_m
+  std::size_t images_standing = 0;          ///< of a robot that stands: see MapBuilder::wants
   std::size_t images_thinned = 0;           ///< after the adjustment: nearer than spacing_m
   std::size_t images_disordered = 0;        ///< stamp not after the one before
   std::size_t images_unusable = 0;          ///< could not be decoded, or too small
@@ -96,8 +100,9 @@ class MapBuilder {
   /// std::runtime_error naming the session when the fixes are not enough for a path, when the path spans less than
   /// kSmallestSession_m, or when it lies farther than kFarthestSession_m from the datum; the builder is as before.
   void beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera = {});
-  /// True when the image at `stamp_ns` has a position and is far enough from the last one: only then is it
-  /// worth decoding and giving to addImage. Counts the reasons otherwise.
+  /// True when the image at `stamp_ns` has a position, is far enough from the last one, and does not come from a robot
+  /// that has stood there (within kStandingReach_m) for longer than kStandingTime_s: only then is it worth decoding and
+  /// giving to addImage. Counts the reasons otherwise.
   bool wants(std::int64_t stamp_ns);
   /// `grey`: 8-bit, one channel; resized to the size of the first image. An empty one counts as unusable. Throws
   /// CameraError when the session's camera or mask is for images of another shape.
@@ -115,6 +120,7 @@ class MapBuilder {
 
  private:
   using Sink = std::function<void(const TrainingImage& image)>;
+  bool stands(const TrajectoryPoint& at);
   void fitCamera(cv::Size recorded);
   void extractWaiting();
   void calibrate(const TrainingMap& pruned);
@@ -136,6 +142,7 @@ class MapBuilder {
   std::vector<std::vector<MapFix>> fixes_;  ///< of each session
   std::optional<std::int64_t> last_stamp_ns_;
   std::optional<Eigen::Vector2d> last_kept_m_;
+  std::optional<TrajectoryPoint> came_to_;  ///< where the robot is, and since when
 };
 
 }  // namespace visual_localization
