@@ -91,6 +91,23 @@ void printImages(const SessionImages& session, cv::Size in_map) {
   std::cout << '\n';
 }
 
+/// Images that do not have the size of most, as a camera gives them that changes its mode or starts.
+void printOtherSizes(const SessionImages& session) {
+  constexpr std::size_t kMostNamed = 4;
+  if (session.other_sizes.empty()) return;
+  std::cout << session.name << ": its images are of " << session.recorded.width << 'x' << session.recorded.height
+            << " px, but for";
+  std::size_t named = 0;
+  for (const auto& [size, images] : session.other_sizes) {
+    if (++named > kMostNamed) break;
+    std::cout << (named == 1 ? " " : ", ") << images << " of " << size.first << 'x' << size.second;
+  }
+  if (session.other_sizes.size() > kMostNamed) {
+    std::cout << " and others of " << session.other_sizes.size() - kMostNamed << " more sizes";
+  }
+  std::cout << '\n';
+}
+
 /// The size of the map's images is that of the first.
 void printSessionImages(const std::vector<SessionImages>& sessions) {
   const auto first = std::find_if(sessions.begin(), sessions.end(), [](const auto& session) { return session.kept; });
@@ -129,11 +146,13 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
   for (const SessionImages& session : report.session_images) {
     if (geometry.enabled) printGeometry(session);
   }
+  for (const SessionImages& session : report.session_images) printOtherSizes(session);
   if (sessions.size() > 1) printSessionImages(report.session_images);
   std::cout << "images: " << (report.images_kept - report.images_thinned) << " kept, " << report.images_without_position
             << " without position, " << report.images_too_close << " too close, " << report.images_thinned
             << " left out after the adjustment, " << report.images_disordered << " out of order, "
             << report.images_unusable << " unusable";
+  printIfAny(report.images_of_other_shape, "of another shape than most, left out");
   printIfAny(report.images_standing, "left out while the robot stood (within 0.5 m for more than 10 s)");
   std::cout << '\n';
   const double dropped = report.features_extracted == 0 ? 0.0

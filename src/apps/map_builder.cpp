@@ -91,7 +91,7 @@ void addImages(MapBuilder& builder, const BagReader& bag, const std::string& top
   bool warned = false;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const BagImage image = images.read(i);
-    if (builder.wants(image.stamp_ns)) {
+    if (builder.wants(image.stamp_ns, image.size)) {
       builder.addImage(image.stamp_ns, decode(image, bag.path() + ": " + images.topic(), warned));
     }
     bar.show(i + 1, images.size());
@@ -116,6 +116,7 @@ SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options, c
   camera.mount = mountOf(bag, options, config);
   camera.model = options.camera_info.empty() ? bag.camera(options.image_topic) : readCameraFile(options.camera_info);
   if (!options.mask.empty()) camera.mask = readMask(options.mask);
+  camera.image_size = bag.images(options.image_topic).usualSize();
   return camera;
 }
 

@@ -1,8 +1,10 @@
 #include "visual_localization/bag/bag_reader.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <utility>
 
@@ -26,12 +28,21 @@ void requireFile(const std::string& path) {
 }
 
 template <class Message>
+cv::Size claimedSize(const Message& message) {
+  try {
+    return sizeOf(message);
+  } catch (const ImageError&) {
+    return {};
+  }
+}
+
+template <class Message>
 BagImage readImage(std::string bytes, const bag::Message& from) {
   try {
     const auto message = deserialize<Message>(std::move(bytes));
-    return {stampOf(message->header, from), [message] { return toGrey(*message); }};
+    return {stampOf(message->header, from), [message] { return toGrey(*message); }, claimedSize(*message)};
   } catch (const ImageError& error) {
-    return {from.stamp_ns, [error]() -> cv::Mat { throw error; }};
+    return {from.stamp_ns, [error]() -> cv::Mat { throw error; }, {}};
   }
 }
 
@@ -83,6 +94,19 @@ BagImage BagImages::read(std::size_t i) const {
     return content_->is_compressed ? readImage<sensor_msgs::CompressedImage>(std::move(bytes), message)
                                    : readImage<sensor_msgs::Image>(std::move(bytes), message);
   });
+}
+
+cv::Size BagImages::usualSize() const {
+  constexpr std::size_t kMostRead = 1000;
+  std::map<std::pair<int, int>, std::size_t> counts;
+  const std::size_t count = std::min(size(), kMostRead);
+  for (std::size_t i = 0; i < count; ++i) {
+    const cv::Size found = read(i * size() / count).size;
+    if (!found.empty()) ++counts[{found.width, found.height}];
+  }
+  const auto usual =
+      std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  return usual == counts.end() ? cv::Size() : cv::Size(usual->first.first, usual->first.second);
 }
 
 BagReader::BagReader(const std::string& path) : path_(path) {

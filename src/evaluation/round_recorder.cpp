@@ -77,15 +77,16 @@ void forEachImage(const BagReader& bag, const std::string& topic,
 /// Sees images and adds them to a drive.
 class DriveRecorder {
  public:
-  /// `for_poses`: keeps features that are not pruned.
-  DriveRecorder(const SiftConfig& sift, const LocalizerConfig& config, bool for_poses)
-      : sift_(sift), config_(config), for_poses_(for_poses) {}
+  /// `image_size`: of most images. `for_poses`: keeps features that are not pruned.
+  DriveRecorder(const SiftConfig& sift, const LocalizerConfig& config, cv::Size image_size, bool for_poses)
+      : sift_(sift), config_(config), for_poses_(for_poses) {
+    drive_.image_size = image_size;
+  }
 
   void add(std::int64_t stamp_ns, const cv::Mat& grey, const std::optional<TruePose>& truth) {
     if (!front_end_) {
-      drive_.image_size = grey.size();
       MapHeader like_the_map;
-      like_the_map.image_size = grey.size();
+      like_the_map.image_size = drive_.image_size;
       like_the_map.sift = sift_;
       front_end_.emplace(frontEndConfigOf(config_, like_the_map));
     }
@@ -144,7 +145,7 @@ std::shared_ptr<const TrainingMap> recordMap(const std::string& path, const Roun
                    "): name its camera_info, or set geometry/enabled to false for places only");
   }
   try {
-    builder.beginSession(recording.name, fixes, {camera, {}});
+    builder.beginSession(recording.name, fixes, {camera, {}, {}, bag.images(recording.image_topic).usualSize()});
     forEachImage(bag, recording.image_topic, [&builder](std::int64_t stamp_ns, const cv::Mat& grey) {
       if (builder.wants(stamp_ns)) builder.addImage(stamp_ns, grey);
     });
@@ -164,7 +165,7 @@ std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpe
   const BagReader bag(path);
   const Truth truth = truthOf(bag, recording, map.trajectory);
   const std::optional<CameraModel> camera = for_poses ? cameraOf(bag, recording) : std::nullopt;
-  DriveRecorder recorder(map.sift, front_end, for_poses);
+  DriveRecorder recorder(map.sift, front_end, bag.images(recording.image_topic).usualSize(), for_poses);
   forEachImage(bag, recording.image_topic,
                [&](std::int64_t stamp_ns, const cv::Mat& grey) { recorder.add(stamp_ns, grey, truth(stamp_ns)); });
   auto drive = std::make_shared<Drive>(recorder.finish());

@@ -79,6 +79,18 @@ void requireNear(const GeodeticPoint& position, const GeodeticPoint& datum) {
                            std::to_string(std::llround(1e-3 * kFarthestSession_m)) + " km: build two maps");
 }
 
+bool isOfShape(cv::Size recorded, cv::Size wanted) {
+  constexpr double kRounding = 0.02;
+  return std::abs(stretchOf(recorded, wanted) - 1.0) <= kRounding;
+}
+
+cv::Size requireBounded(const std::string& session, cv::Size size) {
+  if (size.width <= 1e6 * kLargestMapImage_Mpx / size.height) return size;
+  throw std::runtime_error("session '" + session + "': images of " + std::to_string(size.width) + "x" +
+                           std::to_string(size.height) + " pixels are too large for a map: at most " +
+                           std::to_string(kLargestMapImage_Mpx) + " million pixels");
+}
+
 /// The unpruned features of the images that tell what is noise in image `i`.
 std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, const PruningNeighbours& neighbours,
                                                               const TrainingMap& unpruned) {
@@ -176,13 +188,13 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   header_.datum = frame_->datum();
   header_.sessions.push_back({name, {}, {}, camera.mount});
   fixes_.push_back(inFrame(fixes, *frame_));
-  report_.session_images.push_back({name, 0, {}, camera, false, {}});
+  report_.session_images.push_back({name, 0, camera.image_size, camera, false, {}, {}});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
   came_to_.reset();
 }
 
-bool MapBuilder::wants(std::int64_t stamp_ns) {
+bool MapBuilder::wants(std::int64_t stamp_ns, cv::Size recorded) {
   if (report_.sessions.empty()) throw std::logic_error("map builder: image before the first session");
   if (last_stamp_ns_ && stamp_ns <= *last_stamp_ns_) {
     ++report_.images_disordered;
@@ -202,13 +214,22 @@ bool MapBuilder::wants(std::int64_t stamp_ns) {
     ++report_.images_standing;
     return false;
   }
-  return true;
+  return recorded.empty() || fits(recorded);
 }
 
 /// Also of a robot that turns on its spot, kStandingTime_s of images are wanted.
 bool MapBuilder::stands(const TrajectoryPoint& at) {
   if (!came_to_ || (at.position_m - came_to_->position_m).norm() >= kStandingReach_m) came_to_ = at;
   return secondsBetween(came_to_->stamp_ns, at.stamp_ns) > kStandingTime_s;
+}
+
+/// Whether an image of this size belongs into the session. Counts it when it does not.
+bool MapBuilder::fits(cv::Size recorded) {
+  SessionImages& session = report_.session_images.back();
+  if (session.camera.image_size.empty() || isOfShape(recorded, session.recorded)) return true;
+  ++session.other_sizes[{recorded.width, recorded.height}];
+  ++report_.images_of_other_shape;
+  return false;
 }
 
 void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
@@ -218,8 +239,12 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
     ++(point ? report_.images_unusable : report_.images_without_position);
     return;
   }
-  if (report_.images_kept == 0) header_.image_size = grey.size();
-  if (report_.session_images.back().kept == 0) fitCamera(grey.size());
+  if (!fits(grey.size())) return;
+  SessionImages& session = report_.session_images.back();
+  if (session.recorded.empty()) session.recorded = grey.size();
+  if (report_.images_kept == 0) header_.image_size = requireBounded(session.name, session.recorded);
+  if (session.kept == 0) fitCamera();
+  if (grey.size() != session.recorded) ++session.other_sizes[{grey.cols, grey.rows}];
   RawImage image;
   image.pose = {stamp_ns, static_cast<int>(header_.sessions.size()) - 1, point->position_m, point->yaw_rad};
   // A camera's or a decoder's buffer does not stay.
@@ -228,16 +253,15 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   image.mask = header_.sessions.back().mask;
   waiting_.push_back(std::move(image));
   last_kept_m_ = point->position_m;
-  SessionImages& session = report_.session_images.back();
-  if (session.kept == 0) session.recorded = grey.size();
   ++session.kept;
   ++report_.images_kept;
   if (waiting_.size() >= most_waiting_) extractWaiting();
 }
 
 /// Camera and mask of a session for images of the map's size; those it has recorded are resized to it.
-void MapBuilder::fitCamera(cv::Size recorded) {
+void MapBuilder::fitCamera() {
   const SessionCamera& camera = report_.session_images.back().camera;
+  const cv::Size recorded = report_.session_images.back().recorded;
   Session& session = header_.sessions.back();
   try {
     if (camera.model) session.camera = fittedTo(recorded, *camera.model).scaledTo(header_.image_size);

@@ -48,11 +48,12 @@ const Encoding& encodingOf(const std::string& name) {
   throw ImageError("image encoding " + printable(name) + " is not supported; supported are " + joined(names));
 }
 
-void requireSize(std::uint64_t width, std::uint64_t height) {
+cv::Size requireSize(std::uint64_t width, std::uint64_t height) {
   const std::string size = std::to_string(width) + "x" + std::to_string(height);
   if (width == 0 || height == 0) throw ImageError("image is empty (" + size + ")");
   const auto limit = static_cast<std::uint64_t>(kMaxImageSide_px);
   if (width > limit || height > limit) throw ImageError("image of " + size + " pixels is too large");
+  return {static_cast<int>(width), static_cast<int>(height)};
 }
 
 void requireConsistent(const sensor_msgs::Image& message) {
@@ -88,7 +89,7 @@ bool isStartOfFrame(std::uint64_t marker) {
 }
 
 /// Reads the size from the frame header, so that nothing is allocated for a size that nobody means.
-void requireJpegSize(const Bytes& data) {
+cv::Size requireJpegSize(const Bytes& data) {
   std::size_t at = 2;
   while (true) {
     const std::uint64_t lead = bigEndian(data, at, 1);
@@ -97,8 +98,7 @@ void requireJpegSize(const Bytes& data) {
     if (marker == 0xFF) {
       ++at;
     } else if (isStartOfFrame(marker)) {
-      requireSize(bigEndian(data, at + 7, 2), bigEndian(data, at + 5, 2));
-      return;
+      return requireSize(bigEndian(data, at + 7, 2), bigEndian(data, at + 5, 2));
     } else {
       at += 2 + bigEndian(data, at + 2, 2);
     }
@@ -112,16 +112,17 @@ void requireJpegEnd(const Bytes& data) {
   if (data[end - 2] != 0xFF || data[end - 1] != 0xD9) throw ImageError("JPEG is cut off");
 }
 
-void requireDecodable(const Bytes& data) {
+cv::Size requireDecodable(const Bytes& data) {
   if (data.empty()) throw ImageError("compressed image is empty");
   if (startsWith(data, {0xFF, 0xD8, 0xFF})) {
-    requireJpegSize(data);
+    const cv::Size size = requireJpegSize(data);
     requireJpegEnd(data);
-  } else if (startsWith(data, {0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A})) {
-    requireSize(bigEndian(data, 16, 4), bigEndian(data, 20, 4));
-  } else {
-    throw ImageError("compressed image is neither JPEG nor PNG");
+    return size;
   }
+  if (startsWith(data, {0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A})) {
+    return requireSize(bigEndian(data, 16, 4), bigEndian(data, 20, 4));
+  }
+  throw ImageError("compressed image is neither JPEG nor PNG");
 }
 
 bool hasSwappedBytes(const sensor_msgs::Image& message) {
@@ -140,6 +141,13 @@ sensor_msgs::Image withBytesSwapped(sensor_msgs::Image message) {
 }
 
 }  // namespace
+
+cv::Size sizeOf(const sensor_msgs::Image& message) {
+  requireConsistent(message);
+  return {static_cast<int>(message.width), static_cast<int>(message.height)};
+}
+
+cv::Size sizeOf(const sensor_msgs::CompressedImage& message) { return requireDecodable(message.data); }
 
 cv::Mat toGrey(const sensor_msgs::Image& message) {
   requireConsistent(message);

@@ -107,6 +107,27 @@ TEST_F(BagReaderTest, ImagesKeepTheirBagOpen) {
   EXPECT_EQ(images.read(2).decode().size(), cv::Size(48, 32));
 }
 
+TEST_F(BagReaderTest, MostImagesDecideTheUsualSize) {
+  EXPECT_EQ(BagReader(path_).images("/camera").usualSize(), cv::Size(48, 32));
+  {
+    rosbag::Bag bag(path_, rosbag::bagmode::Write);
+    for (const double time_s : {1.0, 2.0, 3.0, 4.0}) {
+      sensor_msgs::CompressedImage other = jpeg(time_s);
+      if (time_s < 3.0) cv::imencode(time_s < 2.0 ? ".jpg" : ".png", cv::Mat(600, 800, CV_8UC1), other.data);
+      if (time_s == 2.0) other.data.resize(20);  // its size is cut off
+      bag.write("/camera/compressed", ros::Time(time_s), other);
+    }
+    bag.write("/raw", ros::Time(1.0), raw(1.0));
+    bag.write("/broken/compressed", ros::Time(1.0), sensor_msgs::CompressedImage());
+  }
+  const BagReader bag(path_);
+  EXPECT_EQ(bag.images("/camera").usualSize(), cv::Size(48, 32));
+  EXPECT_EQ(bag.images("/camera").read(0).size, cv::Size(800, 600));
+  EXPECT_EQ(bag.images("/camera").read(1).size, cv::Size());
+  EXPECT_EQ(bag.images("/raw").usualSize(), cv::Size(24, 20));
+  EXPECT_EQ(bag.images("/broken").usualSize(), cv::Size());
+}
+
 TEST_F(BagReaderTest, PrefersRawImages) {
   {
     rosbag::Bag bag(path_, rosbag::bagmode::Append);

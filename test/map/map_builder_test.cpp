@@ -93,6 +93,37 @@ TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
 
+TEST(MapBuilder, TheFirstImagesDoNotDecideASizeThatIsGiven) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound(), {{}, {}, {}, {320, 240}});
+  for (int i = 1; i <= 2; ++i) builder.addImage(i * kSecond_ns, cv::Mat(20, 20, CV_8UC1, cv::Scalar(7)));
+  EXPECT_FALSE(builder.wants(3 * kSecond_ns, {16384, 16384})) << "not worth decoding";
+  ASSERT_TRUE(builder.wants(4 * kSecond_ns, {640, 480}));
+  cv::Mat large;
+  cv::resize(scene(1, 0), large, {640, 480});
+  builder.addImage(4 * kSecond_ns, large);
+  ASSERT_TRUE(builder.wants(5 * kSecond_ns, {320, 240}));
+  builder.addImage(5 * kSecond_ns, scene(1, 3));
+  const auto map = builder.build();
+  EXPECT_EQ(map->size(), 2U);
+  EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
+  EXPECT_EQ(builder.report().images_of_other_shape, 3U);
+  const std::map<std::pair<int, int>, std::size_t> others{{{20, 20}, 2U}, {{640, 480}, 1U}, {{16384, 16384}, 1U}};
+  EXPECT_EQ(builder.report().session_images.front().other_sizes, others);
+}
+
+TEST(MapBuilder, ImagesThatTakeTooMuchMemoryAreRefused) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound());
+  try {
+    builder.addImage(kSecond_ns, cv::Mat(5001, 10000, CV_8UC1, cv::Scalar(7)));
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("session 'round': images of 10000x5001"),
+                                             testing::HasSubstr("at most 50 million")));
+  }
+}
+
 /// Drives for 20 s, stands for 30 s, drives for 20 s: 0.7 m/s, fixes with millimetres of noise.
 std::vector<Fix> roundWithAStop() {
   const LocalFrame frame({48.5, 9.05, 0.0});

@@ -33,6 +33,7 @@ class BagError : public std::runtime_error {
 struct BagImage {
   std::int64_t stamp_ns = 0;        ///< of the header, or when it was recorded if the header has none
   std::function<cv::Mat()> decode;  ///< 8-bit grey image; throws ImageError when the message is unusable
+  cv::Size size = {};               ///< pixels, by the message's header; empty when the message is unusable
 };
 
 /// The images of one topic in the order of recording; each is read from the bag only when asked for. Keeps the bag
@@ -44,6 +45,9 @@ class BagImages {
   const std::string& topic() const;
   /// Throws BagError when the bag is damaged there.
   BagImage read(std::size_t i) const;
+  /// The size of most images, by the headers of at most a thousand that are spread evenly; the smaller one of equals.
+  /// Empty when none of them is usable. Throws like read().
+  cv::Size usualSize() const;
 
  private:
   friend class BagReader;

@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -48,16 +50,19 @@ struct SessionCamera {
   std::optional<CameraModel> model = {};  ///< none: not calibrated
   Mask mask = {};                         ///< features under it are not used; empty: all are
   std::optional<SensorMount> mount = {};  ///< none: camera and antenna are where the robot is
+  cv::Size image_size = {};               ///< of most of its images, pixels; empty: that of its first image
 };
 
 /// What one session brought.
 struct SessionImages {
   std::string name;
   std::size_t kept = 0;
-  cv::Size recorded;  ///< size of its first image, pixels; the map's is that of the first session
+  cv::Size recorded;  ///< SessionCamera::image_size, or the size of its first image; the map's is the first session's
   SessionCamera camera;
   bool calibrated_by_images = false;  ///< nobody gave `camera` a model: its images did
   SessionLandmarks geometry = {};     ///< complete when the map is built
+  /// How many images had another size than `recorded`, by width and height in pixels.
+  std::map<std::pair<int, int>, std::size_t> other_sizes = {};
 };
 
 /// A map is flat: farther from its datum north and lengths are wrong by more than a degree and a part in 8000.
@@ -67,6 +72,8 @@ constexpr double kSmallestSession_m = 0.1;
 /// A robot that does not come as far as this in kStandingTime_s stands.
 constexpr double kStandingReach_m = 0.5;
 constexpr double kStandingTime_s = 10.0;
+/// Of an image, millions of pixels: SIFT needs 40 bytes for each pixel of the map's size, in every thread.
+constexpr int kLargestMapImage_Mpx = 50;
 
 /// What was kept and why the rest was dropped.
 struct MapBuildReport {
@@ -74,6 +81,7 @@ struct MapBuildReport {
   std::size_t images_without_position = 0;  ///< before the first or after the last believable fix
   std::size_t images_too_close = 0;         ///< nearer than min_spacing_m
   std::size_t images_standing = 0;          ///< of a robot that stands: see MapBuilder::wants
+  std::size_t images_of_other_shape = 0;    ///< neither SessionCamera::image_size nor of that aspect ratio
   std::size_t images_thinned = 0;           ///< after the adjustment: nearer than spacing_m
   std::size_t images_disordered = 0;        ///< stamp not after the one before
   std::size_t images_unusable = 0;          ///< could not be decoded, or too small
@@ -102,10 +110,14 @@ class MapBuilder {
   void beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera = {});
   /// True when the image at `stamp_ns` has a position, is far enough from the last one, and does not come from a robot
   /// that has stood there (within kStandingReach_m) for longer than kStandingTime_s: only then is it worth decoding and
-  /// giving to addImage. Counts the reasons otherwise.
-  bool wants(std::int64_t stamp_ns);
-  /// `grey`: 8-bit, one channel; resized to the size of the first image. An empty one counts as unusable. Throws
-  /// CameraError when the session's camera or mask is for images of another shape.
+  /// giving to addImage. `recorded`: its size in pixels, if that is known; addImage would leave out an image of another
+  /// shape. Counts the reasons otherwise.
+  bool wants(std::int64_t stamp_ns, cv::Size recorded = {});
+  /// `grey`: 8-bit, one channel; an empty one counts as unusable. The map's images have the size of the first
+  /// session's: its SessionCamera::image_size, without which its first image decides. Others are resized to it, and
+  /// counted where their session has another size. Where SessionCamera::image_size is given, images of another aspect
+  /// ratio are left out: no calibration holds for them. Throws CameraError when the session's camera or mask is for
+  /// images of another shape, and std::runtime_error when the map's images would be larger than kLargestMapImage_Mpx.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
   /// Prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
   std::shared_ptr<const TrainingMap> build(const Progress& progress = {});
@@ -121,7 +133,8 @@ class MapBuilder {
  private:
   using Sink = std::function<void(const TrainingImage& image)>;
   bool stands(const TrajectoryPoint& at);
-  void fitCamera(cv::Size recorded);
+  bool fits(cv::Size recorded);
+  void fitCamera();
   void extractWaiting();
   void calibrate(const TrainingMap& pruned);
   void finish(const Sink& sink, const Progress& progress);

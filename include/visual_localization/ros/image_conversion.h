@@ -20,4 +20,9 @@ cv::Mat toGrey(const sensor_msgs::Image& message);
 /// 8-bit grey image of a JPEG or PNG message. Throws ImageError when it is neither, broken or cut off.
 cv::Mat toGrey(const sensor_msgs::CompressedImage& message);
 
+/// Size of such an image in pixels by its header; nothing is decoded. Throws ImageError where toGrey finds the message
+/// unusable without decoding it.
+cv::Size sizeOf(const sensor_msgs::Image& message);
+cv::Size sizeOf(const sensor_msgs::CompressedImage& message);
+
 }  // namespace visual_localization
