@@ -40,6 +40,20 @@ double stepCost(const PathSample& from, const PathSample& to, const DrivingModel
   return sigmas > 0.0 ? sigmas * sigmas : std::min(kMostForSlow, sigmas * sigmas);
 }
 
+/// That of the fastest quarter; of a robot that was parked for more than three quarters of the recording, that of what
+/// is clearly faster than its noise. `speeds_mps`: in order.
+double speedOfMotion(const std::vector<double>& speeds_mps) {
+  constexpr double kParked = 0.2;  // m/s
+  constexpr double kClearly = 3.0;
+  constexpr double kLeastShare = 0.02;  // less are spikes
+  const double fast_mps = speeds_mps[speeds_mps.size() * 3 / 4];
+  if (fast_mps >= kParked) return fast_mps;
+  const auto moving = std::lower_bound(speeds_mps.begin(), speeds_mps.end(), std::max(kParked, kClearly * fast_mps));
+  const auto count = speeds_mps.end() - moving;
+  if (static_cast<double>(count) < kLeastShare * static_cast<double>(speeds_mps.size())) return fast_mps;
+  return moving[count / 2];
+}
+
 }  // namespace
 
 SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_span_s) {
@@ -47,7 +61,7 @@ SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_
   std::vector<double> speeds = spanSpeeds(samples, min_span_s);
   if (speeds.empty()) return {};
   std::sort(speeds.begin(), speeds.end());
-  const double fast_mps = speeds[speeds.size() * 3 / 4];
+  const double fast_mps = speedOfMotion(speeds);
   speeds.erase(speeds.begin(), std::lower_bound(speeds.begin(), speeds.end(), kStanding * fast_mps));
   const double median_mps = upperMedian(speeds);
   for (double& speed : speeds) speed = std::abs(speed - median_mps);

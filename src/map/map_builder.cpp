@@ -55,7 +55,8 @@ void requireMotion(const CleanedTrajectory& cleaned) {
   for (const TrajectoryPoint& point : cleaned.trajectory.points()) box.extend(point.position_m);
   if (box.diagonal().norm() >= kSmallestSession_m) return;
   const auto kept = std::count(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
-  throw std::runtime_error("its " + std::to_string(kept) + " believable fixes are all at one point: the receiver was " +
+  throw std::runtime_error("its " + std::to_string(kept) + " believable fixes of " +
+                           std::to_string(cleaned.verdicts.size()) + " are all at one point: the receiver was " +
                            "stuck, or the robot stood; a session spans at least 0.1 m");
 }
 

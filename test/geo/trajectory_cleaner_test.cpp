@@ -184,6 +184,13 @@ TEST(TrajectoryCleaner, ARobotMayStandStill) {
   for (const TrajectoryPoint& point : cleaned.trajectory.points()) ASSERT_TRUE(std::isfinite(point.yaw_rad));
 }
 
+TEST(TrajectoryCleaner, ARobotMayBeParkedForMostOfTheRecording) {
+  const Path parking = [](double time_s) { return block(time_s < 60.0 ? time_s : std::max(60.0, time_s - 3000.0)); };
+  const CleanedTrajectory cleaned = clean(record(parking, 3120.0, kRate, 0.05));
+  EXPECT_LT(countOf(cleaned, FixVerdict::kMultipath), 60u);
+  EXPECT_LT(largestOf(errorsOf(cleaned, parking, 3120.0)), 0.6);
+}
+
 TEST(TrajectoryCleaner, SparseExactFixesPassUnharmed) {
   const Path line = [](double time_s) { return Eigen::Vector2d(0.5 * time_s, 0.0); };
   const std::vector<Fix> fixes = record(line, 200.0, 0.25, 0.0);
