@@ -25,6 +25,7 @@ readonly ROS_BUILD='
 catkin: the build of a ROS package
 libroscpp-dev libnodelet-dev libnodeletlib-dev pluginlib-dev: the nodelet
 libcv-bridge-dev libimage-transport-dev: images from a camera
+libjpeg-dev libpng-dev: compressed images
 libcamera-calibration-parsers-dev: calibration files of cameras
 libtf2-ros-dev libtf2-geometry-msgs-dev libtf2-eigen-dev: tf
 librosbag-dev librosbag-storage-dev libroslz4-dev libbz2-dev libboost-dev: bags

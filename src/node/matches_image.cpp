@@ -1,12 +1,17 @@
 #include "node/matches_image.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "features/image_size.h"
+#include "ros/compressed_image.h"
+#include "visual_localization/ros/image_error.h"
 
 namespace visual_localization {
 namespace {
@@ -30,10 +35,19 @@ cv::Mat inColour(const cv::Mat& grey, const cv::Size& size) {
   return colour;
 }
 
+/// A uniform grey without a preview, or with one that cannot be decoded: whoever made the map wrote its bytes.
 cv::Mat previewOf(const std::vector<std::uint8_t>& jpeg, const cv::Size& size) {
-  cv::Mat preview;
-  if (!jpeg.empty()) preview = cv::imdecode(jpeg, cv::IMREAD_GRAYSCALE);
-  return preview.empty() ? cv::Mat(size, CV_8UC3, cv::Scalar::all(48)) : inColour(preview, size);
+  try {
+    if (!jpeg.empty()) return inColour(decodedToGrey(jpeg), size);
+  } catch (const ImageError&) {
+  }
+  return {size, CV_8UC3, cv::Scalar::all(48)};
+}
+
+/// To a width that lines need, but no farther than images of a map may go.
+double scaleOf(const cv::Size& size) {
+  const double largest = std::sqrt(static_cast<double>(kMaxImagePixels) / size.area());
+  return std::max(1.0, std::min(static_cast<double>(kSmallestWidth_px) / size.width, largest));
 }
 
 /// Two images beside each other, and lines between what both show.
@@ -41,7 +55,7 @@ class ImagePair {
  public:
   ImagePair(const cv::Mat& grey, const TrainingMap& map, std::size_t training) {
     const cv::Size size = map.header().image_size;
-    if (size.width < kSmallestWidth_px) scale_ = static_cast<double>(kSmallestWidth_px) / size.width;
+    scale_ = scaleOf(size);
     half_ = cv::Size(cvRound(size.width * scale_), cvRound(size.height * scale_));
     cv::hconcat(inColour(grey, half_), previewOf(map.preview(training), half_), canvas_);
   }

@@ -11,6 +11,7 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
+#include "features/image_size.h"
 #include "node/shared_localizer.h"
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/ros/image_conversion.h"
@@ -48,7 +49,7 @@ std::optional<Message> deserialised(std::vector<std::uint8_t> bytes, std::initia
 
 void requireImage(const cv::Mat& grey) {
   if (grey.empty() || grey.type() != CV_8UC1) fuzz::fail("no grey image");
-  if (grey.cols > kMaxImageSide_px || grey.rows > kMaxImageSide_px) fuzz::fail("an image that is too large");
+  if (whyTooLarge(grey.size())) fuzz::fail("an image that is too large");
 }
 
 void convert(const sensor_msgs::Image& message) {

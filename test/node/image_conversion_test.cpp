@@ -1,9 +1,13 @@
 #include "visual_localization/ros/image_conversion.h"
 
+#include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <sys/resource.h>
+#include <zlib.h>
 
 namespace visual_localization {
 namespace {
@@ -112,6 +116,131 @@ TEST(ImageConversion, OtherFormatsAndHugeSizesAreRefused) {
   auto message = compressed(".png");
   message.data[16] = 0x7F;
   EXPECT_THROW(toGrey(message), ImageError);
+}
+
+/// Bytes of a number, the highest first.
+std::vector<std::uint8_t> bigEndian(std::size_t value, int count) {
+  std::vector<std::uint8_t> bytes;
+  for (int i = count - 1; i >= 0; --i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+  return bytes;
+}
+
+void insert(std::vector<std::uint8_t>& data, std::size_t at, const std::vector<std::uint8_t>& what) {
+  data.insert(data.begin() + static_cast<std::ptrdiff_t>(at), what.begin(), what.end());
+}
+
+std::size_t find(const std::vector<std::uint8_t>& data, const std::vector<std::uint8_t>& what) {
+  return static_cast<std::size_t>(std::search(data.begin(), data.end(), what.begin(), what.end()) - data.begin());
+}
+
+std::string refusalOf(const sensor_msgs::CompressedImage& message) {
+  try {
+    toGrey(message);
+  } catch (const ImageError& error) {
+    return error.what();
+  }
+  return "taken";
+}
+
+TEST(ImageConversion, ASizeInFrontOfTheOneThatTheDecoderReadsIsNotBelieved) {
+  auto message = compressed(".jpg");
+  const std::size_t frame = find(message.data, {0xFF, 0xC0});
+  for (const std::size_t i : {5U, 7U}) message.data[frame + i] = 0x7F;  // 32 thousand pixels a side
+  // A marker without a length; whoever takes the next two bytes, FF E0, for one steps over the frame to a small one.
+  insert(message.data, 2, {0xFF, 0xD0});
+  const std::size_t end = message.data.size() - 2;
+  insert(message.data, end, std::vector<std::uint8_t>(4 + 0xFFE0 - end));
+  insert(message.data, message.data.size() - 2, {0xFF, 0xC0, 0, 11, 8, 0, 16, 0, 16, 1, 1, 0x11, 0});
+  const std::string refusal = refusalOf(message);
+  EXPECT_NE(refusal.find("image is too large"), std::string::npos) << refusal;
+}
+
+TEST(ImageConversion, RawAndCompressedImagesMayHaveTheSameNumberOfPixels) {
+  const cv::Mat largest(4096, 4096, CV_8UC1, cv::Scalar(9));
+  cv::Mat too_large(4097, 4096, CV_8UC1, cv::Scalar(9));
+  for (const char* extension : {".jpg", ".png"}) {
+    sensor_msgs::CompressedImage message;
+    cv::imencode(extension, largest, message.data);
+    EXPECT_EQ(toGrey(message).size(), largest.size()) << extension;
+    cv::imencode(extension, too_large, message.data);
+    EXPECT_EQ(refusalOf(message), "image is too large: 4096x4097 pixels, at most 16777216 are allowed and 16384 a side")
+        << extension;
+  }
+  sensor_msgs::Image raw;
+  raw.encoding = "mono8";
+  raw.width = raw.step = 4096;
+  raw.height = 4097;
+  raw.data.resize(std::size_t{4096} * 4097);
+  EXPECT_THROW(toGrey(raw), ImageError);
+}
+
+TEST(ImageConversion, AJpegOfThousandsOfScansIsRefused) {
+  sensor_msgs::CompressedImage message;
+  cv::imencode(".jpg", cv::Mat(480, 640, CV_8UC1, cv::Scalar(9)), message.data, {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  EXPECT_EQ(toGrey(message).size(), cv::Size(640, 480));
+  const std::size_t first = find(message.data, {0xFF, 0xDA});
+  const std::vector<std::uint8_t> scan(message.data.begin() + static_cast<std::ptrdiff_t>(first),
+                                       message.data.begin() + static_cast<std::ptrdiff_t>(first) + 10);
+  for (int i = 0; i < 1000; ++i) insert(message.data, message.data.size() - 2, scan);
+  EXPECT_EQ(refusalOf(message), "JPEG is broken or has more than 100 scans");
+}
+
+TEST(ImageConversion, EveryKindOfPngIsDecodedAsByOpenCv) {
+  cv::Mat pixels(31, 37, CV_8UC4);
+  cv::randu(pixels, 0, 256);
+  std::vector<cv::Mat> kinds{pixels};
+  for (const int conversion : {cv::COLOR_BGRA2BGR, cv::COLOR_BGRA2GRAY}) {
+    kinds.emplace_back();
+    cv::cvtColor(pixels, kinds.back(), conversion);
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    kinds.emplace_back();
+    kinds[i].convertTo(kinds.back(), CV_16U, 251.0, 3.0);
+  }
+  for (const cv::Mat& kind : kinds) {
+    for (const int two_levels : {0, 1}) {
+      if (two_levels == 1 && kind.type() != CV_8UC1) continue;
+      sensor_msgs::CompressedImage message;
+      cv::imencode(".png", kind, message.data, {cv::IMWRITE_PNG_BILEVEL, two_levels});
+      const cv::Mat expected = cv::imdecode(message.data, cv::IMREAD_GRAYSCALE);
+      EXPECT_EQ(cv::norm(toGrey(message), expected, cv::NORM_INF), 0.0) << cv::typeToString(kind.type());
+    }
+  }
+}
+
+TEST(ImageConversion, APngWithAPaletteIsDecodedAsByOpenCv) {
+  sensor_msgs::CompressedImage message;
+  message.data = {0x89, 0x50, 0x4E, 0x47, 0x0D, 0x0A, 0x1A, 0x0A, 0x00, 0x00, 0x00, 0x0D, 0x49, 0x48, 0x44, 0x52,
+                  0x00, 0x00, 0x00, 0x04, 0x00, 0x00, 0x00, 0x02, 0x02, 0x03, 0x00, 0x00, 0x00, 0x02, 0xC6, 0x95,
+                  0xF0, 0x00, 0x00, 0x00, 0x0C, 0x50, 0x4C, 0x54, 0x45, 0xFF, 0x00, 0x00, 0x00, 0xFF, 0x00, 0x00,
+                  0x00, 0xFF, 0x5A, 0x5A, 0x5A, 0x51, 0x7F, 0xE0, 0xB6, 0x00, 0x00, 0x00, 0x02, 0x74, 0x52, 0x4E,
+                  0x53, 0xFF, 0x00, 0xE5, 0xB7, 0x30, 0x4A, 0x00, 0x00, 0x00, 0x0C, 0x49, 0x44, 0x41, 0x54, 0x78,
+                  0x9C, 0x63, 0x90, 0x66, 0x78, 0x02, 0x00, 0x01, 0x39, 0x01, 0x00, 0x45, 0x64, 0x91, 0x9B, 0x00,
+                  0x00, 0x00, 0x00, 0x49, 0x45, 0x4E, 0x44, 0xAE, 0x42, 0x60, 0x82};
+  const cv::Mat expected = cv::imdecode(message.data, cv::IMREAD_GRAYSCALE);
+  ASSERT_EQ(expected.size(), cv::Size(4, 2));
+  EXPECT_EQ(cv::norm(toGrey(message), expected, cv::NORM_INF), 0.0);
+}
+
+TEST(ImageConversion, CompressedTextInAPngTakesNoMemory) {
+  const std::vector<std::uint8_t> text(7'900'000, 'x');
+  std::vector<std::uint8_t> chunk(::compressBound(text.size()));
+  uLongf size = chunk.size();
+  ASSERT_EQ(::compress(chunk.data(), &size, text.data(), text.size()), Z_OK);
+  chunk.resize(size);
+  insert(chunk, 0, {'z', 'T', 'X', 't', 'a', 0, 0});
+  insert(chunk, chunk.size(), bigEndian(::crc32(0, chunk.data(), static_cast<uInt>(chunk.size())), 4));
+  insert(chunk, 0, bigEndian(chunk.size() - 8, 4));
+  auto message = compressed(".png");
+  const cv::Mat expected = toGrey(message);
+  // behind the header and before the end
+  for (int i = 0; i < 50; ++i) insert(message.data, i % 2 == 0 ? message.data.size() - 12 : 33, chunk);
+  rusage before{};
+  ::getrusage(RUSAGE_SELF, &before);
+  EXPECT_EQ(cv::norm(toGrey(message), expected, cv::NORM_INF), 0.0);
+  rusage after{};
+  ::getrusage(RUSAGE_SELF, &after);
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 100 * 1024);  // kB; 400 MB with the texts
 }
 
 TEST(ImageConversion, DamagedImagesNeverCrash) {

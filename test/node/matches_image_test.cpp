@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "test/node/small_map.h"
@@ -29,6 +30,30 @@ TEST(MatchesImage, ShowsBothImagesSideBySide) {
   EXPECT_EQ(canvas.rows, 360);
   EXPECT_EQ(canvas.cols, 960);
   EXPECT_EQ(colouredPixels(canvas), 0);
+}
+
+cv::Mat drawnBesidePreview(const std::vector<std::uint8_t>& preview, const cv::Size& size) {
+  MapHeader header;
+  header.image_size = size;
+  header.sessions = {{"session"}};
+  TrainingImage image;
+  image.preview_jpeg = preview;
+  return drawMatches(cv::Mat(size, CV_8UC1, cv::Scalar(100)), {}, {header, {image}}, 0, {});
+}
+
+TEST(MatchesImage, APreviewThatIsTooLargeOrBrokenIsNotShown) {
+  std::vector<std::uint8_t> huge;
+  cv::imencode(".jpg", cv::Mat(4097, 4096, CV_8UC1, cv::Scalar(200)), huge);
+  for (const auto& preview : {huge, std::vector<std::uint8_t>{0xFF, 0xD8, 0xFF}}) {
+    const cv::Mat canvas = drawnBesidePreview(preview, {320, 240});
+    EXPECT_EQ(canvas.at<cv::Vec3b>(180, 240), cv::Vec3b::all(100));
+    EXPECT_EQ(canvas.at<cv::Vec3b>(180, 720), cv::Vec3b::all(48));
+  }
+}
+
+TEST(MatchesImage, AThinImageIsNotEnlargedWithoutEnd) {
+  const cv::Mat canvas = drawnBesidePreview({}, {16, 16384});
+  EXPECT_LE(canvas.total(), std::size_t{40'000'000});
 }
 
 TEST(MatchesImage, JoinsMatchedFeatures) {

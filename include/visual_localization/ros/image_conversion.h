@@ -8,16 +8,14 @@
 
 namespace visual_localization {
 
-/// Largest width and height that is taken for an image.
-constexpr int kMaxImageSide_px = 16384;
-
 /// 8-bit grey image of a message with encoding mono8, mono16, bgr8, rgb8, bgra8, rgba8 or bayer_*8. Sixteen bits
 /// become eight by the full range (divided by 257) and not by the brightest pixel, so that the same scene has the
-/// same contrast in every image. Throws ImageError for any other encoding, and when size, step and data do not
-/// agree.
+/// same contrast in every image. Throws ImageError for any other encoding, for more than 16 777 216 pixels (4096 x
+/// 4096) or 16384 a side, and when size, step and data do not agree.
 cv::Mat toGrey(const sensor_msgs::Image& message);
 
-/// 8-bit grey image of a JPEG or PNG message. Throws ImageError when it is neither, broken or cut off.
+/// 8-bit grey image of a JPEG or PNG message. Throws ImageError when it is neither, broken, cut off or
+/// larger than a raw one may be; the decoder's own reading of the header says so before it takes memory for the pixels.
 cv::Mat toGrey(const sensor_msgs::CompressedImage& message);
 
 /// Size of such an image in pixels by its header; nothing is decoded. Throws ImageError where toGrey finds the message
