@@ -6,15 +6,19 @@
 #include <string>
 #include <utility>
 
+#include "features/image_size.h"
+
 namespace visual_localization {
 
 bool isExtractable(const cv::Mat& grey) {
-  return grey.type() == CV_8UC1 && grey.rows >= kSmallestImageSide_px && grey.cols >= kSmallestImageSide_px;
+  return grey.type() == CV_8UC1 && grey.rows >= kSmallestImageSide_px && grey.cols >= kSmallestImageSide_px &&
+         !whyTooLarge(grey.size());
 }
 
 void requireExtractable(const cv::Mat& grey) {
   if (isExtractable(grey)) return;
   if (grey.type() != CV_8UC1) throw std::invalid_argument("image must be 8-bit with one channel");
+  if (const auto reason = whyTooLarge(grey.size())) throw std::invalid_argument("image is too large: " + *reason);
   const std::string side = std::to_string(kSmallestImageSide_px);
   throw std::invalid_argument("image is " + std::to_string(grey.cols) + "x" + std::to_string(grey.rows) +
                               " pixels, must be at least " + side + "x" + side);

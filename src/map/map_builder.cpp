@@ -11,6 +11,7 @@
 #include "base/files.h"
 #include "base/statistics.h"
 #include "base/time.h"
+#include "features/image_size.h"
 #include "map/extraction_pool.h"
 #include "map/image_spool.h"
 #include "map/map_geometry.h"
@@ -86,10 +87,10 @@ bool isOfShape(cv::Size recorded, cv::Size wanted) {
 }
 
 cv::Size requireBounded(const std::string& session, cv::Size size) {
-  if (size.width <= 1e6 * kLargestMapImage_Mpx / size.height) return size;
-  throw std::runtime_error("session '" + session + "': images of " + std::to_string(size.width) + "x" +
-                           std::to_string(size.height) + " pixels are too large for a map: at most " +
-                           std::to_string(kLargestMapImage_Mpx) + " million pixels");
+  if (const auto reason = whyTooLarge(size)) {
+    throw std::runtime_error("session '" + session + "': its images are too large: " + *reason);
+  }
+  return size;
 }
 
 /// The unpruned features of the images that tell what is noise in image `i`.

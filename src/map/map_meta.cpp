@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "features/image_size.h"
 #include "map/map_schema.h"
 
 namespace visual_localization::map_schema {
@@ -34,6 +35,13 @@ int takeSide(ParameterValues& meta, const std::string& key) {
                              std::to_string(kSmallestImageSide_px) + ", " + std::to_string(kMaxImageSide_px) + "]");
   }
   return static_cast<int>(side);
+}
+
+cv::Size takeImageSize(ParameterValues& meta) {
+  const cv::Size size(takeSide(meta, "image/width_px"), takeSide(meta, "image/height_px"));
+  // Live images are resized to it: it decides how much memory and time each one takes.
+  if (const auto reason = whyTooLarge(size)) throw std::runtime_error("its images are too large: " + *reason);
+  return size;
 }
 
 SiftConfig takeSift(ParameterValues& meta) {
@@ -178,7 +186,7 @@ MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
   header.datum.latitude_deg = take<double>(meta, "datum/latitude_deg");
   header.datum.longitude_deg = take<double>(meta, "datum/longitude_deg");
   header.datum.altitude_m = take<double>(meta, "datum/altitude_m");
-  header.image_size = {takeSide(meta, "image/width_px"), takeSide(meta, "image/height_px")};
+  header.image_size = takeImageSize(meta);
   take<std::string>(meta, "package_version");
   header.sift = takeSift(meta);
   header.sessions = takeSessions(meta, version, header.image_size, masks);

@@ -20,7 +20,6 @@ namespace visual_localization::map_schema {
 constexpr std::int64_t kApplicationId = 0x766C6D70;
 constexpr std::int64_t kMaxImages = 100'000'000;
 constexpr std::int64_t kMaxFeaturesPerImage = 1'000'000;
-constexpr std::int64_t kMaxImageSide_px = 32768;
 constexpr std::size_t kHistogramBytes = GlobalFeatures::kSize * sizeof(float);
 constexpr std::size_t kKeypointBytes = 16;
 /// Of the largest row that may be read: the features of one image. Its landmarks are smaller.

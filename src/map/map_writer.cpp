@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/files.h"
+#include "features/image_size.h"
 #include "map/map_meta.h"
 #include "map/map_schema.h"
 #include "map/packed_geometry.h"
@@ -70,6 +71,8 @@ class MapWriter::Tables {
   }
 
   void finish(const MapHeader& header) {
+    // What is written can be opened.
+    if (const auto reason = whyTooLarge(header.image_size)) throw sqlite::Error("its images are too large: " + *reason);
     // Behind each other in the file, because they are read together when the map is opened.
     for (std::size_t i = 0; i < poses_.size(); ++i) writePose(i);
     writeMeta(map_schema::toMeta(header, geometry_count_));

@@ -112,15 +112,16 @@ TEST(MapBuilder, TheFirstImagesDoNotDecideASizeThatIsGiven) {
   EXPECT_EQ(builder.report().session_images.front().other_sizes, others);
 }
 
-TEST(MapBuilder, ImagesThatTakeTooMuchMemoryAreRefused) {
+TEST(MapBuilder, ASessionWhoseImagesNoMapMayHaveIsRefused) {
   MapBuilder builder({});
-  builder.beginSession("round", straightRound());
+  builder.beginSession("round", straightRound(), {{}, {}, {}, {10000, 5000}});
   try {
-    builder.addImage(kSecond_ns, cv::Mat(5001, 10000, CV_8UC1, cv::Scalar(7)));
+    builder.addImage(kSecond_ns, cv::Mat(100, 200, CV_8UC1, cv::Scalar(7)));
     ADD_FAILURE() << "accepted";
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("session 'round': images of 10000x5001"),
-                                             testing::HasSubstr("at most 50 million")));
+    EXPECT_STREQ(error.what(),
+                 "session 'round': its images are too large: 10000x5000 pixels, at most 16777216 are allowed and 16384 "
+                 "a side");
   }
 }
 
@@ -146,6 +147,16 @@ TEST(MapBuilder, ARobotThatStandsGivesImagesForTenSeconds) {
   ASSERT_EQ(wanted_s.size() + builder.report().images_standing, 69U);
   EXPECT_EQ(wanted_s[27], 27) << "a robot may turn on its spot";
   EXPECT_EQ(wanted_s[wanted_s.size() - 16], 53) << "it drives on";
+}
+
+TEST(MapBuilder, ImagesThatNoMapMayHaveAreUnusable) {
+  MapBuilder builder({});
+  builder.beginSession("round", straightRound());
+  builder.addImage(kSecond_ns, cv::Mat(4097, 4096, CV_8UC1, cv::Scalar(9)));
+  builder.addImage(2 * kSecond_ns, cv::Mat(16, 16385, CV_8UC1, cv::Scalar(9)));
+  builder.addImage(3 * kSecond_ns, scene(1, 0));
+  EXPECT_EQ(builder.report().images_unusable, 2U);
+  EXPECT_EQ(builder.build()->header().image_size, cv::Size(320, 240));
 }
 
 TEST(MapBuilder, GlobalFeaturesAreThoseOfTheImageInTheMapsSize) {

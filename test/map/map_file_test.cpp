@@ -112,6 +112,22 @@ TEST_F(MapStore, FullDiskLeavesTheOldMap) {
   expectSame(exampleMap(), *loadMap(path_));
 }
 
+TEST_F(MapStore, AMapThatCouldNotBeOpenedIsNotSaved) {
+  MapHeader header = test::exampleHeader();
+  header.sessions = {{"monday"}, {"tuesday"}};
+  header.image_size = {4096, 4097};
+  std::vector<TrainingImage> images = test::exampleImages(6, 10);
+  for (TrainingImage& image : images) image.geometry.reset();
+  try {
+    saveMap({header, images}, path_);
+    FAIL() << "saved";
+  } catch (const MapStoreError& error) {
+    EXPECT_EQ(error.what(), path_ +
+                                ": cannot be written: its images are too large: 4096x4097 pixels, at most 16777216 "
+                                "are allowed and 16384 a side");
+  }
+}
+
 TEST_F(MapStore, KilledWhileSavingLeavesTheOldMapOrTheNewOne) {
   const TrainingMap old_map = exampleMap(20, 300, 2);
   const TrainingMap new_map = exampleMap(30, 300, 3);

@@ -151,6 +151,24 @@ TEST_F(MapStore, CamerasAndMasksThatCannotBeAreRefused) {
   }
 }
 
+TEST_F(MapStore, ImagesThatNoFrontEndCanHandleAreRefused) {
+  const std::string whole = test::readAll(path_);
+  const struct {
+    int width, height;
+    const char* reason;
+  } cases[] = {{32768, 32768, "'image/height_px' = 32768 is not in [16, 16384]"},
+               {16384, 1025, "its images are too large: 16384x1025 pixels, at most 16777216 are allowed"},
+               {4096, 4097, "its images are too large: 4096x4097 pixels, at most 16777216 are allowed"},
+               {4096, 4096, "a mask has 9600 bytes instead of 2097152"}};  // a size that is allowed
+  for (const auto& [width, height, reason] : cases) {
+    test::writeAll(path_, whole);
+    tamper("UPDATE meta SET value = " + std::to_string(width) +
+           " WHERE key = 'image/width_px'; UPDATE meta SET value = " + std::to_string(height) +
+           " WHERE key = 'image/height_px'");
+    EXPECT_THAT(refusal(path_), HasSubstr(reason)) << width << 'x' << height;
+  }
+}
+
 TEST_F(MapStore, MasksOfAWrongSizeAreRefused) {
   const std::string whole = test::readAll(path_);
   // With the checksum that belongs to it: 3 bytes and 9600 zeros.

@@ -72,8 +72,6 @@ constexpr double kSmallestSession_m = 0.1;
 /// A robot that does not come as far as this in kStandingTime_s stands.
 constexpr double kStandingReach_m = 0.5;
 constexpr double kStandingTime_s = 10.0;
-/// Of an image, millions of pixels: SIFT needs 40 bytes for each pixel of the map's size, in every thread.
-constexpr int kLargestMapImage_Mpx = 50;
 
 /// What was kept and why the rest was dropped.
 struct MapBuildReport {
@@ -117,7 +115,7 @@ class MapBuilder {
   /// session's: its SessionCamera::image_size, without which its first image decides. Others are resized to it, and
   /// counted where their session has another size. Where SessionCamera::image_size is given, images of another aspect
   /// ratio are left out: no calibration holds for them. Throws CameraError when the session's camera or mask is for
-  /// images of another shape, and std::runtime_error when the map's images would be larger than kLargestMapImage_Mpx.
+  /// images of another shape, and std::runtime_error when the map's images would be too large.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
   /// Prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
   std::shared_ptr<const TrainingMap> build(const Progress& progress = {});
