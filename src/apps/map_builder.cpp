@@ -164,6 +164,7 @@ void buildMap(const MapBuilderOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const MapBuilderConfig config = readConfig(options);
   requireOutputs(options);
+  const OutputLock lock(options.output);
   MapBuilder builder(config, {options.threads, options.output});
   std::vector<PlottedSession> sessions;
   for (const std::string& bag : options.bags) addSession(builder, bag, options, config, sessions);

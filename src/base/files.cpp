@@ -12,8 +12,11 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "base/file_locks.h"
 
 namespace visual_localization {
 namespace {
@@ -76,11 +79,6 @@ void requireReplaceable(const std::string& shown, const std::string& target) {
   if (!S_ISREG(status.st_mode)) refuse(shown, "it is not a regular file");
 }
 
-std::string partialName(const std::string& target) {
-  static std::atomic<unsigned> count{0};
-  return target + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".partial";
-}
-
 /// 0 or the error of flushing `path` (file or folder) to the disk.
 int flush(const std::string& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -90,30 +88,38 @@ int flush(const std::string& path) {
   return error;
 }
 
+/// A new file of a name that nobody else has. Throws FileError.
+int createLocked(const std::string& shown, const std::string& target, std::string& path, int& slot) {
+  while (true) {
+    path = partialName(target);
+    slot = enlist(path);  // before it is there: a signal may come at any moment
+    const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    const int error = errno;
+    // Without locks the file is safe as well, since nobody can lock it to remove it.
+    if (descriptor >= 0) ::flock(descriptor, LOCK_EX);
+    if (descriptor >= 0 && isAt(descriptor, path)) return descriptor;
+    if (descriptor >= 0) ::close(descriptor);  // removed before it was locked
+    strike(slot);
+    if (descriptor < 0 && error != EEXIST) refuse(shown, error);
+  }
+}
+
 [[noreturn]] void refuseToRead(const std::string& path, int error) {
   throw FileError((path.empty() ? "''" : path) + ": cannot be read: " + std::strerror(error));
 }
 
 }  // namespace
 
-PartialFile::PartialFile(const std::string& target)
-    : shown_(target), target_(resolved(target)), partial_(partialName(target_)) {
+PartialFile::PartialFile(const std::string& target) : shown_(target), target_(resolved(target)) {
   requireReplaceable(shown_, target_);
-  // A file of this name can only be left over from a killed process that had the same number.
-  ::unlink(partial_.c_str());
-  slot_ = enlist(partial_);  // before it is there: a signal may come at any moment
-  const int descriptor = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor < 0) {
-    const int error = errno;
-    strike(slot_);
-    refuse(shown_, error);
-  }
-  ::close(descriptor);
+  removeAbandoned(folderOf(target_));
+  locked_ = createLocked(shown_, target_, partial_, slot_);
 }
 
 PartialFile::~PartialFile() {
   if (!committed_) ::unlink(partial_.c_str());
   strike(slot_);
+  ::close(locked_);
 }
 
 void PartialFile::commit() {
@@ -139,6 +145,21 @@ void PartialFile::write(const std::string& content) {
     written += static_cast<std::size_t>(count);
   }
   if (::close(descriptor) != 0) refuse(shown_, errno);
+}
+
+OutputLock::OutputLock(const std::string& target) : path_(resolved(target) + kLockSuffix) {
+  locked_ = openLocked(path_, O_CREAT);
+  if (locked_ < 0 && errno == EWOULDBLOCK) refuse(target, "process " + holderIn(path_) + " is writing it");
+  if (locked_ < 0) return;
+  slot_ = enlist(path_);
+  nameHolder(locked_);
+}
+
+OutputLock::~OutputLock() {
+  if (locked_ < 0) return;
+  ::unlink(path_.c_str());
+  strike(slot_);
+  ::close(locked_);
 }
 
 void writeFile(const std::string& path, const std::string& content) {

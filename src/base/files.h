@@ -15,11 +15,12 @@ class FileError : public std::runtime_error {
 
 /// A file that is being written under a temporary name beside its target. commit() puts it in the target's
 /// place in one step; without it the temporary file disappears again. So the target is the old file, the new
-/// one, or absent, whatever happens in between.
+/// one, or absent, whatever happens in between. The temporary file is locked (flock) for as long as its process lives:
+/// the first PartialFile that another process makes in this folder removes those that nobody holds any more.
 class PartialFile {
  public:
-  /// Creates `<target>.<process>-<count>.partial`, empty. Throws FileError naming `target` when its folder does
-  /// not exist or cannot be written, or when the target is something else than a regular file.
+  /// Creates `<target>.<16 random hexadecimal digits>.partial`, empty. Throws FileError naming `target` when its
+  /// folder does not exist or cannot be written, or when the target is something else than a regular file.
   explicit PartialFile(const std::string& target);
   ~PartialFile();
   PartialFile(const PartialFile&) = delete;
@@ -39,7 +40,25 @@ class PartialFile {
   std::string target_;  ///< with symbolic links resolved
   std::string partial_;
   int slot_ = -1;
+  int locked_ = -1;  ///< descriptor
   bool committed_ = false;
+};
+
+/// Keeps other processes that ask for the same from writing a file, by the locked file `<target>.lock.partial`. It
+/// disappears with this object. What a killed process leaves behind does not hold anybody up.
+class OutputLock {
+ public:
+  /// Throws FileError naming `target` and the process that holds it. Where the file system has no locks nobody is kept
+  /// from writing.
+  explicit OutputLock(const std::string& target);
+  ~OutputLock();
+  OutputLock(const OutputLock&) = delete;
+  OutputLock& operator=(const OutputLock&) = delete;
+
+ private:
+  std::string path_;
+  int slot_ = -1;
+  int locked_ = -1;  ///< descriptor
 };
 
 /// Writes `content` to `path` as a whole or not at all. Throws FileError.

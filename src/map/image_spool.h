@@ -20,7 +20,7 @@ class ImageSpool {
   explicit ImageSpool(const std::string& beside) {
     if (beside.empty()) return;
     file_ = std::make_unique<PartialFile>(beside);
-    writer_ = std::make_unique<MapWriter>(file_->path());
+    writer_ = std::make_unique<MapWriter>(*file_);
   }
 
   /// Throws MapStoreError, for instance when the disk is full.

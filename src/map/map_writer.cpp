@@ -60,8 +60,8 @@ auto withPath(const std::string& path, Write write) {
 /// The open file and what has been written to it.
 class MapWriter::Tables {
  public:
-  explicit Tables(const std::string& path)
-      : file_(path), database_(createTables(file_.path())), looks_(std::make_unique<Looks>(database_)) {}
+  explicit Tables(const PartialFile& file)
+      : database_(createTables(file.path())), looks_(std::make_unique<Looks>(database_)) {}
 
   void append(const TrainingImage& image) {
     requireStorable(image);
@@ -81,7 +81,6 @@ class MapWriter::Tables {
     pose_row_.reset();
     database_.execute("COMMIT");
     database_.close();
-    file_.commit();
   }
 
  private:
@@ -172,7 +171,6 @@ class MapWriter::Tables {
     }
   }
 
-  PartialFile file_;
   sqlite::Database database_;
   std::unique_ptr<Looks> looks_;
   std::unique_ptr<Statement> pose_row_;
@@ -182,7 +180,12 @@ class MapWriter::Tables {
 };
 
 MapWriter::MapWriter(const std::string& path)
-    : path_(path), tables_(withPath(path, [&path] { return std::make_unique<Tables>(path); })) {}
+    : path_(path),
+      file_(withPath(path, [&path] { return std::make_unique<PartialFile>(path); })),
+      tables_(withPath(path, [this] { return std::make_unique<Tables>(*file_); })) {}
+
+MapWriter::MapWriter(const PartialFile& file)
+    : path_(file.path()), tables_(withPath(path_, [&file] { return std::make_unique<Tables>(file); })) {}
 
 MapWriter::~MapWriter() = default;
 
@@ -191,7 +194,10 @@ void MapWriter::append(const TrainingImage& image) {
 }
 
 void MapWriter::finish(const MapHeader& header) {
-  withPath(path_, [&] { tables_->finish(header); });
+  withPath(path_, [&] {
+    tables_->finish(header);
+    if (file_) file_->commit();
+  });
 }
 
 void saveMap(const TrainingMap& map, const std::string& path) {

@@ -7,25 +7,30 @@
 
 namespace visual_localization {
 
+class PartialFile;
+
 /// Writes a map image by image, so that it need not fit into memory; only the poses are kept until the end. One SQLite
 /// file, filled in one transaction under a temporary name beside its own: without finish() nothing has happened.
 class MapWriter {
  public:
   /// Throws MapStoreError when the file cannot be made.
   explicit MapWriter(const std::string& path);
+  /// Into a file that stays the caller's: nothing is put in place. Throws MapStoreError.
+  explicit MapWriter(const PartialFile& file);
   ~MapWriter();
   MapWriter(const MapWriter&) = delete;
   MapWriter& operator=(const MapWriter&) = delete;
 
   /// The next image. Throws MapStoreError, for instance when the disk is full or the image has too many features.
   void append(const TrainingImage& image);
-  /// Puts the file in its pose. To be called once. Throws MapStoreError.
+  /// Puts the file in its place. To be called once. Throws MapStoreError.
   void finish(const MapHeader& header);
 
  private:
   class Tables;
 
   std::string path_;
+  std::unique_ptr<PartialFile> file_;  ///< to be put in place
   std::unique_ptr<Tables> tables_;
 };
 

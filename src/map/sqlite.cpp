@@ -42,9 +42,9 @@ std::string immutableUri(const std::string& path) {
   return uri + "?immutable=1";
 }
 
-sqlite3* open(const std::string& name, int flags) {
+sqlite3* open(const std::string& name, int flags, const char* system = nullptr) {
   sqlite3* handle = nullptr;
-  if (sqlite3_open_v2(name.c_str(), &handle, flags | SQLITE_OPEN_NOMUTEX, nullptr) != SQLITE_OK) {
+  if (sqlite3_open_v2(name.c_str(), &handle, flags | SQLITE_OPEN_NOMUTEX, system) != SQLITE_OK) {
     const std::string text = handle == nullptr ? "out of memory" : sqlite3_errmsg(handle);
     sqlite3_close(handle);
     throw Error(text);
@@ -103,7 +103,8 @@ Database Database::openUntrusted(const std::string& path, std::int64_t max_value
 Database Database::create(const std::string& path) {
   // "./" keeps a relative name that begins with "file:" or ":" from being taken for something else.
   const std::string name = !path.empty() && path.front() == '/' ? path : "./" + path;
-  Database database(open(name, SQLITE_OPEN_READWRITE));
+  // The file is its maker's alone, and locked: on network disks SQLite's own locks would wait for that one.
+  Database database(open(name, SQLITE_OPEN_READWRITE, "unix-none"));
   database.execute("PRAGMA journal_mode = OFF");
   database.execute("PRAGMA synchronous = OFF");
   database.execute("PRAGMA locking_mode = EXCLUSIVE");

@@ -154,6 +154,17 @@ class ProgramsTest(ProgramTest):
         self.assertEqual(output.read_bytes(), MAP.read_bytes())
         self.assertEqual([path.name for path in self.folder.iterdir()], ['old.map'])
 
+    def test_one_builder_at_a_time_and_the_next_one_clears_up(self):
+        command = [str(PROGRAMS / 'map_builder'), '--bag', str(DRIVE), '--output', str(self.folder / 'new.map')]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as first:
+            self.assertRaises(subprocess.TimeoutExpired, first.wait, 0.7)
+            self.assert_refused(run(*command), 1, 'new.map: cannot be written', f'process {first.pid} on ')
+            first.kill()
+        self.assertTrue(list(self.folder.glob('new.map.*.partial')))
+        result = run(*command)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual([path.name for path in self.folder.iterdir()], ['new.map'])
+
     def test_map_info_shows_checks_and_exports(self):
         geojson, table = self.folder / 'map.geojson', self.folder / 'map.csv'
         result = run('map_info', MAP, '--check', '--export-geojson', geojson, '--export-csv', table)

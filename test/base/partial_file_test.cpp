@@ -1,3 +1,6 @@
+#include <memory>
+#include <stdexcept>
+
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -8,6 +11,90 @@
 
 namespace visual_localization {
 namespace {
+
+/// A process that does something and then waits to be killed.
+class Child {
+ public:
+  template <class Act>
+  explicit Child(Act act) {
+    int ready[2];
+    if (::pipe(ready) != 0) throw std::runtime_error("no pipe");
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      const auto held = act();
+      if (::write(ready[1], "r", 1) != 1) ::_exit(1);
+      while (true) ::pause();
+    }
+    ::close(ready[1]);
+    char byte = 0;
+    is_ready_ = ::read(ready[0], &byte, 1) == 1;
+    ::close(ready[0]);
+  }
+  ~Child() { kill(); }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  bool isReady() const { return is_ready_; }
+  pid_t pid() const { return pid_; }
+  void kill() {
+    if (pid_ > 0) ::kill(pid_, SIGKILL);
+    if (pid_ > 0) ::waitpid(pid_, nullptr, 0);
+    pid_ = 0;
+  }
+
+ private:
+  pid_t pid_ = 0;
+  bool is_ready_ = false;
+};
+
+TEST(PartialFile, WhatKilledProcessesLeaveIsRemovedByTheNextOne) {
+  const test::TemporaryFolder folder;
+  const auto begin = [&folder] { return std::make_unique<PartialFile>(folder / "a"); };
+  Child killed(begin);
+  ASSERT_TRUE(killed.isReady());
+  const std::vector<std::string> abandoned = folder.names();
+  ASSERT_EQ(abandoned.size(), 1U);
+  killed.kill();
+  EXPECT_EQ(folder.names(), abandoned);
+  test::writeAll(folder / "mine.partial", "of another program");
+  const Child living(begin);
+  ASSERT_TRUE(living.isReady());
+  EXPECT_FALSE(std::filesystem::exists(folder / abandoned.front()));
+  EXPECT_EQ(folder.names().size(), 2U);
+  writeFile(folder / "b", "x");  // in any file's name
+  EXPECT_EQ(folder.names().size(), 3U);
+}
+
+TEST(PartialFile, SeveralOfOneTargetHaveNamesOfTheirOwn) {
+  const test::TemporaryFolder folder;
+  PartialFile first(folder / "a");
+  PartialFile second(folder / "a");
+  EXPECT_EQ(folder.names().size(), 2U);
+  first.write("first");
+  second.write("second");
+  second.commit();
+  first.commit();
+  EXPECT_EQ(test::readAll(folder / "a"), "first");
+}
+
+TEST(OutputLock, OneProcessAtATimeWrites) {
+  const test::TemporaryFolder folder;
+  const std::string target = folder / "a";
+  Child holder([&target] { return std::make_unique<OutputLock>(target); });
+  ASSERT_TRUE(holder.isReady());
+  try {
+    const OutputLock lock(target);
+    FAIL() << "held twice";
+  } catch (const FileError& error) {
+    const std::string expected = target + ": cannot be written: process " + std::to_string(holder.pid()) + " on ";
+    EXPECT_EQ(std::string(error.what()).rfind(expected, 0), 0U) << error.what();
+  }
+  EXPECT_NO_THROW(OutputLock(folder / "b"));
+  holder.kill();
+  EXPECT_EQ(folder.names().size(), 1U);
+  { const OutputLock lock(target); }
+  EXPECT_TRUE(folder.names().empty());
+}
 
 TEST(PartialFile, ReplacesTheTargetOnlyOnCommit) {
   const test::TemporaryFolder folder;
