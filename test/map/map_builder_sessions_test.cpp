@@ -123,7 +123,8 @@ std::string refusalOf(const std::vector<Fix>& fixes) {
 TEST(MapBuilder, AReceiverThatIsStuckIsRefused) {
   std::vector<Fix> stuck = straightRound();
   for (Fix& fix : stuck) fix.position = {52.5, 13.4, 30.0};
-  EXPECT_THAT(refusalOf(stuck), testing::StartsWith("session 'stuck': its 40 believable fixes of 40 are all at one point"));
+  EXPECT_THAT(refusalOf(stuck),
+              testing::StartsWith("session 'stuck': its 40 believable fixes of 40 are all at one point"));
   stuck[7].position.latitude_deg += 0.01;  // an outlier is no motion
   EXPECT_THAT(refusalOf(stuck), testing::HasSubstr("are all at one point"));
   for (Fix& fix : stuck) fix.position = {0.0, 0.0, 0.0};
