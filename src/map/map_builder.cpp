@@ -5,11 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include <Eigen/Geometry>
-#include <GeographicLib/Geodesic.hpp>
-
 #include "base/files.h"
-#include "base/statistics.h"
 #include "base/time.h"
 #include "features/image_size.h"
 #include "map/extraction_pool.h"
@@ -17,6 +13,7 @@
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
 #include "map/pruning_neighbours.h"
+#include "map/session_frame.h"
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_matcher.h"
@@ -27,59 +24,6 @@ namespace visual_localization {
 namespace {
 
 constexpr std::size_t kWaitingPerThread = 4;  ///< images: so that no thread waits long for the slowest
-
-GeodeticPoint datumAt(const GeodeticPoint& position) {
-  GeodeticPoint datum = position;
-  if (!std::isfinite(datum.altitude_m)) datum.altitude_m = 0.0;
-  return datum;
-}
-
-/// The middle of all valid fixes, axis by axis: unlike the first one it cannot be an outlier far away.
-GeodeticPoint middleOf(const std::vector<Fix>& fixes) {
-  std::vector<double> latitudes;
-  std::vector<double> longitudes;
-  for (const Fix& fix : fixes) {
-    if (!hasPosition(fix)) continue;
-    latitudes.push_back(fix.position.latitude_deg);
-    longitudes.push_back(fix.position.longitude_deg);
-  }
-  if (latitudes.empty()) {
-    throw std::runtime_error("none of its " + std::to_string(fixes.size()) +
-                             " fixes is valid (latitude 0, longitude 0 is none)");
-  }
-  return {upperMedian(latitudes), upperMedian(longitudes), 0.0};
-}
-
-/// A path that stays where it is would put all images of the drive on one spot.
-void requireMotion(const CleanedTrajectory& cleaned) {
-  Eigen::AlignedBox2d box;
-  for (const TrajectoryPoint& point : cleaned.trajectory.points()) box.extend(point.position_m);
-  if (box.diagonal().norm() >= kSmallestSession_m) return;
-  const auto kept = std::count(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
-  throw std::runtime_error("its " + std::to_string(kept) + " believable fixes of " +
-                           std::to_string(cleaned.verdicts.size()) + " are all at one point: the receiver was " +
-                           "stuck, or the robot stood; a session spans at least 0.1 m");
-}
-
-/// A frame around the first believable fix.
-LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
-  const LocalFrame provisional(middleOf(fixes));
-  const CleanedTrajectory cleaned = cleanTrajectory(fixes, provisional, config);
-  const auto first = std::find(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
-  if (first == cleaned.verdicts.end()) throw std::runtime_error("none of its fixes is believable");
-  return LocalFrame(datumAt(fixes[static_cast<std::size_t>(first - cleaned.verdicts.begin())].position));
-}
-
-/// On the earth, since a tangent plane shows its far side near the datum again.
-void requireNear(const GeodeticPoint& position, const GeodeticPoint& datum) {
-  double distance_m = 0.0;
-  GeographicLib::Geodesic::WGS84().Inverse(datum.latitude_deg, datum.longitude_deg, position.latitude_deg,
-                                           position.longitude_deg, distance_m);
-  if (distance_m <= kFarthestSession_m) return;
-  throw std::runtime_error("is " + std::to_string(std::llround(1e-3 * distance_m)) +
-                           " km away from where the map begins, and one map reaches " +
-                           std::to_string(std::llround(1e-3 * kFarthestSession_m)) + " km: build two maps");
-}
 
 bool isOfShape(cv::Size recorded, cv::Size wanted) {
   constexpr double kRounding = 0.02;
@@ -101,68 +45,13 @@ std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, con
   return features;
 }
 
-std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
-  std::vector<MapFix> found;
-  for (const Fix& fix : fixes) {
-    if (hasPosition(fix)) found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m});
-  }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const MapFix& a, const MapFix& b) { return a.stamp_ns < b.stamp_ns; });
-  return found;
-}
-
 std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<const SiftFeatures>>& owned) {
   std::vector<const SiftFeatures*> pointers;
   for (const auto& features : owned) pointers.push_back(features.get());
   return pointers;
 }
 
-template <class Parse>
-bool canParse(const std::string& text, Parse parse) {
-  try {
-    if (!text.empty()) parse(text);
-    return true;
-  } catch (const MountError&) {
-    return false;
-  }
-}
-
-void requireMountTexts(ParameterVisitor& visitor, const std::string& camera, const std::string& antenna) {
-  visitor.require(canParse(camera, parseCameraMount), "robot/camera", "'" + camera + "'",
-                  "six numbers: x y z yaw pitch roll, metres (at most 100) and radians");
-  visitor.require(canParse(antenna, parseAntennaMount), "robot/antenna", "'" + antenna + "'",
-                  "three numbers: x y z, metres, at most 100");
-}
-
 }  // namespace
-
-void MapBuilderConfig::declare(ParameterVisitor& visitor) {
-  visitor.real({"map/min_spacing", "m", "skip an image closer than this to the last kept one of its session"},
-               min_spacing_m, 0.0, 1000.0);
-  visitor.real(
-      {"map/spacing", "m",
-       "keep, after all images were pruned and adjusted, only those at least this far from the last kept one of their "
-       "session"},
-      spacing_m, 0.0, 1000.0);
-  visitor.flag(
-      {"map/prune", "", "keep only features that one of the two nearest training images of its session shows too"},
-      prune);
-  visitor.integer({"map/preview_width", "px", "width of the stored previews; 0 stores none"}, preview_width_px, 0, 640);
-  visitor.choice(
-      {"map/sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any localizer"},
-      sift_backend, siftBackends());
-  visitor.text({"robot/base_frame", "", "frame of the robot in /tf_static"}, base_frame);
-  visitor.text({"robot/camera", "m, rad",
-                "x y z yaw pitch roll of the camera (x ahead) on the robot; empty: from /tf_static, or the robot is "
-                "where the camera is"},
-               camera_mount);
-  visitor.text({"robot/antenna", "m", "x y z of the antenna on the robot; empty: likewise"}, antenna_mount);
-  requireMountTexts(visitor, camera_mount, antenna_mount);
-  sift.declare(visitor);
-  match.declare(visitor);
-  trajectory.declare(visitor);
-  geometry.declare(visitor);
-}
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources)
     : config_(requireValid(config)),
@@ -179,7 +68,7 @@ MapBuilder::~MapBuilder() = default;
 void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera) {
   try {
     const LocalFrame frame = frame_ ? *frame_ : frameFor(fixes, config_.trajectory);
-    requireNear(middleOf(fixes), frame.datum());
+    requireNear(fixes, frame.datum());
     CleanedTrajectory cleaned = cleanTrajectory(fixes, frame, config_.trajectory);
     requireMotion(cleaned);
     report_.sessions.push_back(std::move(cleaned));

@@ -1,0 +1,80 @@
+#include "map/session_frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include <Eigen/Geometry>
+#include <GeographicLib/Geodesic.hpp>
+
+#include "base/statistics.h"
+#include "visual_localization/map/map_builder.h"
+
+namespace visual_localization {
+namespace {
+
+GeodeticPoint datumAt(const GeodeticPoint& position) {
+  GeodeticPoint datum = position;
+  if (!std::isfinite(datum.altitude_m)) datum.altitude_m = 0.0;
+  return datum;
+}
+
+/// The middle of all valid fixes, axis by axis: unlike the first one it cannot be an outlier far away.
+GeodeticPoint middleOf(const std::vector<Fix>& fixes) {
+  std::vector<double> latitudes;
+  std::vector<double> longitudes;
+  for (const Fix& fix : fixes) {
+    if (!hasPosition(fix)) continue;
+    latitudes.push_back(fix.position.latitude_deg);
+    longitudes.push_back(fix.position.longitude_deg);
+  }
+  if (latitudes.empty()) {
+    throw std::runtime_error("none of its " + std::to_string(fixes.size()) +
+                             " fixes is valid (latitude 0, longitude 0 is none)");
+  }
+  return {upperMedian(latitudes), upperMedian(longitudes), 0.0};
+}
+
+}  // namespace
+
+LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
+  const LocalFrame provisional(middleOf(fixes));
+  const CleanedTrajectory cleaned = cleanTrajectory(fixes, provisional, config);
+  const auto first = std::find(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
+  if (first == cleaned.verdicts.end()) throw std::runtime_error("none of its fixes is believable");
+  return LocalFrame(datumAt(fixes[static_cast<std::size_t>(first - cleaned.verdicts.begin())].position));
+}
+
+void requireNear(const std::vector<Fix>& fixes, const GeodeticPoint& datum) {
+  const GeodeticPoint position = middleOf(fixes);
+  double distance_m = 0.0;  // on the earth, since a tangent plane shows its far side near the datum again
+  GeographicLib::Geodesic::WGS84().Inverse(datum.latitude_deg, datum.longitude_deg, position.latitude_deg,
+                                           position.longitude_deg, distance_m);
+  if (distance_m <= kFarthestSession_m) return;
+  throw std::runtime_error("is " + std::to_string(std::llround(1e-3 * distance_m)) +
+                           " km away from where the map begins, and one map reaches " +
+                           std::to_string(std::llround(1e-3 * kFarthestSession_m)) + " km: build two maps");
+}
+
+void requireMotion(const CleanedTrajectory& cleaned) {
+  Eigen::AlignedBox2d box;
+  for (const TrajectoryPoint& point : cleaned.trajectory.points()) box.extend(point.position_m);
+  if (box.diagonal().norm() >= kSmallestSession_m) return;
+  const auto kept = std::count(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
+  throw std::runtime_error("its " + std::to_string(kept) + " believable fixes of " +
+                           std::to_string(cleaned.verdicts.size()) + " are all at one point: the receiver was " +
+                           "stuck, or the robot stood; a session spans at least 0.1 m");
+}
+
+std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
+  std::vector<MapFix> found;
+  for (const Fix& fix : fixes) {
+    if (hasPosition(fix)) found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m});
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const MapFix& a, const MapFix& b) { return a.stamp_ns < b.stamp_ns; });
+  return found;
+}
+
+}  // namespace visual_localization
