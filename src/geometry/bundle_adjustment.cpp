@@ -13,127 +13,14 @@
 #include <ceres/solver.h>
 #include <glog/logging.h>
 
-#include "geometry/mounting_residual.h"
+#include "geometry/bundle_residuals.h"
 #include "geometry/rotation_vector.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr double kNearest_m = 0.05;  ///< a landmark closer to a camera's plane than this has no projection
-constexpr double kBehind_sigmas = 1e3;
 constexpr double kTiltLoss = 2.0;      ///< sigmas
 constexpr double kRoughness_m = 0.01;  ///< of a level road, from one image to the next
-
-/// Camera parameters: turn[3] (camera_in_map = start * exp(turn)) and position[3]. Landmark: position[3]. Focal scale.
-class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 1> {
- public:
-  SightingCost(const Eigen::Matrix3d& map_from_start, const LandmarkSighting& sighting)
-      : start_from_map_(map_from_start.transpose()), seen_(sighting.normalised), weight_(1.0 / sighting.sigma) {}
-
-  bool Evaluate(const double* const* parameters, double* residuals, double** derivatives) const override {
-    const Eigen::Map<const Eigen::Vector3d> turn(parameters[0]);
-    const Eigen::Map<const Eigen::Vector3d> position(parameters[0] + 3);
-    const Eigen::Map<const Eigen::Vector3d> landmark(parameters[1]);
-    const Eigen::Matrix3d camera_from_map = exponential(-turn) * start_from_map_;
-    const Eigen::Vector3d point = camera_from_map * (landmark - position);
-    Eigen::Map<Eigen::Vector2d> residual(residuals);
-    if (point.z() < kNearest_m) {  // a constant: the robust loss gives it no say
-      residual.setConstant(kBehind_sigmas);
-      for (int block = 0; derivatives != nullptr && block < 3; ++block) {
-        if (derivatives[block] != nullptr) std::fill_n(derivatives[block], kDerivatives[block], 0.0);
-      }
-      return true;
-    }
-    const double inverse_z = 1.0 / point.z();
-    const double scale = *parameters[2];
-    residual = weight_ * (scale * point.head<2>() * inverse_z - seen_);
-    if (derivatives == nullptr) return true;
-
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << inverse_z, 0.0, -point.x() * inverse_z * inverse_z, 0.0, inverse_z, -point.y() * inverse_z * inverse_z;
-    by_point *= scale * weight_;
-    const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera_from_map;
-    if (derivatives[0] != nullptr) {
-      Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> jacobian(derivatives[0]);
-      jacobian.leftCols<3>() = by_point * crossMatrix(point) * rightJacobian(turn);
-      jacobian.rightCols<3>() = -by_landmark;
-    }
-    if (derivatives[1] != nullptr) {
-      Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> jacobian(derivatives[1]);
-      jacobian = by_landmark;
-    }
-    if (derivatives[2] != nullptr) {
-      derivatives[2][0] = weight_ * point.x() * inverse_z;
-      derivatives[2][1] = weight_ * point.y() * inverse_z;
-    }
-    return true;
-  }
-
- private:
-  static constexpr int kDerivatives[] = {12, 6, 2};
-
-  Eigen::Matrix3d start_from_map_;
-  Eigen::Vector2d seen_;
-  double weight_;
-};
-
-/// rho(s) = s / (1 + s / c^2): what is far off loses its say altogether (Geman and McClure 1987).
-class GemanMcClureLoss final : public ceres::LossFunction {
- public:
-  explicit GemanMcClureLoss(double scale) : squared_(scale * scale) {}
-  void Evaluate(double s, double rho[3]) const override {
-    const double shrink = squared_ / (squared_ + s);
-    rho[0] = s * shrink;
-    rho[1] = shrink * shrink;
-    rho[2] = -2.0 * shrink * shrink * shrink / squared_;
-  }
-
- private:
-  double squared_;
-};
-
-struct PositionResidual {
-  PositionObservation fix;
-  Eigen::Matrix3d map_from_start;
-  Eigen::Vector3d antenna_m;  ///< in the camera's frame
-
-  template <class T>
-  bool operator()(const T* camera, const T* bias, const T* delay, T* residual) const {
-    const T antenna[3] = {T(antenna_m.x()), T(antenna_m.y()), T(antenna_m.z())};
-    T turned[3];
-    ceres::AngleAxisRotatePoint(camera, antenna, turned);
-    for (int i = 0; i < 2; ++i) {
-      T antenna_in_map = camera[3 + i];
-      for (int k = 0; k < 3; ++k) antenna_in_map += T(map_from_start(i, k)) * turned[k];
-      const T then = antenna_in_map - delay[0] * T(fix.velocity_m_s[i]);
-      residual[i] = (then + bias[i] - T(fix.east_north_m[i])) / T(fix.sigma_m);
-    }
-    return true;
-  }
-};
-
-/// Unknowns that are near zero.
-template <int kSize>
-struct ZeroResidual {
-  double sigma;
-
-  template <class T>
-  bool operator()(const T* unknown, T* residual) const {
-    for (int i = 0; i < kSize; ++i) residual[i] = unknown[i] / T(sigma);
-    return true;
-  }
-};
-
-/// Roads are not steep.
-struct SlopeResidual {
-  double sigma_m;
-
-  template <class T>
-  bool operator()(const T* camera, const T* next, T* residual) const {
-    residual[0] = (next[5] - camera[5]) / T(sigma_m);
-    return true;
-  }
-};
 
 /// A step that cannot be solved is tried again with more damping. Ceres warns of each on stderr.
 class QuietCeres {
@@ -145,33 +32,6 @@ class QuietCeres {
 
  private:
   int before_;
-};
-
-/// MountingResidual on the six parameters of a camera.
-struct CameraMountingResidual {
-  MountingResidual residual_of_turn;
-
-  template <class T>
-  bool operator()(const T* camera, const T* mounting, T* residual) const {
-    return residual_of_turn(camera, mounting, residual);
-  }
-};
-
-struct HeightResidual {
-  template <class T>
-  bool operator()(const T* camera, T* residual) const {
-    residual[0] = camera[5] / T(0.01);
-    return true;
-  }
-};
-
-/// A calibration is about right.
-struct FocalResidual {
-  template <class T>
-  bool operator()(const T* scale, T* residual) const {
-    residual[0] = (scale[0] - T(1.0)) / T(0.1);
-    return true;
-  }
 };
 
 /// The problem as Ceres takes it. Losses and parameters must live as long as Ceres works on it.

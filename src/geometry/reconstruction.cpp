@@ -4,10 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "base/statistics.h"
 #include "geometry/fix_positions.h"
+#include "geometry/landmark_covariance.h"
 #include "geometry/rotation_vector.h"
 #include "geometry/triangulation.h"
 #include "geometry/vector_median.h"
@@ -27,17 +26,6 @@ constexpr int kMostFocalSteps = 100;
 constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
 
 Eigen::Vector3d level(const Eigen::Vector2d& position_m) { return {position_m.x(), position_m.y(), 0.0}; }
-
-void addLandmark(ImageGeometry& image, const Landmark& landmark, const Eigen::Matrix3d& covariance,
-                 std::uint32_t feature, std::uint32_t id) {
-  const Eigen::Vector3d offset = landmark.position_m - image.camera.position_m;
-  const Eigen::Vector3d ray = offset.normalized();
-  const double along_m2 = ray.dot(covariance * ray);
-  const double across_m2 = 0.5 * (covariance.trace() - along_m2);
-  if (!(std::isfinite(along_m2) && along_m2 > 0.0 && across_m2 > 0.0)) return;
-  image.landmarks.push_back({feature, id, offset.cast<float>(), static_cast<float>(std::sqrt(along_m2)),
-                             static_cast<float>(std::sqrt(across_m2))});
-}
 
 }  // namespace
 
@@ -233,11 +221,11 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   std::vector<ImageGeometry> images(images_.size());
   for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i);
   for (const Landmark& landmark : problem_.landmarks) {
-    const Eigen::Matrix3d covariance = covarianceOf(landmark);
+    const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_.cameras);
     ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
     for (const LandmarkSighting& sighting : landmark.sightings) {
       errors_px[sessionOf(sighting.image)].push_back(error(landmark, sighting) * focal_px(sighting.image));
-      addLandmark(images[sighting.image], landmark, covariance, sighting.feature, first_id);
+      addSighting(landmark, covariance, sighting.feature, first_id, images[sighting.image]);
     }
     ++first_id;
   }
@@ -266,21 +254,6 @@ ImageGeometry Reconstruction::imageAt(std::size_t image) const {
   sigmas << bias_m, bias_m, bias_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
   geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
   return geometry;
-}
-
-/// Of a landmark among cameras that stand still.
-Eigen::Matrix3d Reconstruction::covarianceOf(const Landmark& landmark) const {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  for (const LandmarkSighting& sighting : landmark.sightings) {
-    const CameraPose& camera = problem_.cameras[sighting.image];
-    const Eigen::Vector3d point = camera.toCamera(landmark.position_m);
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << 1.0, 0.0, -point.x() / point.z(), 0.0, 1.0, -point.y() / point.z();
-    by_point *= 1.0 / (point.z() * sighting.sigma);
-    const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera.rotation.conjugate().toRotationMatrix();
-    information += by_landmark.transpose() * by_landmark;
-  }
-  return information.ldlt().solve(Eigen::Matrix3d::Identity());
 }
 
 /// Images with enough landmarks, and how far they were moved.

@@ -79,7 +79,6 @@ class Reconstruction {
   double error(const Landmark& landmark, const LandmarkSighting& sighting) const;
   double distance_m(const Landmark& landmark) const;
   ImageGeometry imageAt(std::size_t image) const;
-  Eigen::Matrix3d covarianceOf(const Landmark& landmark) const;
   void addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;
