@@ -97,7 +97,7 @@ BagImage BagImages::read(std::size_t i) const {
 }
 
 cv::Size BagImages::usualSize() const {
-  constexpr std::size_t kMostRead = 1000;
+  constexpr std::size_t kMostRead = 100;  // each unpacks its chunk of the bag
   std::map<std::pair<int, int>, std::size_t> counts;
   const std::size_t count = std::min(size(), kMostRead);
   for (std::size_t i = 0; i < count; ++i) {

@@ -45,7 +45,7 @@ class BagImages {
   const std::string& topic() const;
   /// Throws BagError when the bag is damaged there.
   BagImage read(std::size_t i) const;
-  /// The size of most images, by the headers of at most a thousand that are spread evenly; the smaller one of equals.
+  /// The size of most images, by the headers of at most a hundred that are spread evenly; the smaller one of equals.
   /// Empty when none of them is usable. Throws like read().
   cv::Size usualSize() const;
 
