@@ -81,14 +81,19 @@ TEST(MapBuilder, OneImageKeepsAllItsFeatures) {
   EXPECT_EQ(builder.report().features_kept, builder.report().features_extracted);
 }
 
-TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
+/// One of each second.
+std::shared_ptr<const TrainingMap> mapOf(const std::vector<cv::Mat>& images) {
   MapBuilder builder({});
   builder.beginSession("round", straightRound());
-  builder.addImage(kSecond_ns, scene(1, 0));
+  std::int64_t stamp_ns = 0;
+  for (const cv::Mat& image : images) builder.addImage(stamp_ns += kSecond_ns, image);
+  return builder.build();
+}
+
+TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   cv::Mat large;
   cv::resize(scene(1, 3), large, {640, 480});
-  builder.addImage(2 * kSecond_ns, large);
-  const auto map = builder.build();
+  const auto map = mapOf({scene(1, 0), large});
   EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
   for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
@@ -160,13 +165,9 @@ TEST(MapBuilder, ImagesThatNoMapMayHaveAreUnusable) {
 }
 
 TEST(MapBuilder, GlobalFeaturesAreThoseOfTheImageInTheMapsSize) {
-  MapBuilder builder({});
-  builder.beginSession("round", straightRound());
-  builder.addImage(kSecond_ns, scene(1, 0));
   cv::Mat large;
   cv::resize(scene(1, 3), large, {640, 480});
-  builder.addImage(2 * kSecond_ns, large);
-  const auto map = builder.build();
+  const auto map = mapOf({scene(1, 0), large});
   cv::Mat small;
   cv::resize(large, small, {320, 240}, 0.0, 0.0, cv::INTER_AREA);
   GlobalExtractor extractor;
