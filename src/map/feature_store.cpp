@@ -44,10 +44,10 @@ MemoryFeatureStore::MemoryFeatureStore(std::vector<TrainingImage>&& images) {
   }
 }
 
-FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, StoredCounts counts,
+FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, StoredRows stored,
                                    std::size_t cache_bytes, Warn warn)
     : path_(std::move(path)),
-      counts_(std::move(counts)),
+      stored_(std::move(stored)),
       cache_bytes_(cache_bytes),
       warn_(std::move(warn)),
       database_(std::move(database)),
@@ -56,24 +56,29 @@ FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, 
       preview_rows_(database_, std::string(map_rows::kSelectPreview) + kOfOneImage),
       cache_(cache_bytes) {
   // A map of an older version has no such table.
-  if (counts_.geometry > 0) geometry_rows_.emplace(database_, std::string(map_rows::kSelectGeometry) + kOfOneImage);
+  if (stored_.geometry_count > 0)
+    geometry_rows_.emplace(database_, std::string(map_rows::kSelectGeometry) + kOfOneImage);
 }
 
 std::shared_ptr<const SiftFeatures> FileFeatureStore::sift(std::size_t image) const {
   return get<SiftFeatures>(keyOf(image, kSift), [&] {
-    return read(image, sift_rows_, "features",
-                [&](const sqlite::Statement& row) { return map_rows::siftOf(row, counts_.features[image]); });
+    return read(image, sift_rows_, "features", [&](const sqlite::Statement& row) {
+      return map_rows::siftOf(row, stored_.seeds[image], stored_.feature_counts[image]);
+    });
   });
 }
 
 std::shared_ptr<const GlobalFeatures> FileFeatureStore::global(std::size_t image) const {
-  return get<GlobalFeatures>(keyOf(image, kGlobal),
-                             [&] { return read(image, global_rows_, "global features", map_rows::globalOf); });
+  return get<GlobalFeatures>(keyOf(image, kGlobal), [&] {
+    return read(image, global_rows_, "global features",
+                [&](const sqlite::Statement& row) { return map_rows::globalOf(row, stored_.seeds[image]); });
+  });
 }
 
 std::vector<std::uint8_t> FileFeatureStore::preview(std::size_t image) const {
   const std::lock_guard<std::mutex> lock(reading_);
-  return read(image, preview_rows_, "preview", map_rows::previewOf);
+  return read(image, preview_rows_, "preview",
+              [&](const sqlite::Statement& row) { return map_rows::previewOf(row, stored_.seeds[image]); });
 }
 
 std::shared_ptr<const ImageGeometry> FileFeatureStore::geometry(std::size_t image) const {
@@ -86,7 +91,7 @@ std::shared_ptr<const ImageGeometry> FileFeatureStore::geometry(std::size_t imag
 
 std::optional<ImageGeometry> FileFeatureStore::readGeometry(std::size_t image) const {
   const auto decode = [&](const sqlite::Statement& row) {
-    return std::optional<ImageGeometry>(map_rows::geometryOf(row, counts_.features[image]));
+    return std::optional<ImageGeometry>(map_rows::geometryOf(row, stored_.seeds[image], stored_.feature_counts[image]));
   };
   return read(image, *geometry_rows_, "landmarks", decode, true);
 }

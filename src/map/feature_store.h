@@ -119,29 +119,29 @@ class FeatureCache {
 };
 
 /// What is known of a map's images without reading what they looked like.
-struct StoredCounts {
-  std::vector<std::uint32_t> features;  ///< of each image
-  std::size_t geometry = 0;             ///< images that have one
+struct StoredRows {
+  std::vector<std::uint32_t> feature_counts;  ///< of each image
+  std::vector<std::uint32_t> seeds;           ///< of its checksums: map_schema::rowSeed()
+  std::size_t geometry_count = 0;             ///< images that have one
 };
 
 /// Reads what an image looked like from the map's file when it is first needed, verifies it, and keeps what was used
 /// last. What cannot be read, does not agree with its checksum or has another number of features than the map says
-/// counts as without features or geometry: the file may be damaged, cut or overwritten at any time. For several threads
-/// at once; one of them reads at a time.
+/// counts as without features or geometry: the file may be damaged, cut or overwritten, by another map too, at any
+/// time. For several threads at once; one of them reads at a time.
 class FileFeatureStore final : public FeatureStore {
  public:
   /// Called with one line about the first image that cannot be read, by the thread that needs it; never again.
   using Warn = std::function<void(const std::string&)>;
 
   /// `path`: to be named in the warning. `cache_bytes`: what may be kept; 0 keeps nothing.
-  FileFeatureStore(sqlite::Database database, std::string path, StoredCounts counts, std::size_t cache_bytes,
-                   Warn warn);
+  FileFeatureStore(sqlite::Database database, std::string path, StoredRows stored, std::size_t cache_bytes, Warn warn);
 
   std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
   std::vector<std::uint8_t> preview(std::size_t image) const override;
   std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override;
-  std::size_t geometryCount() const override { return counts_.geometry; }
+  std::size_t geometryCount() const override { return stored_.geometry_count; }
   std::size_t globalsKept() const override;
 
  private:
@@ -155,7 +155,7 @@ class FileFeatureStore final : public FeatureStore {
   void warnOnce(std::size_t image, const char* what, const std::string& reason) const;
 
   const std::string path_;
-  const StoredCounts counts_;
+  const StoredRows stored_;
   const std::size_t cache_bytes_;
   const Warn warn_;
   mutable std::mutex reading_;  ///< held while the file is read

@@ -113,12 +113,21 @@ TrainingPoses readPoses(const sqlite::Database& database, std::int64_t file_size
   return poses;
 }
 
+std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses, int version) {
+  std::vector<std::uint32_t> seeds(poses.size());
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    seeds[i] = static_cast<std::uint32_t>(map_schema::rowSeed(map_schema::rowOf(poses, i), version));
+  }
+  return seeds;
+}
+
 /// What is read of every map when it is opened.
 struct Opened {
   MapHeader header;
   TrainingPoses poses;
-  std::size_t geometry_count = 0;  ///< images with a geometry
-  map_rows::Budget budget;         ///< for the rest
+  std::vector<std::uint32_t> row_seeds;  ///< of each image: map_schema::rowSeed()
+  std::size_t geometry_count = 0;        ///< images with a geometry
+  map_rows::Budget budget;               ///< for the rest
 };
 
 map_schema::MaskBits readMasks(const map_rows::MapDatabase& map, map_rows::Budget& budget) {
@@ -143,8 +152,9 @@ Opened readPosesAndHeader(const map_rows::MapDatabase& map, std::int64_t file_si
   ParameterValues of_header = meta;
   const std::size_t geometry_count = map_schema::takeGeometryCount(of_header, map.version);
   Opened opened{
-      map_schema::toHeader(std::move(of_header), map.version, readMasks(map, budget)), {}, geometry_count, budget};
+      map_schema::toHeader(std::move(of_header), map.version, readMasks(map, budget)), {}, {}, geometry_count, budget};
   opened.poses = readPoses(map.database, file_size, opened.header.sessions.size(), checksum);
+  opened.row_seeds = rowSeeds(opened.poses, map.version);
   checksum.add(meta);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
   if (geometry_count > opened.poses.size()) throw Refusal("is damaged: more images have landmarks than there are");
@@ -168,9 +178,9 @@ class GeometryRows {
     has_row_ = row_->step();
   }
 
-  std::optional<ImageGeometry> of(std::size_t image, std::size_t feature_count) {
+  std::optional<ImageGeometry> of(std::size_t image, std::int64_t seed, std::size_t feature_count) {
     if (!has_row_ || row_->integer(0) != static_cast<std::int64_t>(image)) return std::nullopt;
-    std::optional<ImageGeometry> geometry = map_rows::geometryOf(*row_, feature_count);
+    std::optional<ImageGeometry> geometry = map_rows::geometryOf(*row_, seed, feature_count);
     ++found_;
     has_row_ = row_->step();
     return geometry;
@@ -211,11 +221,12 @@ void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::f
     stepTo(i, sift, "features");
     stepTo(i, global, "global features");
     stepTo(i, preview, "bytes of the preview");
+    const std::int64_t seed = opened.row_seeds[i];
     TrainingImage image{{poses.stamps_ns[i], poses.sessions[i], poses.positions_m[i], poses.yaws_rad[i]},
-                        map_rows::siftOf(sift, poses.feature_counts[i]),
-                        map_rows::globalOf(global),
-                        map_rows::previewOf(preview),
-                        geometry.of(i, poses.feature_counts[i])};
+                        map_rows::siftOf(sift, seed, poses.feature_counts[i]),
+                        map_rows::globalOf(global, seed),
+                        map_rows::previewOf(preview, seed),
+                        geometry.of(i, seed, poses.feature_counts[i])};
     opened.budget.spend(storedBytes(image));
     use(std::move(image));
   }
@@ -259,9 +270,9 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
   return withMapFile(path, [&](map_rows::MapDatabase&& map, std::int64_t size) {
     Opened opened = readPosesAndHeader(map, size);
     if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(map, std::move(opened));
-    const StoredCounts counts{opened.poses.feature_counts, opened.geometry_count};
-    auto store =
-        std::make_unique<FileFeatureStore>(std::move(map.database), path, counts, loading.cache_bytes, loading.warn);
+    StoredRows rows{opened.poses.feature_counts, std::move(opened.row_seeds), opened.geometry_count};
+    auto store = std::make_unique<FileFeatureStore>(std::move(map.database), path, std::move(rows), loading.cache_bytes,
+                                                    loading.warn);
     return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.poses), std::move(store));
   });
 }

@@ -129,10 +129,10 @@ void Budget::spend(std::uint64_t bytes) {
   left_ -= bytes;
 }
 
-SiftFeatures siftOf(const Statement& row, std::size_t count) {
+SiftFeatures siftOf(const Statement& row, std::int64_t seed, std::size_t count) {
   const Bytes keypoints = row.blob(1);
   const Bytes descriptors = row.blob(2);
-  requireChecksum(map_schema::rowChecksum(row.integer(0), {keypoints, descriptors}), row, 3, "features");
+  requireChecksum(map_schema::rowChecksum(seed, {keypoints, descriptors}), row, 3, "features");
   if (keypoints.size % map_schema::kKeypointBytes != 0) throw Refusal("is damaged: a keypoint is incomplete");
   requireCount(keypoints.size / map_schema::kKeypointBytes, count, row);
   // An address of null plus nothing is not a range, so the empty case goes its own way.
@@ -140,25 +140,25 @@ SiftFeatures siftOf(const Statement& row, std::size_t count) {
   return SiftFeatures(map_schema::unpackKeypoints(keypoints), {descriptors.data, descriptors.data + descriptors.size});
 }
 
-GlobalFeatures globalOf(const Statement& row) {
+GlobalFeatures globalOf(const Statement& row, std::int64_t seed) {
   const Bytes wgoh = row.blob(1);
   const Bytes wgii = row.blob(2);
   const GlobalFeatures features{map_schema::unpackHistogram(wgoh), map_schema::unpackHistogram(wgii)};
-  requireChecksum(map_schema::rowChecksum(row.integer(0), {wgoh, wgii}), row, 3, "global features");
+  requireChecksum(map_schema::rowChecksum(seed, {wgoh, wgii}), row, 3, "global features");
   return features;
 }
 
-std::vector<std::uint8_t> previewOf(const Statement& row) {
+std::vector<std::uint8_t> previewOf(const Statement& row, std::int64_t seed) {
   const Bytes jpeg = row.blob(1);
-  requireChecksum(map_schema::rowChecksum(row.integer(0), {jpeg}), row, 2, "bytes of the preview");
+  requireChecksum(map_schema::rowChecksum(seed, {jpeg}), row, 2, "bytes of the preview");
   if (jpeg.size == 0) return {};
   return {jpeg.data, jpeg.data + jpeg.size};
 }
 
-ImageGeometry geometryOf(const Statement& row, std::size_t feature_count) {
+ImageGeometry geometryOf(const Statement& row, std::int64_t seed, std::size_t feature_count) {
   const Bytes pose = row.blob(1);
   const Bytes points = row.blob(2);
-  requireChecksum(map_schema::rowChecksum(row.integer(0), {pose, points}), row, 3, "landmarks");
+  requireChecksum(map_schema::rowChecksum(seed, {pose, points}), row, 3, "landmarks");
   try {
     return map_schema::unpackGeometry(pose, points, feature_count);
   } catch (const std::runtime_error& error) {

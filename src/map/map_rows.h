@@ -55,13 +55,13 @@ constexpr const char* kSelectPreview = "SELECT image, jpeg, crc32 FROM previews"
 /// Since kSinceLandmarks; an image without geometry has no row.
 constexpr const char* kSelectGeometry = "SELECT image, pose, points, crc32 FROM landmarks";
 
-// What is in the current row of such a statement. Each throws Refusal when it does not agree with its checksum, and
-// sqlite::Error or std::exception when it is not even of the right form.
+// What is in the current row of such a statement. Each throws Refusal when it does not agree with its checksum, which
+// begins with `seed` (map_schema::rowSeed), and sqlite::Error or std::exception when it is not even of the right form.
 /// Throws Refusal, too, when they are not `count`: what the table of images says, and others rely on.
-SiftFeatures siftOf(const sqlite::Statement& row, std::size_t count);
-GlobalFeatures globalOf(const sqlite::Statement& row);
-std::vector<std::uint8_t> previewOf(const sqlite::Statement& row);
+SiftFeatures siftOf(const sqlite::Statement& row, std::int64_t seed, std::size_t count);
+GlobalFeatures globalOf(const sqlite::Statement& row, std::int64_t seed);
+std::vector<std::uint8_t> previewOf(const sqlite::Statement& row, std::int64_t seed);
 /// `feature_count`: SIFT features of the image.
-ImageGeometry geometryOf(const sqlite::Statement& row, std::size_t feature_count);
+ImageGeometry geometryOf(const sqlite::Statement& row, std::int64_t seed, std::size_t feature_count);
 
 }  // namespace visual_localization::map_rows

@@ -61,14 +61,6 @@ std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous) {
   return static_cast<std::int64_t>(::crc32(static_cast<uLong>(previous), bytes.data, static_cast<uInt>(bytes.size)));
 }
 
-std::int64_t rowChecksum(std::int64_t image, std::initializer_list<sqlite::Bytes> blobs) {
-  std::array<std::uint8_t, 8> number{};
-  putLittleEndian(static_cast<std::uint64_t>(image), number.data());
-  std::int64_t checksum = crc32Of({number.data(), number.size()});
-  for (const sqlite::Bytes& blob : blobs) checksum = crc32Of(blob, checksum);
-  return checksum;
-}
-
 void Checksum::addRaw(const std::uint8_t* data, std::size_t size) {
   value_ = static_cast<std::uint32_t>(crc32Of({data, size}, value_));
 }
@@ -112,6 +104,33 @@ void ImageRow::addTo(Checksum& checksum) const {
     to += sizeof(value);
   }
   checksum.addRaw(bytes.data(), bytes.size());
+}
+
+ImageRow rowOf(const TrainingPoses& poses, std::size_t i) {
+  const Eigen::Vector2d& position_m = poses.positions_m[i];
+  return {static_cast<std::int64_t>(i),
+          poses.sessions[i],
+          poses.stamps_ns[i],
+          position_m.x(),
+          position_m.y(),
+          poses.yaws_rad[i],
+          poses.feature_counts[i]};
+}
+
+std::int64_t rowSeed(const ImageRow& image, int version) {
+  Checksum checksum;
+  if (version >= kSinceBoundRows) {
+    image.addTo(checksum);
+  } else {
+    checksum.add(image.id);
+  }
+  return checksum.value();
+}
+
+std::int64_t rowChecksum(std::int64_t seed, std::initializer_list<sqlite::Bytes> blobs) {
+  std::int64_t checksum = seed;
+  for (const sqlite::Bytes& blob : blobs) checksum = crc32Of(blob, checksum);
+  return checksum;
 }
 
 std::vector<std::uint8_t> packMask(const Mask& mask) {

@@ -30,6 +30,8 @@ constexpr std::int64_t kMaxRowBytes =
 constexpr int kSinceCameras = 4;
 /// From this version on images have a geometry.
 constexpr int kSinceLandmarks = 4;
+/// From this version on the checksum of a row covers all that the table `images` says of its image.
+constexpr int kSinceBoundRows = 5;
 
 struct Table {
   const char* name;
@@ -57,9 +59,6 @@ class Checksum {
 /// CRC-32 of some bytes, continuing from `previous`.
 std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous = 0);
 
-/// CRC-32 of a row of a wide table: the number of its image, so that exchanged rows are found, and then its blobs.
-std::int64_t rowChecksum(std::int64_t image, std::initializer_list<sqlite::Bytes> blobs);
-
 /// One row of the table `images`: where an image was taken. All of them are read when a map is opened, so they are
 /// small and hold nothing that only a comparison needs.
 struct ImageRow {
@@ -73,6 +72,16 @@ struct ImageRow {
 
   void addTo(Checksum& checksum) const;
 };
+
+/// The row of image `i`.
+ImageRow rowOf(const TrainingPoses& poses, std::size_t i);
+
+/// What the checksums of an image's rows in the wide tables begin with, so that exchanged rows are found, and those of
+/// another map that was copied over an open one. Before kSinceBoundRows it is of the image's number alone.
+std::int64_t rowSeed(const ImageRow& image, int version = kMapSchemaVersion);
+
+/// CRC-32 of a row of a wide table: its blobs, continuing from rowSeed().
+std::int64_t rowChecksum(std::int64_t seed, std::initializer_list<sqlite::Bytes> blobs);
 
 /// One bit a pixel, row by row, the first pixel in the highest bit; the last byte is filled up with zeros.
 std::vector<std::uint8_t> packMask(const Mask& mask);

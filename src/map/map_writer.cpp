@@ -65,9 +65,9 @@ class MapWriter::Tables {
 
   void append(const TrainingImage& image) {
     requireStorable(image);
-    looks_->write(static_cast<std::int64_t>(poses_.size()), image);
-    if (image.geometry) ++geometry_count_;
     poses_.add(image, image.sift.size());
+    looks_->write(map_schema::rowOf(poses_, poses_.size() - 1), image);
+    if (image.geometry) ++geometry_count_;
   }
 
   void finish(const MapHeader& header) {
@@ -93,24 +93,24 @@ class MapWriter::Tables {
           previews_(database, "INSERT INTO previews VALUES(?,?,?)"),
           landmarks_(database, "INSERT INTO landmarks VALUES(?,?,?,?)") {}
 
-    void write(std::int64_t id, const TrainingImage& image) {
-      const std::optional<map_schema::PackedGeometry> geometry = packedGeometry(id, image);
+    void write(const ImageRow& row, const TrainingImage& image) {
+      const std::optional<map_schema::PackedGeometry> geometry = packedGeometry(row.id, image);
       const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(image.sift.keypoints());
       const std::vector<std::uint8_t> wgoh = map_schema::packHistogram(image.global.wgoh);
       const std::vector<std::uint8_t> wgii = map_schema::packHistogram(image.global.wgii);
-      writeRow(features_, id, {bytesOf(keypoints), bytesOf(image.sift.descriptors())});
-      writeRow(globals_, id, {bytesOf(wgoh), bytesOf(wgii)});
-      writeRow(previews_, id, {bytesOf(image.preview_jpeg)});
-      if (geometry) writeRow(landmarks_, id, {bytesOf(geometry->pose), bytesOf(geometry->points)});
+      writeRow(features_, row, {bytesOf(keypoints), bytesOf(image.sift.descriptors())});
+      writeRow(globals_, row, {bytesOf(wgoh), bytesOf(wgii)});
+      writeRow(previews_, row, {bytesOf(image.preview_jpeg)});
+      if (geometry) writeRow(landmarks_, row, {bytesOf(geometry->pose), bytesOf(geometry->points)});
     }
 
    private:
-    static void writeRow(Statement& row, std::int64_t id, std::initializer_list<Bytes> blobs) {
+    static void writeRow(Statement& insert, const ImageRow& row, std::initializer_list<Bytes> blobs) {
       int column = 0;
-      row.bind(column++, id);
-      for (const Bytes& blob : blobs) row.bind(column++, blob);
-      row.bind(column, map_schema::rowChecksum(id, blobs));
-      row.run();
+      insert.bind(column++, row.id);
+      for (const Bytes& blob : blobs) insert.bind(column++, blob);
+      insert.bind(column, map_schema::rowChecksum(map_schema::rowSeed(row), blobs));
+      insert.run();
     }
 
     Statement features_;
@@ -127,14 +127,7 @@ class MapWriter::Tables {
 
   void writePose(std::size_t i) {
     if (!pose_row_) pose_row_ = std::make_unique<Statement>(database_, "INSERT INTO images VALUES(?,?,?,?,?,?,?)");
-    ImageRow row;
-    row.id = static_cast<std::int64_t>(i);
-    row.session = poses_.sessions[i];
-    row.stamp_ns = poses_.stamps_ns[i];
-    row.east_m = poses_.positions_m[i].x();
-    row.north_m = poses_.positions_m[i].y();
-    row.yaw_rad = poses_.yaws_rad[i];
-    row.feature_count = poses_.feature_counts[i];
+    const ImageRow row = map_schema::rowOf(poses_, i);
     row.addTo(checksum_);
     pose_row_->bind(0, row.id);
     pose_row_->bind(1, row.session);

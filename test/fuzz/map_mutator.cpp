@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <functional>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
@@ -54,6 +56,15 @@ class Editor {
     return {statement, sqlite3_finalize};
   }
 
+  /// To be called before repairRows().
+  void readSeeds() {
+    const Row version = prepare("PRAGMA user_version");
+    sqlite3_step(version.get());
+    forEachImage([&](const map_schema::ImageRow& image) {
+      seeds_[image.id] = map_schema::rowSeed(image, sqlite3_column_int(version.get(), 0));
+    });
+  }
+
   void repairRows(const char* select, int blobs, const char* update) {
     std::vector<std::pair<std::int64_t, std::int64_t>> checksums;
     const Row row = prepare(select);
@@ -64,8 +75,9 @@ class Editor {
                              static_cast<std::size_t>(sqlite3_column_bytes(row.get(), column))};
       };
       const std::int64_t image = sqlite3_column_int64(row.get(), 0);
-      checksums.emplace_back(image, blobs == 1 ? map_schema::rowChecksum(image, {blob(1)})
-                                               : map_schema::rowChecksum(image, {blob(1), blob(2)}));
+      const std::int64_t seed = seeds_[image];
+      checksums.emplace_back(image, blobs == 1 ? map_schema::rowChecksum(seed, {blob(1)})
+                                               : map_schema::rowChecksum(seed, {blob(1), blob(2)}));
     }
     const Row change = prepare(update);
     for (const auto& [image, checksum] : checksums) {
@@ -96,13 +108,7 @@ class Editor {
 
   void repairChecksum() {
     map_schema::Checksum checksum;
-    const Row row =
-        prepare("SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count FROM images ORDER BY id");
-    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
-      const auto integer = [&row](int column) { return std::int64_t{sqlite3_column_int64(row.get(), column)}; };
-      const auto real = [&row](int column) { return sqlite3_column_double(row.get(), column); };
-      map_schema::ImageRow{integer(0), integer(1), integer(2), real(3), real(4), real(5), integer(6)}.addTo(checksum);
-    }
+    forEachImage([&checksum](const map_schema::ImageRow& image) { image.addTo(checksum); });
     checksum.add(meta());
     const Row change = prepare("INSERT OR REPLACE INTO meta VALUES('checksum', ?)");
     sqlite3_bind_int64(change.get(), 1, checksum.value());
@@ -119,6 +125,16 @@ class Editor {
   }
 
  private:
+  void forEachImage(const std::function<void(const map_schema::ImageRow&)>& use) {
+    const Row row =
+        prepare("SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count FROM images ORDER BY id");
+    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
+      const auto integer = [&row](int column) { return std::int64_t{sqlite3_column_int64(row.get(), column)}; };
+      const auto real = [&row](int column) { return sqlite3_column_double(row.get(), column); };
+      use({integer(0), integer(1), integer(2), real(3), real(4), real(5), integer(6)});
+    }
+  }
+
   ParameterValues meta() {
     ParameterValues values;
     const Row row = prepare("SELECT key, value FROM meta WHERE key <> 'checksum'");
@@ -142,6 +158,7 @@ class Editor {
   }
 
   sqlite3* handle_ = nullptr;
+  std::map<std::int64_t, std::int64_t> seeds_;  ///< of the images' rows
 };
 
 std::string anySql(Random& random) {
@@ -263,6 +280,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
     Editor editor(bytes.data(), bytes.size());
     for (std::size_t i = 0; by_sql && i <= random() % 3; ++i) editor.execute(anySql(random));
     if (random() % 8 != 0) {
+      editor.readSeeds();
       editor.repairRows("SELECT image, keypoints, descriptors FROM features", 2,
                         "UPDATE features SET crc32 = ? WHERE image = ?");
       editor.repairRows("SELECT image, wgoh, wgii FROM globals", 2, "UPDATE globals SET crc32 = ? WHERE image = ?");

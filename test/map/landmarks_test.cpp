@@ -43,7 +43,9 @@ class Landmarks : public testing::Test {
   /// Replaces the row of an image by one whose checksum is right.
   void put(std::int64_t image, const PackedGeometry& packed) const {
     restore();
-    const std::int64_t crc32 = map_schema::rowChecksum(image, {bytesOf(packed.pose), bytesOf(packed.points)});
+    const TrainingPoses poses = posesOf(test::exampleImages(6, kFeatures));
+    const std::int64_t seed = map_schema::rowSeed(map_schema::rowOf(poses, static_cast<std::size_t>(image)));
+    const std::int64_t crc32 = map_schema::rowChecksum(seed, {bytesOf(packed.pose), bytesOf(packed.points)});
     tamper("REPLACE INTO landmarks VALUES(" + std::to_string(image) + ", " + blob(packed.pose) + ", " +
            blob(packed.points) + ", " + std::to_string(crc32) + ")");
   }

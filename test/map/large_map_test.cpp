@@ -10,7 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "map/map_schema.h"
 #include "map/map_writer.h"
+#include "test/map/stored_geometry.h"
 #include "test/support/example_map.h"
 #include "test/support/tamper.h"
 #include "test/support/temporary_folder.h"
@@ -179,10 +181,18 @@ TEST_F(LargeMap, AnImageWithOtherThanItsPlacesNumberOfFeaturesCountsAsDamaged) {
   for (const std::size_t i : {3U, 4U}) others[i].sift = test::randomFeatures(51, random);
   const std::string other_path = folder_ / "other.map";
   saveMap(TrainingMap(test::exampleHeader(), others), other_path);
-  // Rows whose checksums are right.
   tamper("ATTACH '" + other_path +
          "' AS other; DELETE FROM main.features WHERE image IN (3, 4); "
          "INSERT INTO main.features SELECT * FROM other.features WHERE image IN (3, 4)");
+  // With checksums that are right.
+  const TrainingPoses poses = posesOf(images_);
+  for (const std::size_t i : {3U, 4U}) {
+    const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(others[i].sift.keypoints());
+    const std::int64_t crc32 =
+        map_schema::rowChecksum(map_schema::rowSeed(map_schema::rowOf(poses, i)),
+                                {test::bytesOf(keypoints), test::bytesOf(others[i].sift.descriptors())});
+    tamper("UPDATE features SET crc32 = " + std::to_string(crc32) + " WHERE image = " + std::to_string(i));
+  }
   const auto map = open();
   EXPECT_TRUE(map->sift(3)->empty());
   EXPECT_TRUE(map->sift(4)->empty());
@@ -208,6 +218,27 @@ TEST_F(LargeMap, SurvivesItsFileBeingDeletedOrReplaced) {
   saveMap(TrainingMap(test::exampleHeader(), test::exampleImages(5, 3, 9)), path_);
   expectAllSame(*map);
   EXPECT_THAT(warnings_, ElementsAre());
+}
+
+/// As `cp other.map live.map` does: rows that are whole, but of another map.
+TEST_F(LargeMap, TakesNothingFromAnotherMapThatWasCopiedOverIt) {
+  std::vector<TrainingImage> others = test::exampleImages(kImages, 50, 9);
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    others[i].position_m.x() += 1e-3;  // the same recording, built again with other parameters
+    others[i].geometry = images_[i].geometry;
+  }
+  const auto map = open(0);
+  saveMap(TrainingMap(test::exampleHeader(), others), folder_ / "other.map");
+  const std::string other = test::readAll(folder_ / "other.map");
+  ASSERT_EQ(other.size(), test::readAll(path_).size());
+  std::ofstream(path_, std::ios::binary | std::ios::in) << other;  // in place, so that the open file sees it
+  for (std::size_t i = 0; i < kImages; ++i) {
+    EXPECT_TRUE(map->sift(i)->empty()) << i;
+    EXPECT_EQ(map->global(i)->wgoh, GlobalFeatures().wgoh) << i;
+    EXPECT_TRUE(map->preview(i).empty()) << i;
+    EXPECT_EQ(map->geometry(i), nullptr) << i;
+  }
+  EXPECT_THAT(warnings_, ElementsAre(AllOf(HasSubstr("features of image 0"), HasSubstr("checksum"))));
 }
 
 TEST_F(LargeMap, SurvivesItsFileBeingCutAtAnyLength) {

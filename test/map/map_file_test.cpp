@@ -31,7 +31,7 @@ std::string saveRefusal(const std::string& path) {
 TEST_F(MapStore, RoundTripIsIdentical) {
   expectSame(exampleMap(), *loadMap(path_));
   EXPECT_NO_THROW(checkMap(path_));
-  EXPECT_EQ(originOf(path_).schema_version, 4);
+  EXPECT_EQ(originOf(path_).schema_version, kMapSchemaVersion);
   EXPECT_FALSE(originOf(path_).package_version.empty());
 }
 
@@ -83,7 +83,19 @@ TEST_F(MapStore, MapsOfVersion3HaveNoCamerasAndNoLandmarks) {
   EXPECT_NO_THROW(checkMap(old));
   // Saved again it is a map of today.
   saveMap(*map, path_);
-  EXPECT_EQ(originOf(path_).schema_version, 4);
+  EXPECT_EQ(originOf(path_).schema_version, kMapSchemaVersion);
+  expectSame(*map, *loadMap(path_));
+}
+
+TEST_F(MapStore, MapsOfVersion4HaveLandmarks) {
+  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/landmarks_and_mount.map";
+  EXPECT_EQ(originOf(old).schema_version, 4);
+  const auto map = loadMap(old);
+  EXPECT_TRUE(map->hasGeometry());
+  expectSame(*map, *loadMap(old, {0, [](const std::string& reason) { FAIL() << reason; }}));
+  EXPECT_NO_THROW(checkMap(old));
+  saveMap(*map, path_);
+  EXPECT_EQ(originOf(path_).schema_version, kMapSchemaVersion);
   expectSame(*map, *loadMap(path_));
 }
 
