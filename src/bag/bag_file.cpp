@@ -120,7 +120,9 @@ BagFile::BagFile(const std::string& path) : file_(path) {
   if (index_at == 0) {
     throw UnsupportedBag("bag is not indexed, as after an interrupted recording; `rosbag reindex` may repair it");
   }
-  require(index_at >= header.data.end && index_at <= file_.size(), "the index lies outside the file");
+  require(index_at >= header.data.end, "the index lies in the header");
+  require(index_at <= file_.size(),
+          "it ends before its index, as a copy that was cut off; `rosbag reindex` may repair it");
   readChunks({header.data.end, index_at});
   readSummary(header, {index_at, file_.size()});
 }

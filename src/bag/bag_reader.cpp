@@ -120,11 +120,14 @@ BagImages BagReader::images(const std::string& topic) const {
     content->path = path_;
     content->file = file_;
     content->topic = topic;
+    const Topics compressed = topicsOf<sensor_msgs::CompressedImage>(*file_);
     if (topicsOf<sensor_msgs::Image>(*file_).count(topic) != 0) {
+      if (compressed.count(topic) != 0) {
+        throw BagError(path_ + ": topic '" + topic + "' has raw and compressed images; only one kind is allowed");
+      }
       content->messages = messagesOf<sensor_msgs::Image>(*file_, topic);
       return BagImages(content);
     }
-    const Topics compressed = topicsOf<sensor_msgs::CompressedImage>(*file_);
     if (compressed.count(topic) == 0) content->topic = topic + "/compressed";
     if (compressed.count(content->topic) == 0) {
       throw BagError(

@@ -94,7 +94,7 @@ TEST_F(BagFileTest, NamesEveryKindOfDamage) {
       {"the unknown type", patch("op=\x03", 3, "\x63")},
       {": bag is not indexed, as after an interrupted recording; `rosbag reindex`",
        patch("index_pos=", 10, std::string(8, '\0'))},
-      {"the index lies outside the file", patch("index_pos=", 10, huge + huge)},
+      {"it ends before its index", patch("index_pos=", 10, huge + huge)},
       {"field 'chunk_count'", patch("chunk_count=", 0, "Chunk")},
       {"field 'size'", patch("size=", 0, "Size")},
       {"at most 268435456 are accepted", patch("size=", 5, huge)},

@@ -62,6 +62,15 @@ void writeBag(const std::string& path) {
   bag.write("/talk", ros::Time(2.5), std_msgs::String());
 }
 
+/// Who publishes: two of them may have the same topic.
+template <class T>
+boost::shared_ptr<ros::M_string> publisher() {
+  namespace traits = ros::message_traits;
+  return boost::make_shared<ros::M_string>(ros::M_string{{"type", traits::DataType<T>::value()},
+                                                         {"md5sum", traits::MD5Sum<T>::value()},
+                                                         {"message_definition", traits::Definition<T>::value()}});
+}
+
 template <class Action>
 std::string reason(Action action) {
   try {
@@ -146,6 +155,17 @@ TEST_F(BagReaderTest, KeepsAllFixes) {
   EXPECT_DOUBLE_EQ(fixes[0].position.latitude_deg, 48.5);
   EXPECT_FALSE(fixes[1].has_fix);
   EXPECT_TRUE(std::isnan(fixes[1].position.latitude_deg));
+}
+
+TEST_F(BagReaderTest, RawAndCompressedImagesOnOneTopicAreRefused) {
+  const std::string path = folder_ / "both.bag";
+  {
+    rosbag::Bag bag(path, rosbag::bagmode::Write);
+    bag.write("/camera", ros::Time(1.0), raw(1.0), publisher<sensor_msgs::Image>());
+    bag.write("/camera", ros::Time(2.0), jpeg(2.0), publisher<sensor_msgs::CompressedImage>());
+  }
+  const BagReader bag(path);
+  EXPECT_THAT(reason([&] { bag.images("/camera"); }), AllOf(HasSubstr("'/camera'"), HasSubstr("raw and compressed")));
 }
 
 TEST_F(BagReaderTest, NamesTheTopicsThatThereAre) {
