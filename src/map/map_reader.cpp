@@ -257,6 +257,8 @@ auto withMapFile(const std::string& path, Read read) {
     return read(map_rows::open(path, size), size);
   } catch (const Refusal& refusal) {
     throw MapStoreError(path + ": " + oneLine(refusal.what()));
+  } catch (const sqlite::OpenError& error) {
+    throw MapStoreError(path + ": cannot be opened: " + oneLine(error.what()));
   } catch (const std::bad_alloc&) {
     throw MapStoreError(path + ": there is not enough memory for this map");
   } catch (const std::exception& error) {

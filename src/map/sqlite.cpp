@@ -46,7 +46,9 @@ sqlite3* open(const std::string& name, int flags, const char* system = nullptr) 
   sqlite3* handle = nullptr;
   if (sqlite3_open_v2(name.c_str(), &handle, flags | SQLITE_OPEN_NOMUTEX, system) != SQLITE_OK) {
     const std::string text = handle == nullptr ? "out of memory" : sqlite3_errmsg(handle);
+    const bool not_opened = handle != nullptr && sqlite3_errcode(handle) == SQLITE_CANTOPEN;
     sqlite3_close(handle);
+    if (not_opened) throw OpenError(text + "; SQLite takes paths of at most 512 bytes, links and '..' resolved");
     throw Error(text);
   }
   sqlite3_extended_result_codes(handle, 0);

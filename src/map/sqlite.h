@@ -17,6 +17,12 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A file that SQLite does not even open.
+class OpenError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// Bytes inside a row; valid until the statement steps on.
 struct Bytes {
   const std::uint8_t* data = nullptr;
