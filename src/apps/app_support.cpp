@@ -13,6 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/text.h"
+
 extern char** environ;
 
 namespace visual_localization::apps {
@@ -74,6 +76,11 @@ std::string errorOutputOf(const std::vector<std::string>& command) {
 }
 
 }  // namespace
+
+void warn(const std::string& text) {
+  constexpr std::size_t kLongest = 10000;  // as long as a refusal that lists all parameters
+  std::cerr << oneLine(text, kLongest) << std::endl;
+}
 
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {

@@ -18,6 +18,9 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Writes one line to standard error: names and texts from outside may have control characters or no end.
+void warn(const std::string& text);
+
 /// Throws UsageError, naming the option, when the file to write is one of the files to read.
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 

@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "apps/app_support.h"
+#include "base/text.h"
 #include "ros/camera_info.h"
 #include "visual_localization/features/front_end.h"
 
@@ -169,7 +170,7 @@ void printSummary(const MapBuilderOptions& options, const MapBuildReport& report
     fixes += session.verdicts.size();
     gaps += session.gaps_closed;
   }
-  std::cout << options.output << ": " << (report.images_kept - report.images_thinned) << " images, "
+  std::cout << oneLine(options.output) << ": " << (report.images_kept - report.images_thinned) << " images, "
             << fixesKept(report) << " of " << fixes << " fixes, " << gaps << " gaps closed, features "
             << report.features_extracted << " -> " << report.features_kept << ", "
             << humanSize(static_cast<double>(std::filesystem::file_size(options.output))) << ", " << seconds << " s\n";

@@ -152,10 +152,9 @@ void declareOptions(CLI::App& app, EvaluateOptions& options) {
   app.add_flag("--no-report", options.no_report, "Write only the tables");
 }
 
-int fail(const CLI::App& app, std::string reason, int code) {
-  std::replace(reason.begin(), reason.end(), '\n', ' ');
+int fail(const CLI::App& app, const std::string& reason, int code) {
   std::cout.flush();
-  std::cerr << app.get_name() << ": " << reason << std::endl;
+  warn(app.get_name() + ": " + reason);
   return code;
 }
 

@@ -20,6 +20,7 @@
 #include "evaluation/experiment.h"
 #include "evaluation/result_folder.h"
 #include "evaluation/round_recorder.h"
+#include "parameters/yaml_map.h"
 
 namespace visual_localization::apps {
 namespace {
@@ -107,7 +108,7 @@ void report(const std::string& folder) {
 }
 
 void run(const EvaluateOptions& options) {
-  const std::string yaml = readFile(options.config);  // once: it may be a pipe
+  const std::string yaml = readFile(options.config, parameters::kLargestYaml_bytes);  // once: it may be a pipe
   const Experiment experiment = parseExperiment(yaml, options.config);
   const std::string provenance = provenanceOf(experiment, options);
   const ResultFolder results(options.output, yaml, provenance);

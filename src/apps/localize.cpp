@@ -177,8 +177,8 @@ void run(const LocalizeOptions& options) {
   requireNoInput("--output", options.output,
                  {options.map, options.bag, options.config, options.camera_info, options.mask});
   PartialFile output(options.output);  // fails now, not after the run
-  const auto warn = [](const std::string& reason) { std::cerr << "localize: " << reason << std::endl; };
-  Localizer localizer(loadMap(options.map, config.node.mapLoading(warn)), config.localizer);
+  const auto warn_of_map = [](const std::string& reason) { warn("localize: " + reason); };
+  Localizer localizer(loadMap(options.map, config.node.mapLoading(warn_of_map)), config.localizer);
   const BagReader bag(options.bag);
   const BagImages images = bag.images(options.image_topic);
   const std::vector<std::size_t> order = orderOf(options, images.size());
@@ -208,8 +208,8 @@ void run(const LocalizeOptions& options) {
   output.write(track);
   output.commit();
   if (!first_refusal.empty())
-    std::cerr << "localize: " << totals.unusable << " images skipped, first " << first_refusal << '\n';
-  if (!totals.camera_trouble.empty()) std::cerr << "localize: camera: " << totals.camera_trouble << '\n';
+    warn("localize: " + std::to_string(totals.unusable) + " images skipped, first " + first_refusal);
+  if (!totals.camera_trouble.empty()) warn("localize: camera: " + totals.camera_trouble);
   print(totals);
   if (truth) print(summarise(std::move(errors_m)));
 }

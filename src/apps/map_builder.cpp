@@ -13,6 +13,7 @@
 #include "apps/command_line.h"
 #include "apps/map_plot.h"
 #include "base/files.h"
+#include "base/text.h"
 #include "ros/camera_info.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/map/map_file.h"
@@ -52,7 +53,7 @@ MapBuilderConfig readConfig(const MapBuilderOptions& options) {
 
 /// Bags of the same name in different folders get different session names.
 std::string sessionName(const std::string& bag, const std::vector<PlottedSession>& sessions) {
-  const std::string stem = std::filesystem::path(bag).stem().string();
+  const std::string stem = oneLine(std::filesystem::path(bag).stem().string());
   std::string name = stem;
   for (std::size_t n = 2;; ++n) {
     bool taken = false;
@@ -79,7 +80,7 @@ cv::Mat decode(const BagImage& image, const std::string& where, bool& warned) {
   try {
     return image.decode();
   } catch (const ImageError& error) {
-    if (!warned) std::cerr << where << ": unusable image: " << error.what() << std::endl;
+    if (!warned) warn(where + ": unusable image: " + error.what());
     warned = true;
     return {};
   }

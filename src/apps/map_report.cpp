@@ -86,7 +86,7 @@ void printFile(std::ostream& out, const std::string& path, const TrainingMap& ma
   const MapHeader& header = map.header();
   const auto bytes = static_cast<double>(std::filesystem::file_size(path));
   const MapOrigin origin = originOf(path);
-  out << key("map") << path << ", version " << origin.schema_version << ", written by visual_localization "
+  out << key("map") << oneLine(path) << ", version " << origin.schema_version << ", written by visual_localization "
       << origin.package_version << '\n'
       << key("size") << humanSize(bytes) << " on disk, " << whereItsFeaturesAre(bytes) << '\n'
       << key("datum") << std::setprecision(9) << header.datum.latitude_deg << " deg, " << header.datum.longitude_deg

@@ -133,7 +133,7 @@ bool LocalizerNodelet::onRelocalize(Relocalize::Request& request, Relocalize::Re
                                             : "searching the whole map";
   } catch (const std::exception& error) {
     response.success = false;
-    response.message = error.what();
+    response.message = oneLine(error.what());
   }
   return true;
 }
@@ -148,13 +148,13 @@ bool LocalizerNodelet::onLoadMap(LoadMap::Request& request, LoadMap::Response& r
     response.images = static_cast<std::uint32_t>(useMap(request.path));
     reconfigure_->setMap(request.path);
     response.success = true;
-    response.message = "loaded " + request.path;
+    response.message = oneLine("loaded " + request.path);
   } catch (const std::exception& error) {
     const auto map = localizer_->map();
     response.images = map ? static_cast<std::uint32_t>(map->size()) : 0;
     response.success = false;
-    response.message = error.what();
-    NODELET_WARN_STREAM("Map not loaded: " << error.what());
+    response.message = oneLine(error.what());
+    NODELET_WARN_STREAM("Map not loaded: " << response.message);
   }
   return true;
 }
@@ -197,7 +197,7 @@ std::size_t LocalizerNodelet::useMap(const std::string& path) {
   camera_->mapIs(map->header());
   publisher_->publishMap(*map);
   diagnostics_->mapLoaded(path, map->size());
-  NODELET_INFO_STREAM("Map " << path << " with " << map->size() << " training images");
+  NODELET_INFO_STREAM("Map " << oneLine(path) << " with " << map->size() << " training images");
   return map->size();
 }
 

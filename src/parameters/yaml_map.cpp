@@ -277,7 +277,7 @@ std::string withoutKeys(const std::string& yaml, const std::vector<std::string>&
 
 ParameterValues readYaml(const std::string& path) {
   try {
-    const std::string text = readFile(path);
+    const std::string text = readFile(path, kLargestYaml_bytes);
     if (!hasMoreThanOneDocument(text) && YAML::Load(text).IsNull()) return {};
     return YamlMap::parse(text, path).parameters();
   } catch (const FileError& error) {

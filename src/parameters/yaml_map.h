@@ -15,6 +15,9 @@ class Node;
 
 namespace visual_localization::parameters {
 
+/// No file of parameters or experiment is larger; /dev/zero has no end.
+constexpr std::size_t kLargestYaml_bytes = std::size_t{1} << 20U;
+
 /// A mapping of a YAML file of which every key must be asked for: a key nobody knows is a mistake of the writer, and so
 /// is one that appears twice. All errors are ParameterErrors of one line that name the file and the key.
 class YamlMap {

@@ -101,6 +101,30 @@ class ProgramsTest(ProgramTest):
         self.assert_refused(result, 1, 'folder does not exist')
         self.assertEqual([path.name for path in self.folder.iterdir()], ['damaged.bag'])
 
+    def test_names_from_outside_make_one_clear_line(self):
+        hostile = 'a\nb\x1b[31m\x07'
+        for result, code in ((run('map_info', hostile), 1), (run('localize', '--map', MAP, '--bag', hostile, '--output', 'o'), 1),
+                             (run('map_builder', '--bag', DRIVE, '--output', self.folder / hostile / 'o'), 1),
+                             (run('map_builder', '--bag', DRIVE, '--image-topic', hostile, '--output', self.folder / 'o'), 1),
+                             (run('localize', '--map', MAP, hostile), 2), (run('map_info', 'x' * 100000), 1)):
+            self.assert_refused(result, code)
+            self.assertFalse(set(map(chr, range(32))) - {'\n'} & set(result.stderr), result.stderr)
+            self.assertLess(len(result.stderr), 11000)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_a_file_without_end_is_no_configuration(self):
+        for arguments in (('map_builder', '--bag', DRIVE), ('localize', '--map', MAP, '--bag', DRIVE), ('evaluate',)):
+            result = run(*arguments, '--output', self.folder / 'output', '--config', '/dev/zero')
+            self.assert_refused(result, 1, '/dev/zero', '1048576 bytes')
+
+    def test_a_path_that_sqlite_does_not_take_is_named_as_that(self):
+        deep = self.folder / ('a' * 200) / ('b' * 200) / ('c' * 200)
+        deep.mkdir(parents=True)
+        (deep / 'copy.map').write_bytes(MAP.read_bytes())
+        self.assert_refused(run('map_info', deep / 'copy.map'), 1, 'cannot be opened', '512 bytes')
+        self.assert_refused(run('map_builder', '--bag', DRIVE, '--output', deep / 'o.map'), 1, 'cannot be written', '512 bytes')
+        self.assertEqual([path.name for path in deep.iterdir()], ['copy.map'])
+
     def test_an_output_never_replaces_an_input(self):
         copy, bag = self.folder / 'copy.map', self.folder / 'copy.bag'
         copy.write_bytes(MAP.read_bytes())
