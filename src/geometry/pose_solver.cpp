@@ -1,12 +1,14 @@
 #include "geometry/pose_solver.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <random>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/core/eigen.hpp>
 
 #include "base/statistics.h"
 #include "geometry/rotation_vector.h"
@@ -19,41 +21,14 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kNearest_m = 0.05;
+constexpr int kLeastSamples = 30;
+constexpr double kSharpness = 16.0;  ///< an inlier's noise is about a quarter of the tolerance
 constexpr int kMostSamples = 200;
 constexpr double kConfidence = 0.999;
 constexpr std::size_t kLeast = 4;
 constexpr int kMostSteps = 10;
+constexpr int kImprovements = 4;    ///< least squares steps for a better sample
 constexpr double kLossScale = 2.5;  ///< sigmas, of the Cauchy loss
-
-/// Of AP3P in a RANSAC loop. OpenCV seeds it anew in each call.
-std::optional<CameraPose> robustPose(const std::vector<LandmarkMatch>& matches, double tolerance) {
-  // Relative to their middle, so that OpenCV need not subtract large numbers.
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  for (const LandmarkMatch& match : matches) origin += match.landmark_m / static_cast<double>(matches.size());
-  std::vector<cv::Point3d> landmarks;
-  std::vector<cv::Point2d> seen;
-  for (const LandmarkMatch& match : matches) {
-    const Eigen::Vector3d offset = match.landmark_m - origin;
-    landmarks.emplace_back(offset.x(), offset.y(), offset.z());
-    seen.emplace_back(match.normalised.x(), match.normalised.y());
-  }
-  cv::Mat rotation_vector;
-  cv::Mat translation;
-  const bool found = cv::solvePnPRansac(landmarks, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation_vector,
-                                        translation, false, kMostSamples, static_cast<float>(tolerance), kConfidence,
-                                        cv::noArray(), cv::SOLVEPNP_AP3P);
-  if (!found || !cv::checkRange(rotation_vector) || !cv::checkRange(translation)) return std::nullopt;
-  cv::Mat rotation;
-  cv::Rodrigues(rotation_vector, rotation);
-  Eigen::Matrix3d camera_from_map;
-  Eigen::Vector3d shift;
-  cv::cv2eigen(rotation, camera_from_map);
-  cv::cv2eigen(translation, shift);
-  CameraPose pose;
-  pose.rotation = Eigen::Quaterniond(Eigen::Matrix3d(camera_from_map.transpose())).normalized();
-  pose.position_m = origin - pose.rotation * shift;
-  return pose;
-}
 
 double errorOf(const LandmarkMatch& match, const CameraPose& pose) {
   const Eigen::Vector3d point = pose.toCamera(match.landmark_m);
@@ -85,6 +60,12 @@ struct NormalEquations {
     const Eigen::Matrix3d camera_from_map = pose.rotation.conjugate().toRotationMatrix();
     for (const std::size_t i : inliers) add(matches[i], pose, camera_from_map);
     squared_sigmas /= 2.0 * static_cast<double>(inliers.size());
+  }
+
+  /// Towards the least squares.
+  std::optional<Vector6> step() const {
+    const Vector6 step = -information.ldlt().solve(gradient);
+    return step.allFinite() ? std::optional<Vector6>(step) : std::nullopt;
   }
 
  private:
@@ -120,17 +101,128 @@ CameraPose moved(const CameraPose& pose, const Vector6& step) {
           pose.position_m + step.head<3>()};
 }
 
+/// How many samples of three find one without an outlier, as surely as kConfidence.
+int samplesNeeded(double inlier_share) {
+  const double clean = inlier_share * inlier_share * inlier_share;
+  if (clean >= kConfidence) return kLeastSamples;
+  const double samples = std::ceil(std::log(1.0 - kConfidence) / std::log(1.0 - clean));
+  return static_cast<int>(std::clamp<double>(samples, kLeastSamples, kMostSamples));
+}
+
+/// RANSAC (Fischler and Bolles 1981) over the poses that three matches allow.
+class Sampler {
+ public:
+  Sampler(const std::vector<LandmarkMatch>& matches, double tolerance) : matches_(matches), tolerance_(tolerance) {
+    // Relative to their middle, so that OpenCV need not subtract large numbers.
+    for (const LandmarkMatch& match : matches) origin_ += match.landmark_m / static_cast<double>(matches.size());
+  }
+
+  /// That with the best support; the same for the same matches.
+  std::optional<CameraPose> best() {
+    int samples = kMostSamples;
+    for (int i = 0; i < samples; ++i) {
+      for (const CameraPose& pose : posesOf(draw())) {
+        if (!keepIfBest(pose)) continue;
+        improveBest();
+        samples = samplesNeeded(static_cast<double>(most_.inliers) / static_cast<double>(matches_.size()));
+      }
+    }
+    return best_;
+  }
+
+ private:
+  using Sample = std::array<std::size_t, 3>;
+
+  struct Support {
+    std::size_t inliers = 0;
+    double score = 0.0;  ///< less for an inlier that is farther off (MSAC: Torr and Zisserman 2000)
+  };
+
+  Sample draw() {
+    std::uniform_int_distribution<std::size_t> any(0, matches_.size() - 1);
+    Sample sample{any(random_)};
+    do sample[1] = any(random_);
+    while (sample[1] == sample[0]);
+    do sample[2] = any(random_);
+    while (sample[2] == sample[0] || sample[2] == sample[1]);
+    return sample;
+  }
+
+  /// At most four, by AP3P (Ke and Roumeliotis 2017).
+  std::vector<CameraPose> posesOf(const Sample& sample) const {
+    std::array<cv::Point3d, 3> landmarks;
+    std::array<cv::Point2d, 3> seen;
+    for (std::size_t k = 0; k < sample.size(); ++k) {
+      const LandmarkMatch& match = matches_[sample[k]];
+      const Eigen::Vector3d offset = match.landmark_m - origin_;
+      landmarks[k] = {offset.x(), offset.y(), offset.z()};
+      seen[k] = {match.normalised.x(), match.normalised.y()};
+    }
+    std::vector<cv::Vec3d> rotations;
+    std::vector<cv::Vec3d> translations;
+    cv::solveP3P(landmarks, seen, cv::Matx33d::eye(), cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
+    std::vector<CameraPose> poses;
+    for (std::size_t k = 0; k < rotations.size(); ++k) {
+      if (!cv::checkRange(rotations[k]) || !cv::checkRange(translations[k])) continue;
+      const Eigen::Vector3d turn(rotations[k][0], rotations[k][1], rotations[k][2]);  // map to camera
+      const Eigen::Vector3d shift_m(translations[k][0], translations[k][1], translations[k][2]);
+      const Eigen::Quaterniond rotation = Eigen::Quaterniond(exponential(-turn)).normalized();
+      poses.push_back({rotation, origin_ - rotation * shift_m});
+    }
+    return poses;
+  }
+
+  bool keepIfBest(const CameraPose& pose) {
+    const Support support = supportOf(pose);
+    if (support.score <= most_.score) return false;
+    best_ = pose;
+    most_ = support;
+    return true;
+  }
+
+  /// Three points that lie close together, or far away, leave much of a pose to their noise; its inliers know better
+  /// (Chum, Matas and Kittler 2003).
+  void improveBest() {
+    for (int i = 0; i < kImprovements; ++i) {
+      const std::vector<std::size_t> inliers = inliersOf(matches_, *best_, tolerance_);
+      if (inliers.size() < kLeast) return;
+      const std::optional<Vector6> step = NormalEquations(matches_, inliers, *best_).step();
+      if (!step || !keepIfBest(moved(*best_, *step))) return;
+    }
+  }
+
+  Support supportOf(const CameraPose& pose) const {
+    const Eigen::Matrix3d camera_from_map = pose.rotation.conjugate().toRotationMatrix();
+    Support support;
+    for (const LandmarkMatch& match : matches_) {
+      const Eigen::Vector3d point = camera_from_map * (match.landmark_m - pose.position_m);
+      if (!(point.z() >= kNearest_m)) continue;
+      const double squared = (point.hnormalized() - match.normalised).squaredNorm() / (tolerance_ * tolerance_);
+      if (squared > 1.0) continue;
+      ++support.inliers;
+      support.score += 1.0 / (1.0 + kSharpness * squared);
+    }
+    return support;
+  }
+
+  const std::vector<LandmarkMatch>& matches_;
+  const double tolerance_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  std::minstd_rand random_;
+  std::optional<CameraPose> best_;
+  Support most_;  ///< of the best
+};
+
 /// Least squares on the inliers, which are chosen anew before each step.
 std::optional<SolvedPose> refined(const std::vector<LandmarkMatch>& matches, CameraPose pose, double tolerance,
                                   std::size_t min_inliers) {
   for (int i = 0; i < kMostSteps; ++i) {
     const std::vector<std::size_t> inliers = inliersOf(matches, pose, tolerance);
     if (inliers.size() < min_inliers) return std::nullopt;
-    const NormalEquations equations(matches, inliers, pose);
-    const Vector6 step = -equations.information.ldlt().solve(equations.gradient);
-    if (!step.allFinite()) return std::nullopt;
-    pose = moved(pose, step);
-    if (step.head<3>().norm() < 1e-5 && step.tail<3>().norm() < 1e-6) break;
+    const std::optional<Vector6> step = NormalEquations(matches, inliers, pose).step();
+    if (!step) return std::nullopt;
+    pose = moved(pose, *step);
+    if (step->head<3>().norm() < 1e-5 && step->tail<3>().norm() < 1e-6) break;
   }
   SolvedPose solved;
   solved.camera = pose;
@@ -157,7 +249,7 @@ std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, d
                                     std::size_t min_inliers) {
   min_inliers = std::max(min_inliers, kLeast);
   if (matches.size() < min_inliers) return std::nullopt;
-  const std::optional<CameraPose> start = robustPose(matches, tolerance);
+  const std::optional<CameraPose> start = Sampler(matches, tolerance).best();
   return start ? refined(matches, *start, tolerance, min_inliers) : std::nullopt;
 }
 
