@@ -46,6 +46,7 @@ struct LocalizeOptions {
   std::string bag;
   std::string output;
   std::string config;
+  std::string preset;
   std::string tracker;
   std::string features;
   std::string pose_source;

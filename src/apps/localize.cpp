@@ -13,6 +13,7 @@
 #include "evaluation/metrics.h"
 #include "evaluation/round_recorder.h"
 #include "evaluation/track_csv.h"
+#include "localization/presets.h"
 #include "node/node_config.h"
 #include "ros/camera_info.h"
 #include "visual_localization/bag/bag_reader.h"
@@ -36,6 +37,11 @@ NodeParameters configOf(const LocalizeOptions& options) {
     }
   }
   ParameterValues given;
+  try {
+    if (!options.preset.empty()) assignParameters(config, presetValues(options.preset));
+  } catch (const ParameterError& error) {
+    throw UsageError("--preset: " + std::string(error.what()));
+  }
   if (!options.tracker.empty()) given["tracker"] = options.tracker;
   if (!options.features.empty()) given["features"] = options.features;
   if (!options.pose_source.empty()) given["pose_source"] = options.pose_source;

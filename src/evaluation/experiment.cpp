@@ -5,6 +5,7 @@
 
 #include "base/text.h"
 #include "evaluation/experiment_methods.h"
+#include "localization/presets.h"
 #include "parameters/yaml_map.h"
 
 namespace visual_localization {
@@ -94,6 +95,18 @@ Config configured(YamlMap& yaml, const std::string& key, Config config = {}) {
   return config;
 }
 
+/// Defaults, then the preset, then what the experiment says.
+LocalizerConfig localizerConfig(YamlMap& yaml) {
+  LocalizerConfig config;
+  const std::string preset = yaml.text("preset", "");
+  try {
+    if (!preset.empty()) assignParameters(config, presetValues(preset));
+  } catch (const ParameterError& error) {
+    yaml.refuse("preset", error.what());
+  }
+  return configured(yaml, "parameters", config);
+}
+
 Experiment parse(YamlMap yaml) {
   Experiment experiment;
   experiment.name = readName(yaml, "experiment");
@@ -107,7 +120,7 @@ Experiment parse(YamlMap yaml) {
   experiment.found_within_m = yaml.real("found_within", experiment.found_within_m, 0.001, 1000.0);
   experiment.trace_start = yaml.count("trace_start", 0, 0, kMostStarts);
   experiment.map = configured(yaml, "map_parameters", placesOnly());
-  experiment.front_end = configured<LocalizerConfig>(yaml, "parameters");
+  experiment.front_end = localizerConfig(yaml);
   experiment.methods = readMethods(yaml, experiment.front_end);
   yaml.requireNoMore();
   const auto kidnapped = std::find_if(experiment.methods.begin(), experiment.methods.end(),

@@ -4,18 +4,34 @@
 #include <cmath>
 #include <utility>
 
+#include "visual_localization/geo/local_frame.h"
 #include "visual_localization/localization/particles.h"
 
 namespace visual_localization {
 namespace {
 
 /// Keeps a particle inside the area and stops the velocity that led out of it.
-void confine(Particle& particle, const Area& area) {
+void keepInside(Particle& particle, const Area& area) {
   for (int axis = 0; axis < 2; ++axis) {
     const double inside = std::clamp(particle.position_m[axis], area.min_m[axis], area.max_m[axis]);
     if (inside != particle.position_m[axis]) particle.velocity_m[axis] = 0.0;
     particle.position_m[axis] = inside;
   }
+}
+
+/// Keeps a particle this close to a position and stops the velocity that led away from it.
+void keepNear(Particle& particle, const Eigen::Vector2d& position_m, double farthest_m) {
+  const Eigen::Vector2d offset_m = particle.position_m - position_m;
+  const double distance_m = offset_m.norm();
+  if (distance_m <= farthest_m) return;
+  const Eigen::Vector2d away = offset_m / distance_m;
+  particle.position_m = position_m + farthest_m * away;
+  particle.velocity_m -= std::max(0.0, particle.velocity_m.dot(away)) * away;
+}
+
+Area wholeFrame() {
+  const Eigen::Vector2d farthest_m = Eigen::Vector2d::Constant(kLargestCoordinate_m);
+  return {-farthest_m, farthest_m};
 }
 
 /// Length of a displacement in shares of the area's range; an axis without range cannot be travelled.
@@ -49,7 +65,7 @@ void Dpso::reset() {
 }
 
 void Dpso::reset(const Prior& prior) {
-  tuning_ = {config_.v0, 0.0, config_.quantum_share, config_.phi2, false};
+  tuning_ = {config_.v0, 0.0, config_.quantum_share, config_.phi2, config_.phi0, false};
   attractor_m_.reset();
   centre_of_mass_m_.reset();
   speed_known_ = false;
@@ -62,8 +78,9 @@ void Dpso::reset(const Prior& prior) {
     for (int axis = 0; axis < 2; ++axis) {
       particle.velocity_m[axis] = random_.uniform(-1.0, 1.0) * config_.v0 * range_m()[axis];
     }
+    particle.velocity_m = limited(particle.velocity_m, config_.v0);
     particle.weight = 1.0 / static_cast<double>(particles_.size());
-    confine(particle, area_);
+    confine(particle);
   }
   assignKinds();
 }
@@ -74,6 +91,7 @@ void Dpso::configure(const TrackerConfig& config) {
   if (config_.v0 != before.v0) tuning_.v0 = config_.v0;
   if (config_.quantum_share != before.quantum_share) tuning_.quantum_share = config_.quantum_share;
   if (config_.phi2 != before.phi2) tuning_.phi2 = config_.phi2;
+  if (config_.phi0 != before.phi0) tuning_.phi0 = config_.phi0;
   tuning_.v0 = std::clamp(tuning_.v0, config_.v0_min, config_.v0_max);
   if (config_.recovery == "none" && tuning_.recovering) endRecovery();
   assignKinds();
@@ -87,7 +105,7 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
     } else if (seen_an_image_) {
       particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
     }
-    confine(particle, area_);
+    confine(particle);
   }
   seen_an_image_ = true;
   const std::size_t best = evaluate(input);
@@ -123,20 +141,37 @@ void Dpso::assignKinds() {
   }
 }
 
+/// The papers let particles go where they will; nothing is known of positions outside of the map's frame.
+void Dpso::confine(Particle& particle) const {
+  if (config_.confine == "box") return keepInside(particle, area_);
+  keepInside(particle, wholeFrame());
+  if (config_.confine == "none") return;
+  const std::size_t nearest = map_.nearest(particle.position_m).image;
+  keepNear(particle, map_.position_m(nearest), config_.corridor_m);
+}
+
 /// Kronfeld et al. (journal), Eq. 4 and 5, with r0 in [-1, 1] so that the swarm does not drift one way.
 void Dpso::move(Particle& particle) {
   const double factor = particle.kind == ParticleKind::kHighEnergy ? config_.high_energy_factor : 1.0;
+  Eigen::Vector2d wanted_m;
   for (int axis = 0; axis < 2; ++axis) {
-    const double range = range_m()[axis];
-    const double perturbation = config_.phi0 * random_.uniform(-1.0, 1.0) * range * tuning_.v0;
+    const double perturbation = tuning_.phi0 * random_.uniform(-1.0, 1.0) * range_m()[axis] * tuning_.v0;
     const double attraction =
         attractor_m_ ? tuning_.phi2 * random_.uniform(0.0, 1.0) * ((*attractor_m_)[axis] - particle.position_m[axis])
                      : 0.0;
-    const double limit = factor * tuning_.v0 * range;
-    const double wanted = config_.inertia * particle.velocity_m[axis] + perturbation + attraction;
-    particle.velocity_m[axis] = std::clamp(wanted, -limit, limit);
+    wanted_m[axis] = config_.inertia * particle.velocity_m[axis] + perturbation + attraction;
   }
+  particle.velocity_m = limited(wanted_m, factor * tuning_.v0);
   particle.position_m += particle.velocity_m;
+}
+
+/// `limit`: share of the range. The norm of Kronfeld et al. (journal), section 3, or each axis alone.
+Eigen::Vector2d Dpso::limited(const Eigen::Vector2d& velocity_m, double limit) const {
+  const Eigen::Vector2d range = range_m();
+  if (config_.speed_limit == "axis") return velocity_m.cwiseMax(-limit * range).cwiseMin(limit * range);
+  const double length = relativeLength(velocity_m, range);
+  const Eigen::Vector2d possible_m = (range.array() > 0.0).select(velocity_m.array(), 0.0);
+  return length > limit ? Eigen::Vector2d(limit / length * possible_m) : possible_m;
 }
 
 /// Kronfeld et al. (journal), Eq. 6; anywhere as long as nothing was recognised.
@@ -169,7 +204,7 @@ std::size_t Dpso::evaluate(const TrackerInput& input) {
 TrackerEstimate Dpso::estimate() const {
   const CloudMoments cloud = momentsOf(particles_);
   TrackerEstimate result;
-  result.position_m = attractor_m_.value_or(cloud.mean_m);
+  result.position_m = positionOf_m(cloud);
   result.training_image = map_.nearest(result.position_m).image;
   result.mode_covariance_m2 = covarianceAbout(result.position_m, particles_, config_.mode_radius_m);
   result.cloud_covariance_m2 = scatterAbout(result.position_m, particles_);
@@ -184,12 +219,36 @@ TrackerEstimate Dpso::estimate() const {
   return result;
 }
 
-/// v_sw: the quantum particles do not travel, so they do not count.
+/// The estimates that the conference paper names in section IV and V. Before any image was recognised they are the
+/// middle of the cloud.
+Eigen::Vector2d Dpso::positionOf_m(const CloudMoments& cloud) const {
+  if (!attractor_m_ || config_.position == "centre") return cloud.mean_m;
+  return config_.position == "best" ? *attractor_m_ : centreOfBest_m();
+}
+
+/// Of as many particles as are asked for, if so many have any weight.
+Eigen::Vector2d Dpso::centreOfBest_m() const {
+  std::vector<const Particle*> order;
+  for (const Particle& particle : particles_) order.push_back(&particle);
+  const auto count = std::min(order.size(), static_cast<std::size_t>(config_.best_particles));
+  std::partial_sort(
+      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
+      [](const Particle* a, const Particle* b) { return std::make_pair(b->weight, a) < std::make_pair(a->weight, b); });
+  Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
+  double weighted = 0.0;
+  for (std::size_t i = 0; i < count && order[i]->weight > 0.0; ++i) {
+    sum_m += order[i]->position_m;
+    weighted += 1.0;
+  }
+  return weighted > 0.0 ? Eigen::Vector2d(sum_m / weighted) : *attractor_m_;
+}
+
+/// Of which v_sw is the speed.
 Eigen::Vector2d Dpso::centreOfMass() const {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double count = 0.0;
   for (const Particle& particle : particles_) {
-    if (particle.kind == ParticleKind::kQuantum) continue;
+    if (particle.kind == ParticleKind::kQuantum && config_.speed_of == "moving") continue;
     sum += particle.position_m;
     count += 1.0;
   }
@@ -226,10 +285,11 @@ void Dpso::adaptDiversity(const Score& best) {
   tuning_.quantum_share =
       approach(tuning_.quantum_share, config_.quantum_share_max, config_.quantum_share, config_.recovery_step);
   tuning_.phi2 = approach(tuning_.phi2, config_.phi2_min, config_.phi2, config_.recovery_step);
+  tuning_.phi0 = approach(tuning_.phi0, config_.phi0_max, config_.phi0, config_.recovery_step);
 }
 
 void Dpso::endRecovery() {
-  tuning_ = {config_.v0, tuning_.speed_ema, config_.quantum_share, config_.phi2, false};
+  tuning_ = {config_.v0, tuning_.speed_ema, config_.quantum_share, config_.phi2, config_.phi0, false};
   speed_known_ = false;
   bad_images_ = 0;
 }

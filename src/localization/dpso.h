@@ -26,11 +26,15 @@ class Dpso final : public Tracker {
 
  private:
   void assignKinds();
+  void confine(Particle& particle) const;
   void move(Particle& particle);
+  Eigen::Vector2d limited(const Eigen::Vector2d& velocity_m, double limit) const;
   void moveQuantum(Particle& particle);
   bool isGuided() const;
   std::size_t evaluate(const TrackerInput& input);
   TrackerEstimate estimate() const;
+  Eigen::Vector2d positionOf_m(const CloudMoments& cloud) const;
+  Eigen::Vector2d centreOfBest_m() const;
   void adaptSpeed();
   void adaptDiversity(const Score& best);
   void endRecovery();

@@ -14,6 +14,25 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"dpso/inertia", "1", "share of the velocity that is kept (omega)"}, inertia, 0.0, 1.0);
   visitor.real({"dpso/phi0", "1", "weight of the random perturbation"}, phi0, 0.0, 10.0);
   visitor.real({"dpso/phi2", "1", "weight of the attraction to the best particle"}, phi2, 0.0, 4.0);
+  visitor.choice({"dpso/confine", "",
+                  "where particles may be: anywhere, as in the papers (none), in the bounding box of the training "
+                  "images, or not far from one of them (corridor)"},
+                 confine, {"none", "box", "corridor"});
+  visitor.real({"dpso/corridor", "m", "how far from the nearest training image a corridor reaches"}, corridor_m, 0.1,
+               10000.0);
+  visitor.choice({"dpso/speed_limit", "",
+                  "what is limited: the speed along each axis, or its norm, as in the papers, with each axis in shares "
+                  "of its range"},
+                 speed_limit, {"axis", "norm"});
+  visitor.choice({"dpso/speed_of", "",
+                  "whose centre of mass tells the speed of the swarm (v_sw): of all particles, as in the papers, or "
+                  "without those that do not travel, the quantum particles (moving)"},
+                 speed_of, {"moving", "all"});
+  visitor.choice({"dpso/position", "",
+                  "estimate: the best particle, the centre of the best ones, or the weighted centre of the swarm "
+                  "(conference paper, section V)"},
+                 position, {"best", "k_best", "centre"});
+  visitor.integer({"dpso/best_particles", "1", "how many are the best ones (k)"}, best_particles, 1, 100000);
   visitor.real({"dpso/quantum_share", "1", "share of quantum particles (q_r)"}, quantum_share, 0.0, 1.0);
   visitor.real({"dpso/quantum_std", "1", "spread of quantum particles, share of the area's range (q_d)"}, quantum_std,
                0.0, 1.0);
@@ -40,12 +59,15 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
                100000.0);
   visitor.real({"dpso/quantum_share_max", "1", "share of quantum particles in recovery"}, quantum_share_max, 0.0, 1.0);
   visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);
+  visitor.real({"dpso/phi0_max", "1", "random perturbation in recovery; more than phi0 in the conference paper alone"},
+               phi0_max, 0.0, 10.0);
   visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
                1000.0);
   visitor.atMost("dpso/v0_min", v0_min, "dpso/v0", v0);
   visitor.atMost("dpso/v0", v0, "dpso/v0_max", v0_max);
   visitor.atMost("dpso/quantum_share", quantum_share, "dpso/quantum_share_max", quantum_share_max);
   visitor.atMost("dpso/phi2_min", phi2_min, "dpso/phi2", phi2);
+  visitor.atMost("dpso/phi0", phi0, "dpso/phi0_max", phi0_max);
   // Not by the difference: 1 - 0.9 is less than 0.1.
   visitor.require(quantum_share_max + high_energy_share <= 1.0, "dpso/quantum_share_max",
                   parameters::toString(quantum_share_max),

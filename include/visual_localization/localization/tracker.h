@@ -21,6 +21,7 @@ struct TrackerTuning {
   double speed_ema = 0.0;      ///< smoothed speed of the swarm, same unit
   double quantum_share = 0.0;  ///< share of quantum particles
   double phi2 = 0.0;           ///< attraction of the best particle
+  double phi0 = 0.0;           ///< random perturbation
   bool recovering = false;     ///< the position is taken to be lost
 };
 

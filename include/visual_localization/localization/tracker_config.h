@@ -20,6 +20,12 @@ struct DpsoConfig {
   double inertia = 0.99;
   double phi0 = 0.3;
   double phi2 = 0.6;
+  std::string confine = "box";
+  double corridor_m = 20.0;
+  std::string speed_limit = "axis";
+  std::string speed_of = "moving";
+  std::string position = "best";
+  int best_particles = 5;
   double quantum_share = 0.10;
   double quantum_std = 0.15;
   double high_energy_share = 0.10;
@@ -36,6 +42,7 @@ struct DpsoConfig {
   double max_range_m = 500.0;
   double quantum_share_max = 0.20;
   double phi2_min = 0.01;
+  double phi0_max = 0.3;
   double mode_radius_m = 5.0;
 
   void declare(ParameterVisitor& visitor);

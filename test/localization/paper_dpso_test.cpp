@@ -1,0 +1,187 @@
+// Where the swarm differs from the papers, and the switches that make it as they say.
+
+#include <algorithm>
+#include <numeric>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "localization/dpso.h"
+#include "localization/presets.h"
+#include "test/support/synthetic.h"
+#include "test/support/world.h"
+#include "visual_localization/localization/localizer_config.h"
+
+namespace visual_localization {
+namespace {
+
+using test::onCircle;
+using test::roundWorld;
+using test::World;
+using testing::HasSubstr;
+
+constexpr int kImages = 60;
+
+/// Runs a swarm around the circle, with a dark image now and then, and has `check` look at it after each image.
+template <class Check>
+void drive(const DpsoConfig& config, const Check& check) {
+  World world = roundWorld();
+  Dpso swarm(world.map(), config, FitnessConfig(), 4);
+  for (int image = 0; image < kImages; ++image) {
+    const TrackerEstimate estimate = swarm.update(image % 10 == 9 ? world.inTheDark() : world.from(onCircle(image)));
+    check(world.map(), swarm, estimate);
+  }
+}
+
+bool isInside(const Area& area, const Eigen::Vector2d& position_m) {
+  return (position_m.array() >= area.min_m.array()).all() && (position_m.array() <= area.max_m.array()).all();
+}
+
+int countOutside(const std::string& confine) {
+  DpsoConfig config;
+  config.confine = confine;
+  int outside = 0;
+  drive(config, [&](const TrainingMap& map, const Dpso& swarm, const TrackerEstimate&) {
+    for (const Particle& particle : swarm.particles()) outside += isInside(map.area(), particle.position_m) ? 0 : 1;
+  });
+  return outside;
+}
+
+TEST(PaperDpso, ParticlesLeaveTheBoxUnlessItConfinesThem) {
+  EXPECT_EQ(countOutside("box"), 0);
+  EXPECT_GT(countOutside("none"), kImages);
+  EXPECT_GT(countOutside("corridor"), kImages);
+}
+
+TEST(PaperDpso, ACorridorReachesSoFarFromATrainingImage) {
+  DpsoConfig config;
+  config.confine = "corridor";
+  config.corridor_m = 3.0;
+  int at_its_border = 0;
+  drive(config, [&](const TrainingMap& map, const Dpso& swarm, const TrackerEstimate&) {
+    for (const Particle& particle : swarm.particles()) {
+      const double distance_m = map.nearest(particle.position_m).distance_m;
+      ASSERT_LE(distance_m, 3.0 + 1e-9);
+      at_its_border += distance_m > 3.0 - 1e-6 ? 1 : 0;
+    }
+  });
+  EXPECT_GT(at_its_border, kImages);
+}
+
+/// The fastest of the standard particles, and of those of high energy, by the norm in shares of the range and of v0.
+std::pair<double, double> fastest(const std::string& speed_limit) {
+  DpsoConfig config;
+  config.speed_limit = speed_limit;
+  config.adapt_speed = false;
+  config.recovery = "none";
+  std::pair<double, double> fastest;
+  drive(config, [&](const TrainingMap& map, const Dpso& swarm, const TrackerEstimate&) {
+    for (const Particle& particle : swarm.particles()) {
+      const double speed = particle.velocity_m.cwiseQuotient(map.area().range()).norm() / config.v0;
+      double& of_kind = particle.kind == ParticleKind::kHighEnergy ? fastest.second : fastest.first;
+      of_kind = std::max(of_kind, speed);
+    }
+  });
+  return fastest;
+}
+
+TEST(PaperDpso, TheSpeedLimitIsOfTheNormOrOfEachAxis) {
+  EXPECT_NEAR(fastest("norm").first, 1.0, 1e-9);
+  EXPECT_NEAR(fastest("norm").second, 3.0, 1e-9);
+  EXPECT_NEAR(fastest("axis").first, std::sqrt(2.0), 1e-3);
+  EXPECT_NEAR(fastest("axis").second, 3.0 * std::sqrt(2.0), 1e-2);
+}
+
+TEST(PaperDpso, TheEstimateIsTheBestParticleTheBestFewOrTheWeightedCentre) {
+  for (const char* position : {"best", "k_best", "centre"}) {
+    DpsoConfig config;
+    config.position = position;
+    config.best_particles = 3;
+    int apart = 0;
+    drive(config, [&](const TrainingMap&, const Dpso& swarm, const TrackerEstimate& estimate) {
+      if (!estimate.best.recognised) return;
+      std::vector<Particle> order = swarm.particles();
+      std::stable_sort(order.begin(), order.end(),
+                       [](const Particle& a, const Particle& b) { return a.weight > b.weight; });
+      Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
+      for (const Particle& particle : order) centre_m += particle.weight * particle.position_m;
+      const Eigen::Vector2d few_m = (order[0].position_m + order[1].position_m + order[2].position_m) / 3.0;
+      const std::string name = position;
+      const Eigen::Vector2d expected_m = name == "best" ? order[0].position_m : name == "k_best" ? few_m : centre_m;
+      ASSERT_LT((estimate.position_m - expected_m).norm(), 1e-9) << position;
+      apart += (few_m - centre_m).norm() > 1e-3 && (few_m - order[0].position_m).norm() > 1e-3 ? 1 : 0;
+    });
+    EXPECT_GT(apart, kImages / 2) << position;
+  }
+}
+
+/// v_sw of the second image, in shares of the range, and that of the particles that count.
+void expectSpeed(const std::string& speed_of, bool quantum_counts) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.speed_of = speed_of;
+  config.quantum_share = 0.2;
+  Dpso swarm(world.map(), config, FitnessConfig(), 4);
+  const auto centre_m = [&] {
+    Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
+    double count = 0.0;
+    for (const Particle& particle : swarm.particles()) {
+      if (particle.kind == ParticleKind::kQuantum && !quantum_counts) continue;
+      sum_m += particle.position_m;
+      count += 1.0;
+    }
+    return Eigen::Vector2d(sum_m / count);
+  };
+  swarm.update(world.from(onCircle(0.0)));
+  const Eigen::Vector2d before_m = centre_m();
+  swarm.update(world.from(onCircle(1.0)));
+  const double speed = (centre_m() - before_m).cwiseQuotient(world.map().area().range()).norm();
+  EXPECT_NEAR(swarm.tuning().speed_ema, speed, 1e-12) << speed_of;
+}
+
+TEST(PaperDpso, TheSpeedOfTheSwarmIsThatOfAllOrOfThoseThatTravel) {
+  expectSpeed("all", true);
+  expectSpeed("moving", false);
+}
+
+TEST(PaperDpso, RecoveryRaisesThePerturbationStepByStepAndEndsAtOnce) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.recovery = "paper";
+  config.recovery_patience = 2;
+  config.recovery_step = 0.5;
+  config.phi0_max = 0.9;
+  Dpso swarm(world.map(), config, FitnessConfig(), 4);
+  for (int image = 0; image < 30; ++image) swarm.update(world.from(onCircle(0.5 * image)));
+  EXPECT_DOUBLE_EQ(swarm.tuning().phi0, 0.3);
+  for (const double expected : {0.3, 0.6, 0.9, 0.9}) {
+    swarm.update(world.inTheDark());
+    EXPECT_NEAR(swarm.tuning().phi0, expected, 1e-12);
+  }
+  for (int image = 30; image < 80 && swarm.tuning().recovering; ++image)
+    swarm.update(world.from(onCircle(0.5 * image)));
+  EXPECT_FALSE(swarm.tuning().recovering);
+  EXPECT_DOUBLE_EQ(swarm.tuning().phi0, 0.3);
+}
+
+TEST(PaperDpso, ThePresetIsAConfiguration) {
+  LocalizerConfig config;
+  config.tracker = "pf_linear";
+  assignParameters(config, presetValues("paper"));
+  EXPECT_EQ(config.tracker, "pf_linear") << "what it does not name stays";
+  EXPECT_EQ(config.dpso.confine, "none");
+  EXPECT_EQ(config.dpso.speed_limit, "norm");
+  EXPECT_EQ(config.dpso.speed_of, "all");
+  EXPECT_EQ(config.dpso.recovery, "paper");
+  EXPECT_EQ(config.estimate, "image");
+  EXPECT_EQ(config.metric.pose_source, "place");
+  try {
+    presetValues("papers\n");
+    ADD_FAILURE();
+  } catch (const ParameterError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("'papers ' is not allowed: must be one of paper"));
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization
