@@ -22,6 +22,11 @@ def read_track(path: Path) -> list:
         return list(csv.DictReader(file))
 
 
+def positions(rows: list) -> list:
+    """All of a track but the times that it took."""
+    return [{name: value for name, value in row.items() if name not in TIMES} for row in rows]
+
+
 class ProgramsTest(ProgramTest):
     """All programs but `evaluate`."""
 
@@ -52,10 +57,17 @@ class ProgramsTest(ProgramTest):
         self.assert_refused(run('localize', '--map', MAP, '--bag', DRIVE, '--output', self.folder / 'no.csv',
                                 '--pose-source', 'gps'), 2, 'pose_source')
 
-    def test_same_seed_gives_the_same_track_another_seed_another_one(self):
-        def positions(rows):
-            return [{name: value for name, value in row.items() if name not in TIMES} for row in rows]
+    def test_the_preset_is_the_papers_to_the_letter(self):
+        config = self.folder / 'config.yaml'
+        config.write_text('dpso: {confine: corridor}\n', encoding='utf-8')
+        papers = positions(self.localize('--preset', 'paper'))
+        self.assertEqual(papers, positions(self.localize('--preset', 'paper', '--config', config)))
+        self.assertNotEqual(papers, positions(self.localize('--pose-source', 'place')))
+        self.assertEqual({row['source'] for row in self.localize('--preset', 'paper')} - {'PLACE', 'NONE'}, set())
+        result = run('localize', '--map', MAP, '--bag', DRIVE, '--preset', 'thesis', '--output', self.folder / 'out')
+        self.assert_refused(result, 2, "--preset: preset 'thesis' is not allowed: must be one of paper")
 
+    def test_same_seed_gives_the_same_track_another_seed_another_one(self):
         first = positions(self.localize('--seed', 5))
         self.assertEqual(first, positions(self.localize('--seed', 5)))
         self.assertNotEqual(first, positions(self.localize('--seed', 6)))
