@@ -194,7 +194,7 @@ def write_bag(path: Path, events: List[Event], start_s: float) -> None:
 def parse_arguments() -> argparse.Namespace:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('round', type=Path, help='folder that render_campus.py wrote')
+    parser.add_argument('round', type=Path, help='folder that render_world.py wrote')
     parser.add_argument('out', type=Path, help='bag to write')
     parser.add_argument('--seed', type=int, default=0, help='of the faults (default: %(default)s)')
     parser.add_argument('--start', type=float, default=1226500000.0, help='unix time (default: %(default).0f)')

@@ -17,8 +17,10 @@ class CameraPose:
     y_m: float
     z_m: float
     yaw_rad: float
-    pitch_rad: float
+    pitch_rad: float  # upwards
     render_seed: int  # other sensor noise in every frame
+    roll_rad: float = 0  # to the right
+    rates: Tuple[float, float, float] = (0, 0, 0)  # of roll, pitch and yaw while the shutter is open, rad/s
 
 
 class Loop:
@@ -61,7 +63,8 @@ class Drive:
         self._rng = rng
         self._spacing_m = spacing_m
         self.loop = Loop(building, 9.0 + rng.uniform(-.45, .45))
-        self.count = int(self.loop.length_m / spacing_m)
+        self.length_m = self.loop.length_m
+        self.count = int(self.length_m / spacing_m)
         self._phases = [rng.uniform(0, 6.28) for _ in range(4)]
 
     def poses(self) -> Iterator[CameraPose]:
@@ -76,3 +79,8 @@ class Drive:
             x -= lateral * math.sin(heading)
             y += lateral * math.cos(heading)
             yield CameraPose(index, index * 1.0, x, y, CAMERA_HEIGHT_M, yaw, pitch, rng.randrange(1 << 30))
+
+    def pose(self, index: int, s: float) -> CameraPose:
+        """The pose after `s` metres without wobble, to look around."""
+        x, y, heading = self.loop.at(s % self.length_m)
+        return CameraPose(index, index * 1.0, x, y, CAMERA_HEIGHT_M, heading, 0, 0)

@@ -1,4 +1,4 @@
-"""Builds the campus in Blender: the main building, what surrounds it, and what changes by day and round."""
+"""Builds the campus in Blender: the main building, what surrounds it, its light, and what changes by day and round."""
 import math
 import random
 from typing import List, Tuple
@@ -6,7 +6,9 @@ from typing import List, Tuple
 import bpy
 import numpy as np
 
-from campus import meshes, textures
+from worlds import lights, meshes, textures
+from worlds.campus_course import Drive
+from worlds.spec import Spec
 
 BUILDING = (66.0, 33.0)  # length along east and width along north, metres; its corner is the origin
 
@@ -25,7 +27,7 @@ def _beside_building(s: float, distance: float) -> Point:
     return -distance, 2 * (length + width) - s
 
 
-class World:
+class Campus:
     """The campus. `plan` and `noise` decide what never changes, `day` the parked cars, `round` the people.
 
     Call the methods in the order of `build`: they draw from the same generators.
@@ -201,3 +203,18 @@ class World:
                 height *= .6
             meshes.quad([(cx - tx, cy - ty, 0), (cx + tx, cy + ty, 0), (cx + tx, cy + ty, height),
                          (cx - tx, cy - ty, height)], material)
+
+
+def build(scene: 'bpy.types.Scene', spec: Spec) -> Drive:
+    """The campus of a seed in the light of its day, and the drive around its main building."""
+    sunny = spec.day == 'sunny'
+    plan = random.Random(spec.seed)
+    noise = np.random.default_rng(spec.seed)
+    day = random.Random(spec.seed * 100 + (7 if sunny else 8))
+    round_ = random.Random(spec.seed * 1000 + (10 if sunny else 20) + spec.round)
+    Campus(plan, noise, day, round_).build()
+    if sunny:
+        lights.add_clear_sky(scene, 38 + 2.5 * spec.round, 140 + 7 * spec.round, .35, .12)
+    else:
+        lights.add_overcast_sky(scene, .55 + .12 * spec.round, 1.2 + .1 * spec.round)
+    return Drive(BUILDING, spec.spacing_m, round_)

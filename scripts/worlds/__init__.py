@@ -1,0 +1,1 @@
+"""Procedural worlds to render: campus, town and meadow, with their textures, geometry and courses."""

@@ -1,0 +1,41 @@
+"""What distinguishes one round from another, and what a world prefers. Needs no Blender."""
+from dataclasses import dataclass
+from typing import Dict, Optional, Tuple
+
+Distortion = Tuple[float, float, float, float, float]  # plumb_bob: k1, k2, p1, p2, k3
+
+
+@dataclass(frozen=True)
+class Spec:
+    """Which world is rendered, in which light, and in which round."""
+
+    seed: int
+    day: str
+    round: int
+    spacing_m: float
+    raise_m: float = 0  # the camera
+    pitch_rad: float = 0  # the camera upwards
+
+
+@dataclass(frozen=True)
+class Light:
+    """What the light of a day means to the camera."""
+
+    shutter_s: float
+    noise: float  # grey levels of the read-out
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """What a world has unless it is asked for something else."""
+
+    days: Dict[str, Light]
+    spacing_m: float
+    pitch_deg: float
+    distortion: Optional[Distortion]  # None: Blender's own camera and tone curve
+
+
+_SUN, _CLOUDS = Light(.002, .8), Light(.008, 1.2)
+DEFAULTS = {
+    'campus': Defaults({'sunny': _SUN, 'cloudy': _CLOUDS}, .65, 0, None),
+}
