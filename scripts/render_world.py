@@ -126,8 +126,8 @@ def main() -> None:
     tilted = args.world != 'campus'
     if args.distortion:
         from worlds.sensor import SensorCamera  # needs OpenCV
-        camera = SensorCamera(scene, lens, args.samples, DEFAULTS[args.world].days[args.day], args.out)
-        camera.meter(drive, args.spacing / IMAGE_PERIOD_S)
+        camera = SensorCamera(scene, lens, args.samples, DEFAULTS[args.world].days[args.day], drive, args.out)
+        camera.meter(args.spacing / IMAGE_PERIOD_S)
     else:
         camera = PlainCamera(scene, args.field_of_view, args.size, args.samples)
     with open(args.out / 'pose.csv', 'w', newline='', encoding='utf-8') as file:

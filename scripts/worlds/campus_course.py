@@ -2,7 +2,7 @@
 import math
 import random
 from dataclasses import dataclass
-from typing import Iterator, Tuple
+from typing import Callable, Iterator, Tuple
 
 CAMERA_HEIGHT_M = .95
 
@@ -62,6 +62,7 @@ class Drive:
     def __init__(self, building: Tuple[float, float], spacing_m: float, rng: random.Random):
         self._rng = rng
         self._spacing_m = spacing_m
+        self.on_move: Callable[[float, float], None] = lambda x, y: None
         self.loop = Loop(building, 9.0 + rng.uniform(-.45, .45))
         self.length_m = self.loop.length_m
         self.count = int(self.length_m / spacing_m)

@@ -5,7 +5,7 @@ Local east-north-up frame, metres and radians; yaw 0 looks east, counter-clockwi
 import math
 import random
 from dataclasses import dataclass
-from typing import Iterator, List, Sequence, Tuple
+from typing import Callable, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
@@ -157,6 +157,7 @@ class HillyDrive:
         self.count = int(path.length_m / spacing_m)
         self._spacing_m = spacing_m
         self._rng = rng
+        self.on_move: Callable[[float, float], None] = lambda x, y: None  # called where an image is taken
 
     def poses(self) -> Iterator[CameraPose]:
         """The camera poses in order. They draw from the round's generator, so consume them once and all."""

@@ -42,8 +42,8 @@ def undistorted(u: np.ndarray, v: np.ndarray, coefficients: Sequence[float]) -> 
         x, y = x + (yy * du - xy * dv) / determinant, y + (xx * dv - xy * du) / determinant
     du, dv = distorted(x, y, coefficients)
     if not (np.hypot(du - u, dv - v) < 1e-9).all():
-        raise ValueError(f'distortion {",".join(f"{value:g}" for value in coefficients)} folds the image over inside its'
-                         ' corners: weaker coefficients or a smaller field of view')
+        text = ','.join(f'{value:g}' for value in coefficients)
+        raise ValueError(f'{text} folds the image over inside its corners: weaker ones or a smaller field of view')
     return x, y
 
 

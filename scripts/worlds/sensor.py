@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import List, Sequence
 
 import bpy
-import cv2
 import mathutils
 import numpy as np
 
@@ -16,7 +15,9 @@ from worlds.lens import Lens
 from worlds.renderer import add_camera, configure_renderer
 from worlds.spec import Light
 
-MIDDLE_GREY = .17  # of the scene's mean after exposure, linear
+os.environ['OPENCV_IO_ENABLE_OPENEXR'] = '1'  # OpenCV asks for it when it is loaded
+import cv2  # noqa: E402
+
 METER_EVERY_M = 5.0
 METER_TIME_S = 5.0  # the exposure follows so slowly
 LUMINANCE = (.2126, .7152, .0722)
@@ -42,8 +43,10 @@ def smoothed(gains: Sequence[float], spacing_s: float) -> np.ndarray:
 class SensorCamera:
     """Renders a wider pinhole image in linear light and develops it."""
 
-    def __init__(self, scene: 'bpy.types.Scene', lens: Lens, samples: int, light: Light, folder: Path):
+    def __init__(self, scene: 'bpy.types.Scene', lens: Lens, samples: int, light: Light, drive: HillyDrive,
+                 folder: Path):
         self._scene, self._lens, self._light, self._folder = scene, lens, light, folder
+        self._drive = drive
         self._samples = samples
         self._camera = add_camera(scene, 60)
         self._camera.data.sensor_fit = 'HORIZONTAL'
@@ -55,14 +58,16 @@ class SensorCamera:
         scene.render.image_settings.file_format = 'OPEN_EXR'
         scene.render.image_settings.color_mode = 'RGB'
         scene.render.image_settings.color_depth = '16'
-        scene.render.use_motion_blur = False
+        # Never off: when it is switched, the renderer loses texture coordinates of meshes that persist.
+        scene.render.use_motion_blur = True
         scene.render.motion_blur_shutter = 1.0
+        self._add_motion()
         self._gains: List[float] = []
         self._metered_m = METER_EVERY_M
 
-    def meter(self, drive: HillyDrive, speed_m_s: float) -> None:
+    def meter(self, speed_m_s: float) -> None:
         """Looks at the brightness along the course, or reads what was seen. So any frame can be rendered alone."""
-        path = self._folder / 'exposure.csv'
+        path, drive = self._folder / 'exposure.csv', self._drive
         count = max(1, round(drive.length_m / METER_EVERY_M))
         self._metered_m = drive.length_m / count
         if path.exists():
@@ -72,11 +77,11 @@ class SensorCamera:
                 return
         size, self._scene.cycles.samples = self._lens.pinhole_size, 4
         self._scene.render.resolution_x, self._scene.render.resolution_y = (side // 8 for side in size)
-        seen = [self._shoot(drive.pose(k, k * self._metered_m)) for k in range(count)]
+        seen = [self._shoot(drive.pose(k, k * self._metered_m))[size[1] // 24:] for k in range(count)]
         self._scene.render.resolution_x, self._scene.render.resolution_y = size
         self._scene.cycles.samples = self._samples
         # A bright sky counts only so much.
-        raw = [MIDDLE_GREY / max(1e-6, np.minimum(grey, 4 * np.median(grey) + 1e-6).mean()) for grey in seen]
+        raw = [self._light.grey / max(1e-6, np.minimum(grey, 4 * np.median(grey) + 1e-6).mean()) for grey in seen]
         self._gains = list(smoothed(raw, self._metered_m / speed_m_s))
         temporary = path.with_suffix(f'.{os.getpid()}')
         with open(temporary, 'w', newline='', encoding='utf-8') as file:
@@ -90,7 +95,10 @@ class SensorCamera:
         if path.exists():
             return
         self._scene.cycles.seed = pose.render_seed
-        linear = self._lens.remap(self._shoot(pose, speed_m_s)) * self._lens.vignette * self._gain(distance_m)
+        gain = self._gain(distance_m)
+        # What a pixel's few samples see by chance of a lamp must not outshine it.
+        self._scene.cycles.sample_clamp_direct, self._scene.cycles.sample_clamp_indirect = 8 / gain, 2 / gain
+        linear = self._lens.remap(self._shoot(pose, speed_m_s)) * self._lens.vignette * gain
         rng = np.random.default_rng(pose.render_seed)
         grey = tone_curve(linear) + rng.normal(0, self._light.noise, linear.shape)
         temporary = path.with_suffix('.part.png')
@@ -102,42 +110,45 @@ class SensorCamera:
         stops = np.log2(self._gains)
         return float(2 ** np.interp(position, np.arange(len(stops) + 1), np.append(stops, stops[0])))
 
-    def _place(self, pose: CameraPose, late_s: float, speed_m_s: float) -> None:
-        """The camera at so many seconds after the middle of the exposure."""
+    def _placed(self, pose: CameraPose, late_s: float, speed_m_s: float) -> Sequence[float]:
+        """Location and rotation of the camera so many seconds after the middle of the exposure."""
         body = rotation(pose.roll_rad, pose.pitch_rad, pose.yaw_rad)
-        shake = [rate * late_s for rate in pose.rates]
-        turned = body @ rotation(*shake)
+        turned = body @ rotation(*(rate * late_s for rate in pose.rates))
         # Blender's camera looks along -z, with y upwards.
         axes = np.stack([-turned[:, 1], turned[:, 2], -turned[:, 0]], 1)
-        self._camera.location = np.array([pose.x_m, pose.y_m, pose.z_m]) + body[:, 0] * speed_m_s * late_s
-        self._camera.rotation_quaternion = mathutils.Matrix(axes.tolist()).to_quaternion()
+        place = np.array([pose.x_m, pose.y_m, pose.z_m]) + body[:, 0] * speed_m_s * late_s
+        return [*place, *mathutils.Matrix(axes.tolist()).to_quaternion()]
+
+    def _add_motion(self) -> None:
+        """Curves of the camera's location and rotation. The shutter is open from frame 0.5 to frame 1.5."""
+        for frame in (0, 2):
+            self._camera.keyframe_insert('location', frame=frame)
+            self._camera.keyframe_insert('rotation_quaternion', frame=frame)
+        self._curves = list(self._camera.animation_data.action.fcurves)
+        for curve in self._curves:
+            for key in curve.keyframe_points:
+                key.interpolation = 'LINEAR'
+
+    def _move(self, pose: CameraPose, speed_m_s: float) -> None:
+        """Through the pose in the middle of the exposure."""
+        start, end = (self._placed(pose, sign * self._light.shutter_s, speed_m_s) for sign in (-1, 1))
+        if np.dot(start[3:], end[3:]) < 0:
+            end = [*end[:3], *(-value for value in end[3:])]  # the same rotation, not the long way round
+        for curve, first, last in zip(self._curves, start, end):
+            for key, value in zip(curve.keyframe_points, (first, last)):
+                key.co[1] = key.handle_left[1] = key.handle_right[1] = value
+            curve.update()
+        self._scene.frame_set(1)
 
     def _shoot(self, pose: CameraPose, speed_m_s: float = 0) -> np.ndarray:
         """The pinhole image as linear grey, rows from the top. With a speed it is blurred by the motion."""
-        if speed_m_s > 0:
-            self._animate(pose, speed_m_s)
-        self._scene.render.use_motion_blur = speed_m_s > 0
-        self._place(pose, 0, speed_m_s)
+        self._drive.on_move(pose.x_m, pose.y_m)
+        self._move(pose, speed_m_s)
         raw = self._folder / f'.raw_{os.getpid()}.exr'
         self._scene.render.filepath = str(raw)
         bpy.ops.render.render(write_still=True)
-        self._camera.animation_data_clear()
-        image = bpy.data.images.load(str(raw))
-        image.colorspace_settings.name = 'Non-Color'
-        width, height = image.size
-        pixels = np.empty(width * height * image.channels, np.float32)
-        image.pixels.foreach_get(pixels)
-        bpy.data.images.remove(image)
+        pixels = cv2.imread(str(raw), cv2.IMREAD_UNCHANGED)
+        if pixels is None:
+            raise SystemExit(f'render_world: {raw}: OpenCV of Blender\'s Python cannot read OpenEXR')
         raw.unlink()
-        return pixels.reshape(height, width, -1)[::-1, :, :3] @ np.array(LUMINANCE)
-
-    def _animate(self, pose: CameraPose, speed_m_s: float) -> None:
-        """The shutter is open from half a frame before to half a frame after frame 1."""
-        for frame, sign in ((0, -1), (2, 1)):
-            self._place(pose, sign * self._light.shutter_s, speed_m_s)
-            self._camera.keyframe_insert('location', frame=frame)
-            self._camera.keyframe_insert('rotation_quaternion', frame=frame)
-        for curve in self._camera.animation_data.action.fcurves:
-            for key in curve.keyframe_points:
-                key.interpolation = 'LINEAR'
-        self._scene.frame_set(1)
+        return pixels[..., ::-1] @ np.array(LUMINANCE)

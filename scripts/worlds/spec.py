@@ -23,6 +23,7 @@ class Light:
 
     shutter_s: float
     noise: float  # grey levels of the read-out
+    grey: float = .17  # of the mean of the lower two thirds after exposure, linear
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,10 @@ class Defaults:
     distortion: Optional[Distortion]  # None: Blender's own camera and tone curve
 
 
+_BARREL = (-.28, .09, 0, 0, 0)
 _SUN, _CLOUDS = Light(.002, .8), Light(.008, 1.2)
 DEFAULTS = {
     'campus': Defaults({'sunny': _SUN, 'cloudy': _CLOUDS}, .65, 0, None),
+    'town': Defaults({'sunny_high': _SUN, 'sunny_low': Light(.004, 1), 'overcast': _CLOUDS, 'dusk': Light(.03, 2.5, .08),
+                      'wet': Light(.012, 1.5)}, 1.0, 4, _BARREL),
 }
