@@ -5,6 +5,10 @@ JPEG images at 1 Hz on /stereo/left/image_raw/compressed, a DGPS at 5 Hz on /gps
 one (noise, slow bias, multipath bends, gaps, stretches without a fix, single spikes), and the exact positions
 on /ground_truth/fix for judging. The same seed gives the same faults. With --camera-info, every image has a calibration
 on /stereo/left/camera_info beside it.
+
+A round whose pose.csv has roll and pitch (town, meadow), or any with --full, also has the calibration camera.yaml of
+its folder, fixes with the height of the camera, its exact pose (x ahead, y left, z up) in the local east-north-up frame
+on /ground_truth/pose, and wheel odometry that slips on /odom.
 """
 import argparse
 import copy
@@ -21,7 +25,9 @@ import rosbag
 import rospy
 from camera_info import TOPIC as CAMERA_INFO_TOPIC
 from camera_info import read_camera_info
+from geometry_msgs.msg import PoseStamped, Quaternion
 from sensor_msgs.msg import CameraInfo, CompressedImage, NavSatFix, NavSatStatus
+from wheel_odometry import events as odometry_events
 
 # Origin of the local east-north frame.
 LATITUDE_DEG, LONGITUDE_DEG, ALTITUDE_M = 48.53450, 9.07130, 445.0
@@ -41,11 +47,16 @@ Event = Tuple[float, str, object]
 
 @dataclass
 class Round:
-    """The rendered images' stamps and positions, seconds and metres east and north."""
+    """The rendered images' stamps and poses, seconds, metres east, north and up, and radians by REP 103."""
 
     stamps: np.ndarray
     east: np.ndarray
     north: np.ndarray
+    up: np.ndarray
+    roll: np.ndarray
+    pitch: np.ndarray
+    yaw: np.ndarray
+    tilted: bool  # does the file know roll and pitch?
 
 
 @dataclass
@@ -58,6 +69,7 @@ class Track:
     status: np.ndarray
     variance: np.ndarray
     lost: np.ndarray  # no message at all
+    up: Optional[np.ndarray] = None  # None: the ground is level
 
 
 def to_geodetic(east: float, north: float) -> Tuple[float, float]:
@@ -75,7 +87,8 @@ def read_round(folder: Path, rng: np.random.Generator) -> Round:
     with open(folder / 'pose.csv', newline='', encoding='utf-8') as file:
         rows = list(csv.DictReader(file))
     stamps = np.array([float(row['t']) for row in rows]) + rng.normal(0, STAMP_JITTER_S, len(rows))
-    return Round(stamps, np.array([float(row['x']) for row in rows]), np.array([float(row['y']) for row in rows]))
+    columns = [np.array([float(row.get(name, 0)) for row in rows]) for name in ('x', 'y', 'z', 'roll', 'pitch', 'yaw')]
+    return Round(stamps, *columns, tilted='roll' in rows[0])
 
 
 def drive_with_gps(drive: Round, rng: np.random.Generator) -> Track:
@@ -88,6 +101,11 @@ def drive_with_gps(drive: Round, rng: np.random.Generator) -> Track:
     north = north + rng.normal(0, GPS_NOISE_M, count) + .25 * np.cos(stamps / 33 + rng.uniform(0, 6))
     return Track(stamps, east, north, np.full(count, NavSatStatus.STATUS_GBAS_FIX), np.full(count, .3 ** 2),
                  np.zeros(count, bool))
+
+
+def add_heights(track: Track, drive: Round, rng: np.random.Generator) -> None:
+    """Heights of the ground, twice as noisy as the position."""
+    track.up = np.interp(track.stamps, drive.stamps, drive.up) + rng.normal(0, 2 * GPS_NOISE_M, len(track.stamps))
 
 
 def add_faults(track: Track, end_s: float, rng: np.random.Generator) -> List[str]:
@@ -134,7 +152,8 @@ def add_spikes(track: Track, rng: np.random.Generator) -> str:
     return 'spikes at ' + ', '.join(f'{track.stamps[index]:.0f} s' for index in indices)
 
 
-def make_fix(east: float, north: float, status: int, variance: float, up_variance: float) -> NavSatFix:
+def make_fix(east: float, north: float, status: int, variance: float, up_variance: float,
+             up: float = 0.0) -> NavSatFix:
     """A message; NaN throughout when the position is not known."""
     fix = NavSatFix()
     fix.header.frame_id = 'gps'
@@ -144,7 +163,7 @@ def make_fix(east: float, north: float, status: int, variance: float, up_varianc
         fix.latitude = fix.longitude = fix.altitude = float('nan')
     else:
         fix.latitude, fix.longitude = to_geodetic(east, north)
-        fix.altitude = ALTITUDE_M
+        fix.altitude = ALTITUDE_M + up
     fix.position_covariance = [variance, 0, 0, 0, variance, 0, 0, 0, up_variance]
     fix.position_covariance_type = NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN
     return fix
@@ -163,22 +182,40 @@ def make_image(path: Path, index: int, quality: int) -> CompressedImage:
     return image
 
 
-def image_events(folder: Path, drive: Round, quality: int, camera_info: Optional[CameraInfo]) -> Iterator[Event]:
-    """Every image, its calibration if there is one, and its exact position, at the same stamp."""
+def make_pose(drive: Round, index: int) -> PoseStamped:
+    """The exact pose of the camera."""
+    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in (
+        drive.roll[index], drive.pitch[index], drive.yaw[index]))
+    message = PoseStamped()
+    message.header.frame_id = 'enu'
+    place = message.pose.position
+    place.x, place.y, place.z = float(drive.east[index]), float(drive.north[index]), float(drive.up[index])
+    message.pose.orientation = Quaternion(sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
+                                          cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
+    return message
+
+
+def image_events(folder: Path, drive: Round, quality: int, camera_info: Optional[CameraInfo],
+                 full: bool) -> Iterator[Event]:
+    """Every image, its calibration if there is one, and its exact position and pose, at the same stamp."""
     for index, stamp in enumerate(drive.stamps):
         image = make_image(folder / f'frame_{index:04d}.png', index, quality)
         yield stamp, '/stereo/left/image_raw/compressed', image
         if camera_info is not None:
             yield stamp, CAMERA_INFO_TOPIC, copy.deepcopy(camera_info)
-        truth = make_fix(drive.east[index], drive.north[index], NavSatStatus.STATUS_GBAS_FIX, 1e-4, 1e-4)
+        truth = make_fix(drive.east[index], drive.north[index], NavSatStatus.STATUS_GBAS_FIX, 1e-4, 1e-4,
+                         drive.up[index] if full else 0)
         yield stamp, '/ground_truth/fix', truth
+        if full:
+            yield stamp, '/ground_truth/pose', make_pose(drive, index)
 
 
 def gps_events(track: Track) -> Iterator[Event]:
     """Every fix that arrives."""
     for index in np.flatnonzero(~track.lost):
         variance = track.variance[index]
-        fix = make_fix(track.east[index], track.north[index], int(track.status[index]), variance, 4 * variance)
+        fix = make_fix(track.east[index], track.north[index], int(track.status[index]), variance, 4 * variance,
+                       0 if track.up is None else track.up[index])
         yield track.stamps[index], '/gps/fix', fix
 
 
@@ -200,6 +237,8 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--start', type=float, default=1226500000.0, help='unix time (default: %(default).0f)')
     parser.add_argument('--quality', type=int, default=92, help='of the JPEGs (default: %(default)s)')
     parser.add_argument('--camera-info', type=Path, help='calibration of the camera, YAML')
+    parser.add_argument('--full', action='store_true', help='calibration, heights, exact poses and odometry, also for '
+                        'a round on level ground (others always have them)')
     parser.add_argument('--perfect', action='store_true', help='a DGPS without faults')
     return parser.parse_args()
 
@@ -211,8 +250,17 @@ def main() -> None:
     drive = read_round(args.round, rng)
     track = drive_with_gps(drive, rng)
     faults = [] if args.perfect else add_faults(track, drive.stamps[-1], rng)
-    camera_info = read_camera_info(args.camera_info) if args.camera_info else None
-    events = list(image_events(args.round, drive, args.quality, camera_info)) + list(gps_events(track))
+    full = args.full or drive.tilted
+    calibration = args.camera_info or (args.round / 'camera.yaml' if full else None)
+    if calibration is not None and not calibration.is_file():
+        raise SystemExit(f'make_round_bag: {calibration} does not exist; another calibration: --camera-info FILE')
+    camera_info = read_camera_info(calibration) if calibration else None
+    events = list(image_events(args.round, drive, args.quality, camera_info, full))
+    if full:
+        extra = np.random.default_rng([args.seed, 1])  # of its own: the faults stay those of their seed
+        add_heights(track, drive, extra)
+        events += odometry_events(drive.stamps, np.stack([drive.east, drive.north, drive.up], 1), extra)
+    events += gps_events(track)
     write_bag(args.out, events, args.start)
     print(f'{args.out}: {len(drive.stamps)} images, {os.path.getsize(args.out) / 1e6:.1f} MB')
     for fault in faults:
