@@ -18,7 +18,7 @@ def leaf_textures(noise: np.random.Generator) -> list:
     """Materials of leaves: one a colour, each with light and dark specks."""
     materials = []
     for green in GREENS:
-        shade = (.5 + 2.4 * fractal(64, 64, noise, 5) * noise.random((64, 64)))[..., None]
+        shade = (.7 + 3.2 * fractal(64, 64, noise, 5) * noise.random((64, 64)))[..., None]
         materials.append(meshes.image_material((shade * np.array(green) * 1.3).clip(0, 1), 'leaves', 1.0))
     return materials
 
@@ -82,9 +82,9 @@ class Planter:
                                z + height + rng.uniform(.1, 2.0) * scale])
             self._batch.cylinder(top, tuple(middle), .06 * scale, self._bark, 5, .02)
             radius = rng.uniform(.7, 1.15) * scale
-            rays = noise.standard_normal((130, 3))
-            rays *= (noise.uniform(.35, 1.1, (130, 1)) ** .6 * radius) / np.linalg.norm(rays, axis=1)[:, None]
-            scatter(self._batch, self._blown(middle + rays, z, 1), .34 * scale, leaves, noise)
+            rays = noise.standard_normal((190, 3))
+            rays *= (noise.uniform(.35, 1.1, (190, 1)) ** .6 * radius) / np.linalg.norm(rays, axis=1)[:, None]
+            scatter(self._batch, self._blown(middle + rays, z, 1), .28 * scale, leaves, noise)
 
     def conifer(self, foot: Corner, rng: random.Random, scale: float) -> None:
         """A spruce: leaves on a cone."""
@@ -100,21 +100,21 @@ class Planter:
 
     def bush(self, foot: Corner, rng: random.Random, scale: float) -> None:
         """Leaves down to the ground."""
-        count = int(160 * scale)
+        count = int(300 * scale)
         rays = self._noise.standard_normal((count, 3))
         rays *= (self._noise.uniform(.4, 1, (count, 1)) * .8 * scale) / np.linalg.norm(rays, axis=1)[:, None]
         centres = np.array(foot) + np.abs(rays) * np.sign(rays * [1, 1, 0] + [0, 0, 1])
-        scatter(self._batch, self._blown(centres, foot[2], .5), .26, rng.choice(self._leaves), self._noise)
+        scatter(self._batch, self._blown(centres, foot[2], .5), .19, rng.choice(self._leaves), self._noise)
 
     def hedge(self, start: Tuple[float, float], end: Tuple[float, float], size: Tuple[float, float], relief,
               rng: random.Random) -> None:
         """Leaves in a box along a line; `size`: width and height."""
         length = math.hypot(end[0] - start[0], end[1] - start[1])
-        count = int(length * (2 * size[1] + size[0]) * 26)
+        count = int(length * (2 * size[1] + size[0]) * 55)
         noise, (dx, dy) = self._noise, ((end[0] - start[0]) / length, (end[1] - start[1]) / length)
         s, side = noise.uniform(0, length, count), noise.choice([-.5, -.4, .4, .5, 0], count)
         up = np.where(side == 0, size[1] * noise.uniform(.92, 1.05, count), size[1] * noise.random(count))
         across = np.where(side == 0, noise.uniform(-.5, .5, count), side) * size[0] + noise.normal(0, .03, count)
         x, y = start[0] + s * dx - across * dy, start[1] + s * dy + across * dx
         centres = np.stack([x, y, relief.height(x, y) + up], 1)
-        scatter(self._batch, self._blown(centres, centres[:, 2].min(), .25), .24, rng.choice(self._leaves), noise)
+        scatter(self._batch, self._blown(centres, centres[:, 2].min(), .25), .17, rng.choice(self._leaves), noise)

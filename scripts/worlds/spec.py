@@ -40,6 +40,7 @@ _BARREL = (-.28, .09, 0, 0, 0)
 _SUN, _CLOUDS = Light(.002, .8), Light(.008, 1.2)
 DEFAULTS = {
     'campus': Defaults({'sunny': _SUN, 'cloudy': _CLOUDS}, .65, 0, None),
-    'town': Defaults({'sunny_high': _SUN, 'sunny_low': Light(.004, 1), 'overcast': _CLOUDS, 'dusk': Light(.03, 2.5, .08),
-                      'wet': Light(.012, 1.5)}, 1.0, 4, _BARREL),
+    'town': Defaults({'sunny_high': _SUN, 'sunny_low': Light(.004, 1), 'overcast': _CLOUDS,
+                      'dusk': Light(.03, 2.5, .08), 'wet': Light(.012, 1.5)}, 1.0, 4, _BARREL),
+    'meadow': Defaults({'sunny': _SUN, 'overcast': _CLOUDS}, .65, 0, _BARREL),
 }

@@ -133,7 +133,7 @@ def ground_material(rgb: np.ndarray, wet: bool) -> 'bpy.types.Material':
     grain, where = tree.nodes.new('ShaderNodeTexNoise'), tree.nodes.new('ShaderNodeTexCoord')
     grain.inputs['Scale'].default_value = 4.5
     grain.inputs['Detail'].default_value = 9
-    grain.inputs['Roughness'].default_value = .75
+    grain.inputs['Roughness'].default_value = .85
     tree.links.new(where.outputs['Object'], grain.inputs['Vector'])
     contrast = tree.nodes.new('ShaderNodeMapRange')
     contrast.inputs['From Min'].default_value, contrast.inputs['From Max'].default_value = .41, .59
