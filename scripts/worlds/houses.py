@@ -30,6 +30,11 @@ class Site:
         return (self.front[0] + u * self.along[0] + v * self.back[0],
                 self.front[1] + u * self.along[1] + v * self.back[1], z)
 
+    def outline(self, width_m: float, depth_m: float) -> np.ndarray:
+        """The corners of a house here."""
+        w, d = width_m / 2, depth_m
+        return np.array([self.at(u, v)[:2] for u, v in ((-w, 0), (w, 0), (w, d), (-w, d))])
+
 
 class House:
     """Walls, roof, chimney and steps of one design."""

@@ -98,7 +98,9 @@ class Town:
     def _add_rows(self, designs: List[House]) -> None:
         """Twin rows first: nothing may be in their way. Then long streets before short ones."""
         twins = [side for street, sign, side in self._sides if street in TWIN_ROWS and sign == 1]
-        row = self._row(min(side[3] for side in twins) - 2 * JUNCTION_M, designs)
+        row = max((self._twin_row(twins, designs) for _ in range(30)),
+                  key=lambda lots: sum(lot.house is not None for lot in lots))
+        designs = [house for house in designs if house not in [lot.house for lot in row]]
         state = self._rng.getstate()
         for side in twins:
             self._rng.setstate(state)
@@ -110,13 +112,30 @@ class Town:
                 designs = self._rng.sample(spare, len(spare))
             self._place_row(side, self._row(side[3] - 2 * JUNCTION_M, designs))
 
+    def _twin_row(self, twins: List[Side], designs: List[House]) -> List[Lot]:
+        """A row whose houses have room in both streets."""
+        row = self._row(min(side[3] for side in twins) - 2 * JUNCTION_M, self._rng.sample(designs, 8))
+        return [lot if all(map(self._is_free, outlines)) else lot._replace(house=None)
+                for lot, *outlines in zip(row, *(self._outlines(side, row) for side in twins))]
+
+    @staticmethod
+    def _sites(side: Side, row: List[Lot]) -> List[Site]:
+        """Where the houses of a row stand."""
+        start, along, out, _ = side
+        ends = JUNCTION_M + np.cumsum([lot.width_m for lot in row])
+        return [Site(tuple(start + (end - lot.width_m / 2) * along + lot.setback_m * out), tuple(along), tuple(out))
+                for lot, end in zip(row, ends)]
+
+    def _outlines(self, side: Side, row: List[Lot]) -> List[np.ndarray]:
+        return [site.outline(lot.house.width_m, lot.house.depth_m) if lot.house else np.full((4, 2), 1e6)
+                for lot, site in zip(row, self._sites(side, row))]
+
     def _place_row(self, side: Side, row: List[Lot]) -> None:
         start, along, out, _ = side
         s = JUNCTION_M
-        for lot in row:
+        for lot, site in zip(row, self._sites(side, row)):
             middle = start + (s + lot.width_m / 2) * along
             a, b = (start + (s + d) * along + (FENCE_M + .3) * out for d in (0, lot.width_m))
-            site = Site(tuple(middle + lot.setback_m * out), tuple(along), tuple(out))
             if lot.house and self._place_house(lot, site):
                 gap = .7 * along
                 self._fences.add(lot.fence, a, middle + (FENCE_M + .3) * out - gap, self._rng)
@@ -130,8 +149,7 @@ class Town:
     def _place_house(self, lot: Lot, site: Site) -> bool:
         """Unless something is in its way."""
         house = lot.house
-        w, d = house.width_m / 2, house.depth_m
-        corners = np.array([site.at(u, v)[:2] for u, v in ((-w, 0), (w, 0), (w, d), (-w, d))])
+        corners = site.outline(house.width_m, house.depth_m)
         if not self._is_free(corners):
             return False
         self._footprints.append(corners)
@@ -294,7 +312,7 @@ def add_light(scene: 'bpy.types.Scene', spec: Spec) -> None:
     rng = random.Random(f'town sky {spec.seed} {spec.day} {spec.round}')
     if spec.day in ('sunny_high', 'sunny_low'):
         elevation = rng.uniform(44, 56) if spec.day == 'sunny_high' else rng.uniform(9, 14)
-        lights.add_clear_sky(scene, elevation, rng.uniform(0, 360), .35, .12)
+        lights.add_clear_sky(scene, elevation, rng.uniform(0, 360), .35 if spec.day == 'sunny_high' else .8, .12)
         lights.add_clouds(scene, .32, 9, rng.randrange(1000))
         return
     strength = {'overcast': .8, 'wet': .6, 'dusk': .012}[spec.day]
