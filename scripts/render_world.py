@@ -60,15 +60,25 @@ def number(low: float, high: float):
     return parse
 
 
+def whole(low: int, high: int):
+    """A parser of whole numbers in a range."""
+    def parse(text: str) -> int:
+        if not re.fullmatch('[0-9]{1,10}', text) or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from {low} to {high}")
+        return int(text)
+    return parse
+
+
 def parse_arguments() -> argparse.Namespace:
     """The arguments behind Blender's own `--`."""
     arguments = sys.argv[sys.argv.index('--') + 1:] if '--' in sys.argv else []
     parser = argparse.ArgumentParser(prog='render_world.py', description=__doc__.splitlines()[0])
     parser.add_argument('--world', choices=list(DEFAULTS), default='campus', help='(default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=1, help='another seed is another world (default: %(default)s)')
+    parser.add_argument('--seed', type=whole(0, 10**9), default=1,
+                        help='another seed is another world (default: %(default)s)')
     parser.add_argument('--day', help='light and parked cars: ' + '; '.join(
         f'{name}: {", ".join(world.days)}' for name, world in DEFAULTS.items()) + ' (default: the first)')
-    parser.add_argument('--round', type=int, default=0, help='people, path offsets, height of the sun')
+    parser.add_argument('--round', type=whole(0, 10**6), default=0, help='people, path offsets, height of the sun')
     parser.add_argument('--out', type=Path, required=True, help='folder to write to')
     parser.add_argument('--spacing', type=number(.05, 20),
                         help='metres between images (default: 0.65, in the town 1)')
@@ -76,15 +86,16 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--field-of-view', type=number(10, 120), default=62,
                         help='horizontal and without distortion, degrees (default: %(default)s)')
     parser.add_argument('--distortion', type=coefficients, metavar='K1,K2,P1,P2,K3',
-                        help='plumb_bob; also vignetting, exposure and motion blur (default: none on the campus, '
-                        'elsewhere -0.28,0.09,0,0,0)')
+                        help='plumb_bob, written --distortion=-0.28,0.09,0,0,0; also vignetting, exposure and motion '
+                        'blur (default: none on the campus, elsewhere as written here)')
     parser.add_argument('--raise', dest='raise_m', type=number(-.9, 20), default=0,
                         help='the camera by so many metres (default: %(default)s)')
     parser.add_argument('--pitch', type=number(-60, 60), help='the camera upwards, degrees (default: in the town 4)')
-    parser.add_argument('--samples', type=int, default=12, help='light samples a pixel (default: %(default)s)')
-    parser.add_argument('--first', type=int, default=0, help='first frame to render')
-    parser.add_argument('--last', type=int, default=10**9, help='last frame to render')
-    parser.add_argument('--every', type=int, default=1, help='render only every so many frames')
+    parser.add_argument('--samples', type=whole(1, 4096), default=12,
+                        help='light samples a pixel (default: %(default)s)')
+    parser.add_argument('--first', type=whole(0, 10**9), default=0, help='first frame to render')
+    parser.add_argument('--last', type=whole(0, 10**9), default=10**9, help='last frame to render')
+    parser.add_argument('--every', type=whole(1, 10**9), default=1, help='render only every so many frames')
     args = parser.parse_args(arguments)
     world = DEFAULTS[args.world]
     args.day = args.day or next(iter(world.days))

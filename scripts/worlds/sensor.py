@@ -97,7 +97,7 @@ class SensorCamera:
         self._scene.cycles.seed = pose.render_seed
         gain = self._gain(distance_m)
         # What a pixel's few samples see by chance of a lamp must not outshine it.
-        self._scene.cycles.sample_clamp_direct, self._scene.cycles.sample_clamp_indirect = 8 / gain, 2 / gain
+        self._scene.cycles.sample_clamp_direct, self._scene.cycles.sample_clamp_indirect = 6 / gain, .5 / gain
         linear = self._lens.remap(self._shoot(pose, speed_m_s)) * self._lens.vignette * gain
         rng = np.random.default_rng(pose.render_seed)
         grey = tone_curve(linear) + rng.normal(0, self._light.noise, linear.shape)

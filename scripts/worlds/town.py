@@ -62,7 +62,7 @@ class Town:
         self._add_skyline()
         if self._dusk:
             self._light_windows()
-            self._furniture.glow(25)
+            self._furniture.glow(4)
         self._batch.build(self._scene)
         return self._furniture.lamps
 
@@ -290,7 +290,7 @@ class Town:
                 surface = glows[kind].node_tree.nodes['Principled BSDF']
                 texture = glows[kind].node_tree.nodes['Image Texture']
                 glows[kind].node_tree.links.new(texture.outputs['Color'], surface.inputs['Emission'])
-                surface.inputs['Emission Strength'].default_value = .45 + .25 * kind
+                surface.inputs['Emission Strength'].default_value = .05 + .04 * kind
                 glows[kind].cycles.sample_as_light = False
             self._batch.quad(corners, glows[kind])
 
