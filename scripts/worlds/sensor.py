@@ -82,7 +82,8 @@ class SensorCamera:
         self._scene.cycles.samples = self._samples
         # A bright sky counts only so much.
         raw = [self._light.grey / max(1e-6, np.minimum(grey, 4 * np.median(grey) + 1e-6).mean()) for grey in seen]
-        self._gains = list(smoothed(raw, self._metered_m / speed_m_s))
+        # As the file has them, so that a frame does not depend on who measured.
+        self._gains = [float(f'{gain:.6g}') for gain in smoothed(raw, self._metered_m / speed_m_s)]
         temporary = path.with_suffix(f'.{os.getpid()}')
         with open(temporary, 'w', newline='', encoding='utf-8') as file:
             writer = csv.writer(file)
