@@ -219,7 +219,8 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   std::vector<std::vector<double>> errors_px(sessions_.size());
   std::vector<std::size_t> tracked(sessions_.size());
   std::vector<ImageGeometry> images(images_.size());
-  for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i);
+  const std::vector<std::set<std::uint32_t>> tied = tiedSessions();
+  for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i, tied[i]);
   for (const Landmark& landmark : problem_.landmarks) {
     const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_.cameras);
     ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
@@ -246,11 +247,35 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   return geometries;
 }
 
-ImageGeometry Reconstruction::imageAt(std::size_t image) const {
+/// The sessions that show landmarks of each image, its own included.
+std::vector<std::set<std::uint32_t>> Reconstruction::tiedSessions() const {
+  std::vector<std::set<std::uint32_t>> tied(images_.size());
+  for (std::size_t i = 0; i < images_.size(); ++i) tied[i].insert(images_[i].session);
+  for (const Landmark& landmark : problem_.landmarks) {
+    std::set<std::uint32_t> sessions;
+    for (const LandmarkSighting& sighting : landmark.sightings) sessions.insert(images_[sighting.image].session);
+    if (sessions.size() == 1) continue;
+    for (const LandmarkSighting& sighting : landmark.sightings)
+      tied[sighting.image].insert(sessions.begin(), sessions.end());
+  }
+  return tied;
+}
+
+/// Receivers err slowly, each recording by itself: where several are tied, their errors average out.
+double Reconstruction::fixBias_m(const std::set<std::uint32_t>& tied) const {
+  double information = 0.0;
+  for (const std::uint32_t session : tied) {
+    const double bias_m = std::max(config_.fix_bias * fix_sigmas_m_[session], 0.01);
+    information += 1.0 / (bias_m * bias_m);
+  }
+  return 1.0 / std::sqrt(information);
+}
+
+ImageGeometry Reconstruction::imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const {
   ImageGeometry geometry;
   geometry.camera = problem_.cameras[image];
   Eigen::Matrix<double, 6, 1> sigmas;
-  const double bias_m = std::max(config_.fix_bias * fix_sigmas_m_[sessionOf(image)], 0.01);
+  const double bias_m = fixBias_m(tied);
   sigmas << bias_m, bias_m, bias_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
   geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
   return geometry;

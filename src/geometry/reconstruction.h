@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <vector>
 
 #include <Eigen/Core>
@@ -78,7 +79,9 @@ class Reconstruction {
   bool isAstray(std::size_t image) const;
   double error(const Landmark& landmark, const LandmarkSighting& sighting) const;
   double distance_m(const Landmark& landmark) const;
-  ImageGeometry imageAt(std::size_t image) const;
+  std::vector<std::set<std::uint32_t>> tiedSessions() const;
+  double fixBias_m(const std::set<std::uint32_t>& tied) const;
+  ImageGeometry imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const;
   void addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;

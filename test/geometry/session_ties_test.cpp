@@ -59,6 +59,21 @@ TEST(SessionGeometry, TiesSessionsWhereTheyOverlap) {
   for (const SessionGeometry& session : tied) EXPECT_EQ(imagesIn(session), session.images.size());
 }
 
+TEST(SessionGeometry, TwoTiedSessionsKnowWhereTheyAreBetterThanOne) {
+  std::mt19937 random(21);
+  const auto world = test::pointsAlong(test::drive({}), kDensity, random);
+  const std::vector<RecordedDrive> drives{again(world, {0.1, 0.0}, 22), again(world, {-0.1, 0.0}, 23)};
+  const auto alone = adjustSessions({drives[0].unadjusted()}, {}, 1);
+  const auto tied = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  for (const SessionGeometry& session : tied) {
+    for (std::size_t i = 0; i < session.images.size(); ++i) {
+      const auto& covariance = session.images[i]->covariance;
+      EXPECT_NEAR(covariance(0, 0), 0.5 * alone.front().images[i]->covariance(0, 0), 1e-12);
+      EXPECT_EQ(covariance(5, 5), alone.front().images[i]->covariance(5, 5));
+    }
+  }
+}
+
 TEST(SessionGeometry, SharesLandmarksOfTiedSessions) {
   std::mt19937 random(31);
   const auto world = test::pointsAlong(test::drive({}), kDensity, random);
