@@ -110,8 +110,9 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
   app.add_option("--bag", options.bag, "Recording of the drive")->required();
   app.add_option("--output", options.output, "Track to write, CSV")->required();
   app.add_option("--config", options.config, "Parameters, YAML (see config/localizer.yaml)");
-  app.add_option("--preset", options.preset,
-                 "'paper': parameters to the letter of the papers, in place of the configuration's (config/paper.yaml)");
+  app.add_option(
+      "--preset", options.preset,
+      "'paper': parameters to the letter of the papers, in place of the configuration's (config/paper.yaml)");
   app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
   app.add_option("--features", options.features, "Features (parameter 'features')");
   app.add_option("--pose-source", options.pose_source, "'metric' or 'place' (parameter 'pose_source')");

@@ -44,7 +44,9 @@ class Landmarks : public testing::Test {
   void put(std::int64_t image, const PackedGeometry& packed) const {
     restore();
     const TrainingPoses poses = posesOf(test::exampleImages(6, kFeatures));
-    const std::int64_t seed = map_schema::rowSeed(map_schema::rowOf(poses, static_cast<std::size_t>(image)));
+    const auto i = static_cast<std::size_t>(image);
+    const std::int64_t seed = map_schema::rowSeed(i < poses.size() ? map_schema::rowOf(poses, i)
+                                                                   : map_schema::ImageRow{image});  // of no image
     const std::int64_t crc32 = map_schema::rowChecksum(seed, {bytesOf(packed.pose), bytesOf(packed.points)});
     tamper("REPLACE INTO landmarks VALUES(" + std::to_string(image) + ", " + blob(packed.pose) + ", " +
            blob(packed.points) + ", " + std::to_string(crc32) + ")");
