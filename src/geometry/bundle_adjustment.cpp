@@ -20,6 +20,7 @@ namespace visual_localization {
 namespace {
 
 constexpr double kTiltLoss = 2.0;      ///< sigmas
+constexpr double kAltitudeLoss = 2.0;  ///< sigmas
 constexpr double kRoughness_m = 0.01;  ///< of a level road, from one image to the next
 
 /// A step that cannot be solved is tried again with more damping. Ceres warns of each on stderr.
@@ -43,6 +44,7 @@ class Adjustment {
         sighting_loss_(config.landmark_loss),
         tilt_loss_(kTiltLoss),
         position_loss_(config.position_loss),
+        altitude_loss_(kAltitudeLoss),
         ceres_(borrowedLosses()) {
     for (const CameraPose& camera : problem.cameras) {
       const Eigen::Vector3d& position = camera.position_m;
@@ -54,6 +56,7 @@ class Adjustment {
     }
     addSightings();
     addPositions();
+    addHeights();
     addPriors();
   }
 
@@ -111,6 +114,15 @@ class Adjustment {
     }
   }
 
+  void addHeights() {
+    for (const HeightObservation& height : problem_.heights) {
+      BundleSession& session = problem_.sessions[sessions_[height.image]];
+      const AltitudeResidual residual{height, starts_[height.image], session.antenna_m};
+      ceres_.AddResidualBlock(automatic<AltitudeResidual, 1, 6, 1>(residual), &altitude_loss_,
+                              cameras_[height.image].data(), &session.fix_height_m);
+    }
+  }
+
   void addPriors() {
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
       const MountingResidual mounting(problem_.cameras[i].rotation, problem_.travel[i], config_.tilt_sigma_rad);
@@ -118,8 +130,9 @@ class Adjustment {
                               problem_.sessions[sessions_[i]].mounting_rad.data());
       if (i + 1 == cameras_.size() || sessions_[i + 1] != sessions_[i]) continue;
       const double run_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i].position_m).head<2>().norm();
-      ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>({config_.slope_sigma * run_m + kRoughness_m}), nullptr,
-                              cameras_[i].data(), cameras_[i + 1].data());
+      const SlopeResidual slope{problem_.slopes[i] * run_m, config_.slope_sigma * run_m + kRoughness_m};
+      ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>(slope), nullptr, cameras_[i].data(),
+                              cameras_[i + 1].data());
     }
     if (!cameras_.empty()) {
       ceres_.AddResidualBlock(automatic<HeightResidual, 1, 6>({}), nullptr, cameras_.front().data());
@@ -146,8 +159,10 @@ class Adjustment {
       options.linear_solver_ordering->AddElementToGroup(session.fix_bias_m.data(), 3);
       double* delay = &session.fix_delay_s;
       if (ceres_.HasParameterBlock(delay)) options.linear_solver_ordering->AddElementToGroup(delay, 4);
+      double* height = &session.fix_height_m;
+      if (ceres_.HasParameterBlock(height)) options.linear_solver_ordering->AddElementToGroup(height, 5);
     }
-    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 5);
+    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 6);
     return options;
   }
 
@@ -156,6 +171,7 @@ class Adjustment {
   ceres::CauchyLoss sighting_loss_;
   ceres::CauchyLoss tilt_loss_;
   GemanMcClureLoss position_loss_;
+  ceres::CauchyLoss altitude_loss_;
   std::vector<std::size_t> sessions_;  ///< of the cameras
   std::vector<Eigen::Matrix3d> starts_;
   std::vector<std::array<double, 6>> cameras_;  ///< as in SightingCost

@@ -33,12 +33,20 @@ struct PositionObservation {
   Eigen::Vector2d velocity_m_s = Eigen::Vector2d::Zero();  ///< of the antenna
 };
 
+/// What it says about how high the antenna was.
+struct HeightObservation {
+  std::uint32_t image = 0;
+  double up_m = 0.0;
+  double sigma_m = 1.0;
+};
+
 /// What the images of one recording have in common.
 struct BundleSession {
   std::size_t begin = 0;                                   ///< its first camera
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
   Eigen::Vector2d fix_bias_m = Eigen::Vector2d::Zero();    ///< its fixes are this far off; not for a single session
   Eigen::Vector3d antenna_m = Eigen::Vector3d::Zero();     ///< in the camera's optical frame; known
+  double fix_height_m = 0.0;                               ///< its altitudes are this far off
   double fix_delay_s = 0.0;  ///< a fix says where the antenna was this long before its stamp, by the clock of images
 };
 
@@ -47,7 +55,9 @@ struct BundleProblem {
   std::vector<CameraPose> cameras;
   std::vector<Landmark> landmarks;
   std::vector<PositionObservation> positions;
-  std::vector<Eigen::Quaterniond> travel;  ///< of each camera: levelCamera() along the direction of travel
+  std::vector<HeightObservation> heights;
+  std::vector<Eigen::Quaterniond> travel;  ///< of each camera: one that looks along the direction of travel, upright
+  std::vector<double> slopes;              ///< of each camera: rise over run there, as far as it is known
   std::vector<BundleSession> sessions;
   double focal_scale = 1.0;  ///< true focal length, as a share of the calibration's
 };

@@ -118,13 +118,31 @@ struct ZeroResidual {
   }
 };
 
-/// Roads are not steep.
+struct AltitudeResidual {
+  HeightObservation seen;
+  Eigen::Matrix3d map_from_start;
+  Eigen::Vector3d antenna_m;  ///< in the camera's frame
+
+  template <class T>
+  bool operator()(const T* camera, const T* height, T* residual) const {
+    const T antenna[3] = {T(antenna_m.x()), T(antenna_m.y()), T(antenna_m.z())};
+    T turned[3];
+    ceres::AngleAxisRotatePoint(camera, antenna, turned);
+    T antenna_up = camera[5];
+    for (int k = 0; k < 3; ++k) antenna_up += T(map_from_start(2, k)) * turned[k];
+    residual[0] = (antenna_up + height[0] - T(seen.up_m)) / T(seen.sigma_m);
+    return true;
+  }
+};
+
+/// Roads are not steep, or as steep as altitudes say.
 struct SlopeResidual {
+  double rise_m;
   double sigma_m;
 
   template <class T>
   bool operator()(const T* camera, const T* next, T* residual) const {
-    residual[0] = (next[5] - camera[5]) / T(sigma_m);
+    residual[0] = (next[5] - camera[5] - T(rise_m)) / T(sigma_m);
     return true;
   }
 };

@@ -25,12 +25,11 @@ constexpr std::size_t kEnoughTracked =
 constexpr int kMostFocalSteps = 100;
 constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
 
-Eigen::Vector3d level(const Eigen::Vector2d& position_m) { return {position_m.x(), position_m.y(), 0.0}; }
-
 }  // namespace
 
 void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointRays> rays,
-                         const AveragedRotations& rotations) {
+                         const AveragedRotations& rotations, std::vector<Eigen::Quaterniond> travel,
+                         const PathHeights& heights) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
   std::vector<double> sigmas_m;
   for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
@@ -45,9 +44,15 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
   for (std::size_t i = 0; i < session.images.size(); ++i) {
     const TrajectoryPoint& image = session.images[i];
     const Eigen::Quaterniond& start = rotations.camera_in_map[i];
-    images_.push_back({static_cast<std::uint32_t>(sessions_.size()), image, std::move(rays[i]), start});
-    problem_.cameras.push_back({start, level(image.position_m) - start * antenna_m});
-    problem_.travel.push_back(levelCamera(image.yaw_rad));
+    const double up_m = heights.up_m.empty() ? 0.0 : heights.up_m[i];
+    const Eigen::Vector3d antenna_in_map_m(image.position_m.x(), image.position_m.y(), up_m);
+    images_.push_back({static_cast<std::uint32_t>(sessions_.size()), image, std::move(rays[i]), start, up_m});
+    problem_.cameras.push_back({start, antenna_in_map_m - start * antenna_m});
+    problem_.travel.push_back(travel[i]);
+    problem_.slopes.push_back(heights.slope.empty() ? 0.0 : heights.slope[i]);
+    if (heights.up_m.empty()) continue;
+    problem_.heights.push_back(
+        {begin + static_cast<std::uint32_t>(i), up_m, config_.fix_correlation * heights.sigma_m});
   }
   sessions_.push_back(&session);
 }
@@ -63,6 +68,10 @@ void Reconstruction::append(const Reconstruction& other) {
     fix.image += begin;
     fixes_.push_back(fix);
   }
+  for (HeightObservation height : other.problem_.heights) {
+    height.image += begin;
+    problem_.heights.push_back(height);
+  }
   for (BundleSession added : other.problem_.sessions) {
     added.begin += begin;
     problem_.sessions.push_back(added);
@@ -76,6 +85,7 @@ void Reconstruction::append(const Reconstruction& other) {
   add(other.fix_sigmas_m_, fix_sigmas_m_);
   add(other.problem_.cameras, problem_.cameras);
   add(other.problem_.travel, problem_.travel);
+  add(other.problem_.slopes, problem_.slopes);
 }
 
 void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m) {
@@ -147,8 +157,14 @@ Eigen::Vector3d Reconstruction::antennaInMap_m(const CameraPose& camera, std::si
   return camera.position_m + camera.rotation * problem_.sessions[sessionOf(image)].antenna_m;
 }
 
+/// Where the cleaned path and the altitudes have the antenna.
+Eigen::Vector3d Reconstruction::startOf_m(std::size_t image) const {
+  const Eigen::Vector2d& position_m = images_[image].cleaned.position_m;
+  return {position_m.x(), position_m.y(), images_[image].up_m};
+}
+
 Eigen::Vector3d Reconstruction::shiftOf_m(std::size_t image) const {
-  return antennaInMap_m(problem_.cameras[image], image) - level(images_[image].cleaned.position_m);
+  return antennaInMap_m(problem_.cameras[image], image) - startOf_m(image);
 }
 
 /// How far the adjustment turned it: a rotation vector in the camera's frame.
@@ -189,7 +205,7 @@ void Reconstruction::bringBack() {
   for (std::size_t i = 0; i < images_.size(); ++i) {
     if (!isAstray(i)) continue;
     CameraPose pose{images_[i].start * Eigen::Quaterniond(exponential(usualTurn_rad(i))), Eigen::Vector3d::Zero()};
-    pose.position_m = level(images_[i].cleaned.position_m) + usualShift_m(i) - antennaInMap_m(pose, i);
+    pose.position_m = startOf_m(i) + usualShift_m(i) - antennaInMap_m(pose, i);
     back.emplace_back(i, pose);
   }
   for (const auto& [image, pose] : back) problem_.cameras[image] = pose;

@@ -11,6 +11,7 @@
 #include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
 #include "geometry/keypoint_rays.h"
+#include "geometry/path_heights.h"
 #include "geometry/rotation_averaging.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geometry/geometry_config.h"
@@ -25,7 +26,8 @@ class Reconstruction {
   explicit Reconstruction(const GeometryConfig& config) : config_(config) {}
 
   /// Appends the images of a session, where the cleaned path has their antenna. `session` must outlive it.
-  void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations);
+  void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations,
+           std::vector<Eigen::Quaterniond> travel, const PathHeights& heights);
   /// Appends those of another one, with its landmarks, as they are there.
   void append(const Reconstruction& other);
 
@@ -68,9 +70,11 @@ class Reconstruction {
     TrajectoryPoint cleaned;
     KeypointRays rays;
     Eigen::Quaterniond start;  ///< rotation before the adjustment
+    double up_m = 0.0;         ///< by altitudes, above the first one of its session; 0 without any
   };
 
   Eigen::Vector3d antennaInMap_m(const CameraPose& camera, std::size_t image) const;
+  Eigen::Vector3d startOf_m(std::size_t image) const;
   Eigen::Vector3d shiftOf_m(std::size_t image) const;
   Eigen::Vector3d turnOf_rad(std::size_t image) const;
   std::vector<std::size_t> neighboursOf(std::size_t image) const;

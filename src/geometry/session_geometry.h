@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -22,8 +23,10 @@ namespace visual_localization {
 /// A fix in the map frame, believable or not.
 struct MapFix {
   std::int64_t stamp_ns = 0;
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north
-  double sigma_m = 0.0;                                  ///< per axis, as the receiver claims; 0: not known
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();    ///< east, north
+  double sigma_m = 0.0;                                    ///< per axis, as the receiver claims; 0: not known
+  double up_m = std::numeric_limits<double>::quiet_NaN();  ///< above the datum; NaN: not known
+  double sigma_up_m = 0.0;                                 ///< the same as sigma_m
 };
 
 /// A session before its adjustment.

@@ -70,7 +70,9 @@ void requireMotion(const CleanedTrajectory& cleaned) {
 std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
   std::vector<MapFix> found;
   for (const Fix& fix : fixes) {
-    if (hasPosition(fix)) found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m});
+    if (!hasPosition(fix)) continue;
+    const double up_m = fix.position.altitude_m - frame.datum().altitude_m;
+    found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m, up_m, fix.sigma_up_m});
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const MapFix& a, const MapFix& b) { return a.stamp_ns < b.stamp_ns; });

@@ -26,6 +26,7 @@ BundleProblem truthOf(const std::vector<DrivenPose>& poses, double noise, std::m
   for (std::uint32_t i = 0; i < poses.size(); ++i) {
     problem.cameras.push_back(poses[i].camera);
     problem.travel.push_back(levelCamera(poses[i].travel_yaw_rad));
+    problem.slopes.push_back(0.0);
     problem.positions.push_back({i, poses[i].camera.position_m.head<2>(), 1.0});
     const test::View view = test::viewOf(world, test::streetCamera(), poses[i].camera, 0.0, random);
     for (std::uint32_t k = 0; k < view.points.size(); ++k) {

@@ -75,14 +75,53 @@ TEST(SessionGeometry, HoldsForACameraThatLooksUp) {
   EXPECT_NEAR(geometry.mounting_rad.x(), street.pitch_rad, 0.01);
 }
 
-// Heights and tilts are not: that roads are level is all that is known of them.
-TEST(SessionGeometry, HoldsWhereTheStreetClimbs) {
+/// A street that climbs by 10 % in its middle third.
+RecordedDrive climbing(std::size_t images) {
   test::StreetDrive street;
+  street.images = images;
   street.slope = 0.1;
-  const RecordedDrive drive = recorded(street, 3);
+  return recorded(street, 3);
+}
+
+/// Root mean square of the heights, and of the tilts along the view, that the adjustment came to.
+std::pair<double, double> heightAndTiltErrors(const SessionGeometry& geometry, const std::vector<DrivenPose>& truth) {
+  double heights_m2 = 0.0;
+  double tilts_rad2 = 0.0;
+  const double start_m = truth.front().camera.position_m.z();
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const CameraPose& camera = geometry.images[i]->camera;
+    const double height_m = camera.position_m.z() - (truth[i].camera.position_m.z() - start_m);
+    const double tilt_rad = std::asin(camera.ahead().z()) - std::asin(truth[i].camera.ahead().z());
+    heights_m2 += height_m * height_m / static_cast<double>(truth.size());
+    tilts_rad2 += tilt_rad * tilt_rad / static_cast<double>(truth.size());
+  }
+  return {std::sqrt(heights_m2), std::sqrt(tilts_rad2)};
+}
+
+// Heights and tilts are not: without altitudes all that is known of roads is that they are level.
+TEST(SessionGeometry, HoldsWhereTheStreetClimbs) {
+  const RecordedDrive drive = climbing(45);
   const SessionGeometry geometry = adjusted(drive);
   EXPECT_EQ(imagesIn(geometry), drive.truth.size());
   EXPECT_LT(pathError_m(geometry, drive.truth), kPathError_m);
+}
+
+TEST(SessionGeometry, KnowsByAltitudesHowTheStreetClimbs) {
+  RecordedDrive drive = climbing(150);
+  std::mt19937 random(8);
+  std::normal_distribution<double> noise_m(0.0, 0.3);
+  for (MapFix& fix : drive.fixes) {
+    const auto image =
+        std::min<std::size_t>(static_cast<std::size_t>(fix.stamp_ns / 1'000'000'000), drive.truth.size() - 1);
+    fix.up_m = 40.0 + drive.truth[image].camera.position_m.z() + noise_m(random);
+    fix.sigma_up_m = 0.3;
+  }
+  const SessionGeometry geometry = adjusted(drive);
+  EXPECT_EQ(imagesIn(geometry), drive.truth.size());
+  EXPECT_LT(pathError_m(geometry, drive.truth), kPathError_m);
+  const auto [height_m, tilt_rad] = heightAndTiltErrors(geometry, drive.truth);
+  EXPECT_LT(height_m, 0.25);  // without altitudes 1.1 m and 0.044 rad
+  EXPECT_LT(tilt_rad, 0.01);
 }
 
 TEST(SessionGeometry, HoldsForACameraThatLooksAside) {

@@ -17,6 +17,7 @@ struct Fix {
   GeodeticPoint position;     ///< may hold NaN when there is no fix
   bool has_fix = false;       ///< the receiver's own claim
   double sigma_m = 0.0;       ///< horizontal standard deviation per axis by the receiver's own claim; 0: none
+  double sigma_up_m = 0.0;    ///< that of the altitude; 0: none
 };
 
 }  // namespace visual_localization

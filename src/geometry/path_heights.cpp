@@ -1,0 +1,110 @@
+#include "geometry/path_heights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "base/statistics.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kBelieved_m = 1.0;        ///< a fix farther from the cleaned path has no altitude to believe either
+constexpr double kReach_m = 20.0;          ///< along the path
+constexpr double kSlope = 0.1;             ///< of usual roads, one sigma
+constexpr double kUsualSigma_m = 1.0;      ///< of an altitude whose receiver says nothing
+constexpr double kSmallestRange_m = 0.01;  ///< altitudes that vary by less were not measured
+constexpr std::size_t kFewest = 5;
+
+/// An altitude somewhere along the path.
+struct Altitude {
+  double along_m = 0.0;
+  double up_m = 0.0;
+  double sigma_m = 0.0;
+};
+
+std::vector<double> distancesAlong(const std::vector<TrajectoryPoint>& images) {
+  std::vector<double> along_m;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    along_m.push_back(i == 0 ? 0.0 : along_m.back() + (images[i].position_m - images[i - 1].position_m).norm());
+  }
+  return along_m;
+}
+
+/// In the order of the path. `along_m`: of the images.
+std::vector<Altitude> altitudesOf(const std::vector<TrajectoryPoint>& images, const std::vector<double>& along_m,
+                                  const std::vector<MapFix>& fixes) {
+  const Trajectory path(images);
+  std::vector<Altitude> altitudes;
+  std::size_t next = 1;
+  for (const MapFix& fix : fixes) {
+    const std::optional<TrajectoryPoint> then = path.at(fix.stamp_ns);
+    if (!then || !std::isfinite(fix.up_m) || !((fix.position_m - then->position_m).norm() <= kBelieved_m)) continue;
+    while (next + 1 < images.size() && images[next].stamp_ns < fix.stamp_ns) ++next;
+    const double way_m = (then->position_m - images[next - 1].position_m).norm();
+    const double sigma_m = fix.sigma_up_m > 0.0 ? fix.sigma_up_m : kUsualSigma_m;
+    altitudes.push_back({std::min(along_m[next - 1] + way_m, along_m[next]), fix.up_m, sigma_m});
+  }
+  return altitudes;
+}
+
+bool areMeasured(const std::vector<Altitude>& altitudes) {
+  if (altitudes.size() < kFewest) return false;
+  const auto [lowest, highest] = std::minmax_element(
+      altitudes.begin(), altitudes.end(), [](const Altitude& a, const Altitude& b) { return a.up_m < b.up_m; });
+  return highest->up_m - lowest->up_m >= kSmallestRange_m;
+}
+
+/// Height and slope at a distance along the path.
+struct Line {
+  double up_m = 0.0;
+  double slope = 0.0;
+};
+
+std::optional<Line> lineAt(double along_m, const std::vector<Altitude>& altitudes) {
+  const auto before = [](const Altitude& altitude, double at_m) { return altitude.along_m < at_m; };
+  const auto begin = std::lower_bound(altitudes.begin(), altitudes.end(), along_m - kReach_m, before);
+  const auto end = std::lower_bound(begin, altitudes.end(), along_m + kReach_m, before);
+  const auto count = static_cast<double>(end - begin);
+  if (count < static_cast<double>(kFewest)) return std::nullopt;
+  Line mean;
+  double mean_along_m = 0.0;
+  for (auto altitude = begin; altitude != end; ++altitude) {
+    mean.up_m += altitude->up_m / count;
+    mean_along_m += altitude->along_m / count;
+  }
+  double squared = begin->sigma_m * begin->sigma_m / (kSlope * kSlope);
+  double product = 0.0;
+  for (auto altitude = begin; altitude != end; ++altitude) {
+    const double offset_m = altitude->along_m - mean_along_m;
+    squared += offset_m * offset_m;
+    product += offset_m * (altitude->up_m - mean.up_m);
+  }
+  mean.slope = product / squared;
+  mean.up_m += mean.slope * (along_m - mean_along_m);
+  return mean;
+}
+
+}  // namespace
+
+PathHeights pathHeights(const std::vector<TrajectoryPoint>& images, const std::vector<MapFix>& fixes) {
+  if (images.size() < 2) return {};
+  const std::vector<double> along_m = distancesAlong(images);
+  const std::vector<Altitude> altitudes = altitudesOf(images, along_m, fixes);
+  if (!areMeasured(altitudes)) return {};
+  PathHeights heights;
+  for (const double at_m : along_m) {
+    const std::optional<Line> line = lineAt(at_m, altitudes);
+    if (!line) return {};
+    heights.up_m.push_back(line->up_m);
+    heights.slope.push_back(line->slope);
+  }
+  const double first_m = heights.up_m.front();
+  for (double& up_m : heights.up_m) up_m -= first_m;
+  std::vector<double> sigmas_m;
+  for (const Altitude& altitude : altitudes) sigmas_m.push_back(altitude.sigma_m);
+  heights.sigma_m = median(sigmas_m);
+  return heights;
+}
+
+}  // namespace visual_localization
