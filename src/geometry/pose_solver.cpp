@@ -135,7 +135,7 @@ class Sampler {
 
   struct Support {
     std::size_t inliers = 0;
-    double score = 0.0;  ///< less for an inlier that is farther off (MSAC: Torr and Zisserman 2000)
+    double score = 0.0;  ///< less for an inlier that is farther off (Geman and McClure 1987)
   };
 
   Sample draw() {
