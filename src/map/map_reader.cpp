@@ -113,14 +113,6 @@ TrainingPoses readPoses(const sqlite::Database& database, std::int64_t file_size
   return poses;
 }
 
-std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses, int version) {
-  std::vector<std::uint32_t> seeds(poses.size());
-  for (std::size_t i = 0; i < seeds.size(); ++i) {
-    seeds[i] = static_cast<std::uint32_t>(map_schema::rowSeed(map_schema::rowOf(poses, i), version));
-  }
-  return seeds;
-}
-
 /// What is read of every map when it is opened.
 struct Opened {
   MapHeader header;
@@ -154,7 +146,7 @@ Opened readPosesAndHeader(const map_rows::MapDatabase& map, std::int64_t file_si
   Opened opened{
       map_schema::toHeader(std::move(of_header), map.version, readMasks(map, budget)), {}, {}, geometry_count, budget};
   opened.poses = readPoses(map.database, file_size, opened.header.sessions.size(), checksum);
-  opened.row_seeds = rowSeeds(opened.poses, map.version);
+  opened.row_seeds = map_schema::rowSeeds(opened.poses, map.version);
   checksum.add(meta);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
   if (geometry_count > opened.poses.size()) throw Refusal("is damaged: more images have landmarks than there are");

@@ -127,6 +127,14 @@ std::int64_t rowSeed(const ImageRow& image, int version) {
   return checksum.value();
 }
 
+std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses, int version) {
+  std::vector<std::uint32_t> seeds(poses.size());
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    seeds[i] = static_cast<std::uint32_t>(rowSeed(rowOf(poses, i), version));
+  }
+  return seeds;
+}
+
 std::int64_t rowChecksum(std::int64_t seed, std::initializer_list<sqlite::Bytes> blobs) {
   std::int64_t checksum = seed;
   for (const sqlite::Bytes& blob : blobs) checksum = crc32Of(blob, checksum);

@@ -80,6 +80,9 @@ ImageRow rowOf(const TrainingPoses& poses, std::size_t i);
 /// another map that was copied over an open one. Before kSinceBoundRows it is of the image's number alone.
 std::int64_t rowSeed(const ImageRow& image, int version = kMapSchemaVersion);
 
+/// Those of all images.
+std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses, int version);
+
 /// CRC-32 of a row of a wide table: its blobs, continuing from rowSeed().
 std::int64_t rowChecksum(std::int64_t seed, std::initializer_list<sqlite::Bytes> blobs);
 
