@@ -252,68 +252,6 @@ Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool rec
   return recognised && by_size ? interpolateOnPath(*map_, scores_, tracked.best_image) : tracked.position_m;
 }
 
-void Localizer::configure(const LocalizerConfig& config) {
-  const LocalizerConfig before = std::exchange(config_, LocalizerConfig(requireValid(config)));
-  image_->configure(frontEndConfig(), config_.similarity);
-  if (config_.sweep_images != before.sweep_images) sweep_.configure(static_cast<std::size_t>(config_.sweep_images));
-  choice_.configure(config_.features, config_.hybrid);
-  assessor_.configure(config_.state);
-  verifier_->configure(config_.metric);
-  configureTracker(before.tracker);
-  last_.reset();
-}
-
-void Localizer::setCamera(const CameraModel& camera) {
-  camera_ = camera.scaledTo(map_->header().image_size);
-  verifier_->resetCamera();
-}
-
-void Localizer::setMount(const SensorMount& mount) {
-  requireMount(mount);
-  mount_ = mount;
-  verifier_->reset();
-  last_.reset();
-}
-
-void Localizer::setMask(const Mask& mask) {
-  mask_ = mask.scaledTo(map_->header().image_size);
-  image_->configure(frontEndConfig(), config_.similarity);
-  last_.reset();
-}
-
-FrontEndConfig Localizer::frontEndConfig() const {
-  FrontEndConfig config = frontEndConfigOf(config_, map_->header());
-  config.mask = mask_;
-  return config;
-}
-
-void Localizer::configureTracker(const std::string& tracker_before) {
-  if (config_.tracker == tracker_before && config_.particles() == tracker_->particles().size()) {
-    tracker_->configure(config_);
-    return;
-  }
-  auto successor = makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed));
-  successor->reset(drawnFrom(tracker_->particles()));
-  tracker_ = std::move(successor);
-}
-
-void Localizer::relocalize() {
-  tracker_->reset();
-  forgetEvidence();
-}
-
-void Localizer::relocalize(const Prior& prior) {
-  tracker_->reset(prior);
-  forgetEvidence();
-}
-
-void Localizer::forgetEvidence() {
-  choice_.reset();
-  assessor_.reset();
-  verifier_->reset();
-  last_.reset();
-}
-
 LocalizationState Localizer::doubt() {
   verifier_->reset();  // the motion may have been another meanwhile
   const LocalizationState state = assessor_.doubt(tracker_->tuning().recovering);
