@@ -285,7 +285,7 @@ void Dpso::adaptDiversity(const Score& best) {
   tuning_.quantum_share =
       approach(tuning_.quantum_share, config_.quantum_share_max, config_.quantum_share, config_.recovery_step);
   tuning_.phi2 = approach(tuning_.phi2, config_.phi2_min, config_.phi2, config_.recovery_step);
-  tuning_.phi0 = approach(tuning_.phi0, config_.phi0_max, config_.phi0, config_.recovery_step);
+  tuning_.phi0 = approach(tuning_.phi0, std::max(config_.phi0, config_.phi0_max), config_.phi0, config_.recovery_step);
 }
 
 void Dpso::endRecovery() {

@@ -59,15 +59,16 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
                100000.0);
   visitor.real({"dpso/quantum_share_max", "1", "share of quantum particles in recovery"}, quantum_share_max, 0.0, 1.0);
   visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);
-  visitor.real({"dpso/phi0_max", "1", "random perturbation in recovery; more than phi0 in the conference paper alone"},
-               phi0_max, 0.0, 10.0);
+  visitor.real(
+      {"dpso/phi0_max", "1",
+       "random perturbation in recovery, as in the conference paper; up to phi0: not raised, as in the journal"},
+      phi0_max, 0.0, 10.0);
   visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
                1000.0);
   visitor.atMost("dpso/v0_min", v0_min, "dpso/v0", v0);
   visitor.atMost("dpso/v0", v0, "dpso/v0_max", v0_max);
   visitor.atMost("dpso/quantum_share", quantum_share, "dpso/quantum_share_max", quantum_share_max);
   visitor.atMost("dpso/phi2_min", phi2_min, "dpso/phi2", phi2);
-  visitor.atMost("dpso/phi0", phi0, "dpso/phi0_max", phi0_max);
   // Not by the difference: 1 - 0.9 is less than 0.1.
   visitor.require(quantum_share_max + high_energy_share <= 1.0, "dpso/quantum_share_max",
                   parameters::toString(quantum_share_max),

@@ -164,6 +164,18 @@ TEST(PaperDpso, RecoveryRaisesThePerturbationStepByStepAndEndsAtOnce) {
   EXPECT_DOUBLE_EQ(swarm.tuning().phi0, 0.3);
 }
 
+TEST(PaperDpso, RecoveryLeavesAnyPerturbationAloneUnlessToldToRaiseIt) {
+  for (const double phi0 : {0.005, 0.3, 1.5}) {
+    LocalizerConfig config;
+    assignParameters(config, {{"dpso/phi0", phi0}, {"recovery", std::string("paper")}});
+    World world = roundWorld();
+    Dpso swarm(world.map(), config.dpso, FitnessConfig(), 4);
+    for (int image = 0; image < 10; ++image) swarm.update(world.inTheDark());
+    EXPECT_TRUE(swarm.tuning().recovering);
+    EXPECT_DOUBLE_EQ(swarm.tuning().phi0, phi0);
+  }
+}
+
 TEST(PaperDpso, ThePresetIsAConfiguration) {
   LocalizerConfig config;
   config.tracker = "pf_linear";

@@ -42,7 +42,7 @@ struct DpsoConfig {
   double max_range_m = 500.0;
   double quantum_share_max = 0.20;
   double phi2_min = 0.01;
-  double phi0_max = 0.3;
+  double phi0_max = 0.0;
   double mode_radius_m = 5.0;
 
   void declare(ParameterVisitor& visitor);
