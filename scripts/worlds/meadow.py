@@ -97,13 +97,8 @@ class Meadow:
             away = float(self._from_path(point[None])[0])
             if away < FREE_M or (away > 12 and rng.random() < .35):
                 continue
-            foot, kind = (*point, float(self._height(*point))), rng.random()
-            if kind < .4:
-                self._planter.tree(foot, rng, rng.uniform(.9, 1.9))
-            elif kind < .55:
-                self._planter.conifer(foot, rng, rng.uniform(.6, 1.4))
-            else:
-                self._planter.bush(foot, rng, rng.uniform(.7, 1.8))
+            foot = (*point, float(self._height(*point)))
+            self._planter.any_plant(foot, rng, (.4, (.9, 1.9)), (.15, (.6, 1.4)), (.7, 1.8))
 
     def _add_grass(self) -> None:
         """Blades of one triangle: dense beside the path, thin further out, none where people tread."""

@@ -10,6 +10,9 @@ from worlds import meshes
 from worlds.batch import Batch, Corner
 from worlds.textures import fractal
 
+Range = Tuple[float, float]  # of sizes
+Mix = Tuple[float, Range]    # a kind's share and its sizes
+
 # Linear colours of leaves.
 GREENS = ((.1, .2, .04), (.07, .16, .05), (.16, .24, .05), (.05, .12, .05), (.2, .2, .04), (.22, .14, .04))
 
@@ -97,6 +100,16 @@ class Planter:
         out = share * 1.7 * scale * tier * noise.uniform(.6, 1, 700)
         centres = np.stack([x + out * np.cos(angle), y + out * np.sin(angle), z + height * (1.02 - .9 * share)], 1)
         scatter(self._batch, self._blown(centres, z, .6), .3 * scale, self._leaves[3], noise)
+
+    def any_plant(self, foot: Corner, rng: random.Random, trees: Mix, conifers: Mix, bushes: Range) -> None:
+        """A tree, a conifer or a bush, by their shares; each in a range of sizes."""
+        kind = rng.random()
+        if kind < trees[0]:
+            self.tree(foot, rng, rng.uniform(*trees[1]))
+        elif kind < trees[0] + conifers[0]:
+            self.conifer(foot, rng, rng.uniform(*conifers[1]))
+        else:
+            self.bush(foot, rng, rng.uniform(*bushes))
 
     def bush(self, foot: Corner, rng: random.Random, scale: float) -> None:
         """Leaves down to the ground."""

@@ -174,14 +174,8 @@ class Town:
         return nearest
 
     def _add_garden_plant(self, point: np.ndarray) -> None:
-        foot, rng = (float(point[0]), float(point[1]), self._height(*point)), self._rng
-        kind = rng.random()
-        if kind < .45:
-            self._planter.tree(foot, rng, rng.uniform(.9, 1.5))
-        elif kind < .65:
-            self._planter.conifer(foot, rng, rng.uniform(.6, 1.1))
-        else:
-            self._planter.bush(foot, rng, rng.uniform(.8, 1.6))
+        foot = (float(point[0]), float(point[1]), self._height(*point))
+        self._planter.any_plant(foot, self._rng, (.45, (.9, 1.5)), (.2, (.6, 1.1)), (.8, 1.6))
 
     def _add_pavements(self) -> None:
         pavements = Pavements(self._batch, self._plan, self._noise, self._wet)
