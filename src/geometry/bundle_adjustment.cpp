@@ -125,13 +125,15 @@ class Adjustment {
 
   void addPriors() {
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      const MountingResidual mounting(problem_.cameras[i].rotation, problem_.travel[i], config_.tilt_sigma_rad);
+      const auto [yaw_rad, slope] = problem_.road[i];
+      const MountingResidual mounting(problem_.cameras[i].rotation, uprightCamera(yaw_rad, slope),
+                                      config_.tilt_sigma_rad);
       ceres_.AddResidualBlock(automatic<CameraMountingResidual, 3, 6, 3>({mounting}), &tilt_loss_, cameras_[i].data(),
                               problem_.sessions[sessions_[i]].mounting_rad.data());
       if (i + 1 == cameras_.size() || sessions_[i + 1] != sessions_[i]) continue;
       const double run_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i].position_m).head<2>().norm();
-      const SlopeResidual slope{problem_.slopes[i] * run_m, config_.slope_sigma * run_m + kRoughness_m};
-      ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>(slope), nullptr, cameras_[i].data(),
+      const SlopeResidual climb{slope * run_m, config_.slope_sigma * run_m + kRoughness_m};
+      ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>(climb), nullptr, cameras_[i].data(),
                               cameras_[i + 1].data());
     }
     if (!cameras_.empty()) {

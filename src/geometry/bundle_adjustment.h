@@ -40,6 +40,12 @@ struct HeightObservation {
   double sigma_m = 1.0;
 };
 
+/// Where a road leads.
+struct RoadDirection {
+  double yaw_rad = 0.0;  ///< of travel: 0 = east, counter-clockwise
+  double slope = 0.0;    ///< rise over run, as far as it is known
+};
+
 /// What the images of one recording have in common.
 struct BundleSession {
   std::size_t begin = 0;                                   ///< its first camera
@@ -56,8 +62,7 @@ struct BundleProblem {
   std::vector<Landmark> landmarks;
   std::vector<PositionObservation> positions;
   std::vector<HeightObservation> heights;
-  std::vector<Eigen::Quaterniond> travel;  ///< of each camera: one that looks along the direction of travel, upright
-  std::vector<double> slopes;              ///< of each camera: rise over run there, as far as it is known
+  std::vector<RoadDirection> road;  ///< at each camera
   std::vector<BundleSession> sessions;
   double focal_scale = 1.0;  ///< true focal length, as a share of the calibration's
 };

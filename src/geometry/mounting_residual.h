@@ -14,8 +14,8 @@ inline Eigen::Vector4d ceresQuaternion(const Eigen::Quaterniond& q) { return {q.
 /// of the camera from `start` (camera_in_map = start * exp(w)), and that of the mounting.
 class MountingResidual {
  public:
-  /// `travel`: camera_in_map of a level camera that looks along the direction of travel. `sigma_rad`: of pitch, yaw and
-  /// roll.
+  /// `travel`: camera_in_map of an upright camera that looks along the direction of travel. `sigma_rad`: of pitch, yaw
+  /// and roll.
   MountingResidual(const Eigen::Quaterniond& start, const Eigen::Quaterniond& travel, const Eigen::Vector3d& sigma_rad)
       : travel_from_start_(ceresQuaternion(travel.conjugate() * start)), sigma_rad_(sigma_rad) {}
 

@@ -88,22 +88,24 @@ std::optional<Line> lineAt(double along_m, const std::vector<Altitude>& altitude
 }  // namespace
 
 PathHeights pathHeights(const std::vector<TrajectoryPoint>& images, const std::vector<MapFix>& fixes) {
-  if (images.size() < 2) return {};
+  const PathHeights level{std::vector<double>(images.size()), std::vector<double>(images.size())};
+  if (images.size() < 2) return level;
   const std::vector<double> along_m = distancesAlong(images);
   const std::vector<Altitude> altitudes = altitudesOf(images, along_m, fixes);
-  if (!areMeasured(altitudes)) return {};
+  if (!areMeasured(altitudes)) return level;
   PathHeights heights;
+  double first_m = 0.0;
   for (const double at_m : along_m) {
     const std::optional<Line> line = lineAt(at_m, altitudes);
-    if (!line) return {};
-    heights.up_m.push_back(line->up_m);
+    if (!line) return level;
+    if (heights.up_m.empty()) first_m = line->up_m;
+    heights.up_m.push_back(line->up_m - first_m);
     heights.slope.push_back(line->slope);
   }
-  const double first_m = heights.up_m.front();
-  for (double& up_m : heights.up_m) up_m -= first_m;
   std::vector<double> sigmas_m;
   for (const Altitude& altitude : altitudes) sigmas_m.push_back(altitude.sigma_m);
   heights.sigma_m = median(sigmas_m);
+  heights.measured = true;
   return heights;
 }
 

@@ -6,7 +6,7 @@
 
 #include "base/statistics.h"
 #include "geometry/fix_positions.h"
-#include "geometry/landmark_covariance.h"
+#include "geometry/path_heights.h"
 #include "geometry/rotation_vector.h"
 #include "geometry/triangulation.h"
 #include "geometry/vector_median.h"
@@ -19,17 +19,12 @@ constexpr std::size_t kNeighbours = 7;  ///< on each side of an image
 constexpr double kAstray_m = 2.0;       ///< an image moved by this more or less than its neighbours lost its way
 constexpr double kAstray_rad = 0.1;     ///< so did one that was turned by this more or less
 constexpr double kFarthest_m = 1000.0;  ///< a landmark farther away has no position to rely on
-constexpr double kFar_m = 3.0;          ///< an image moved by more than this is far from the cleaned path
-constexpr std::size_t kEnoughTracked =
-    20;  ///< tracked features of an image on average, for their share to say anything
 constexpr int kMostFocalSteps = 100;
-constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
 
 }  // namespace
 
 void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointRays> rays,
-                         const AveragedRotations& rotations, std::vector<Eigen::Quaterniond> travel,
-                         const PathHeights& heights) {
+                         const AveragedRotations& rotations) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
   std::vector<double> sigmas_m;
   for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
@@ -41,16 +36,16 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
   fix_sigmas_m_.push_back(sigmas_m.empty() ? config_.fix_sigma_m : median(sigmas_m));
   const Eigen::Vector3d antenna_m = session.mount.antennaInCamera_m();
   problem_.sessions.push_back({begin, rotations.mounting_rad, Eigen::Vector2d::Zero(), antenna_m});
+  const PathHeights heights = pathHeights(session.images, session.fixes);
   for (std::size_t i = 0; i < session.images.size(); ++i) {
     const TrajectoryPoint& image = session.images[i];
     const Eigen::Quaterniond& start = rotations.camera_in_map[i];
-    const double up_m = heights.up_m.empty() ? 0.0 : heights.up_m[i];
+    const double up_m = heights.up_m[i];
     const Eigen::Vector3d antenna_in_map_m(image.position_m.x(), image.position_m.y(), up_m);
     images_.push_back({static_cast<std::uint32_t>(sessions_.size()), image, std::move(rays[i]), start, up_m});
     problem_.cameras.push_back({start, antenna_in_map_m - start * antenna_m});
-    problem_.travel.push_back(travel[i]);
-    problem_.slopes.push_back(heights.slope.empty() ? 0.0 : heights.slope[i]);
-    if (heights.up_m.empty()) continue;
+    problem_.road.push_back({image.yaw_rad, heights.slope[i]});
+    if (!heights.measured) continue;
     problem_.heights.push_back(
         {begin + static_cast<std::uint32_t>(i), up_m, config_.fix_correlation * heights.sigma_m});
   }
@@ -84,8 +79,7 @@ void Reconstruction::append(const Reconstruction& other) {
   add(other.sessions_, sessions_);
   add(other.fix_sigmas_m_, fix_sigmas_m_);
   add(other.problem_.cameras, problem_.cameras);
-  add(other.problem_.travel, problem_.travel);
-  add(other.problem_.slopes, problem_.slopes);
+  add(other.problem_.road, problem_.road);
 }
 
 void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m) {
@@ -228,97 +222,6 @@ double Reconstruction::error(const Landmark& landmark, const LandmarkSighting& s
 
 double Reconstruction::distance_m(const Landmark& landmark) const {
   return (landmark.position_m - problem_.cameras[landmark.sightings.front().image].position_m).norm();
-}
-
-std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) const {
-  std::vector<SessionGeometry> geometries(sessions_.size());
-  std::vector<std::vector<double>> errors_px(sessions_.size());
-  std::vector<std::size_t> tracked(sessions_.size());
-  std::vector<ImageGeometry> images(images_.size());
-  const std::vector<std::set<std::uint32_t>> tied = tiedSessions();
-  for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i, tied[i]);
-  for (const Landmark& landmark : problem_.landmarks) {
-    const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_.cameras);
-    ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
-    for (const LandmarkSighting& sighting : landmark.sightings) {
-      errors_px[sessionOf(sighting.image)].push_back(error(landmark, sighting) * focal_px(sighting.image));
-      addSighting(landmark, covariance, sighting.feature, first_id, images[sighting.image]);
-    }
-    ++first_id;
-  }
-  for (const FeatureTrack& track : tracks_) {
-    for (const FeatureObservation& seen : track) ++tracked[sessionOf(seen.image)];
-  }
-  addPath(images, geometries);
-  for (std::size_t k = 0; k < geometries.size(); ++k) {
-    SessionGeometry& geometry = geometries[k];
-    geometry.sightings = errors_px[k].size();
-    if (tracked[k] >= kEnoughTracked * geometry.images.size()) {
-      geometry.agreeing_share = static_cast<double>(geometry.sightings) / static_cast<double>(tracked[k]);
-    }
-    geometry.median_error_px = median(errors_px[k]);
-    geometry.mounting_rad = problem_.sessions[k].mounting_rad;
-    geometry.fix_delay_s = problem_.sessions[k].fix_delay_s;
-  }
-  return geometries;
-}
-
-/// The sessions that show landmarks of each image, its own included.
-std::vector<std::set<std::uint32_t>> Reconstruction::tiedSessions() const {
-  std::vector<std::set<std::uint32_t>> tied(images_.size());
-  for (std::size_t i = 0; i < images_.size(); ++i) tied[i].insert(images_[i].session);
-  for (const Landmark& landmark : problem_.landmarks) {
-    std::set<std::uint32_t> sessions;
-    for (const LandmarkSighting& sighting : landmark.sightings) sessions.insert(images_[sighting.image].session);
-    if (sessions.size() == 1) continue;
-    for (const LandmarkSighting& sighting : landmark.sightings)
-      tied[sighting.image].insert(sessions.begin(), sessions.end());
-  }
-  return tied;
-}
-
-/// Receivers err slowly, each recording by itself: where several are tied, their errors average out.
-double Reconstruction::fixBias_m(const std::set<std::uint32_t>& tied) const {
-  double information = 0.0;
-  for (const std::uint32_t session : tied) {
-    const double bias_m = std::max(config_.fix_bias * fix_sigmas_m_[session], 0.01);
-    information += 1.0 / (bias_m * bias_m);
-  }
-  return 1.0 / std::sqrt(information);
-}
-
-ImageGeometry Reconstruction::imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const {
-  ImageGeometry geometry;
-  geometry.camera = problem_.cameras[image];
-  Eigen::Matrix<double, 6, 1> sigmas;
-  const double bias_m = fixBias_m(tied);
-  sigmas << bias_m, bias_m, bias_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
-  geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
-  return geometry;
-}
-
-/// Images with enough landmarks, and how far they were moved.
-void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const {
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    SessionGeometry& geometry = geometries[sessionOf(i)];
-    const auto least = static_cast<std::size_t>(config_.min_landmarks);
-    if (images[i].landmarks.size() < least || isAstray(i)) {
-      geometry.images.emplace_back();
-      continue;
-    }
-    ImageGeometry& image = geometry.images.emplace_back(images[i]).value();
-    std::sort(image.landmarks.begin(), image.landmarks.end(),
-              [](const SeenLandmark& a, const SeenLandmark& b) { return a.feature < b.feature; });
-    ++geometry.located;
-    const double shift_m = shiftOf_m(i).head<2>().norm();
-    geometry.mean_shift_m += shift_m;
-    geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
-    geometry.far_share += shift_m > kFar_m ? 1.0 : 0.0;
-  }
-  for (SessionGeometry& geometry : geometries) {
-    if (geometry.located > 0) geometry.mean_shift_m /= static_cast<double>(geometry.located);
-    geometry.far_share /= static_cast<double>(std::max<std::size_t>(1, geometry.images.size()));
-  }
 }
 
 }  // namespace visual_localization

@@ -11,7 +11,6 @@
 #include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
 #include "geometry/keypoint_rays.h"
-#include "geometry/path_heights.h"
 #include "geometry/rotation_averaging.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geometry/geometry_config.h"
@@ -26,8 +25,7 @@ class Reconstruction {
   explicit Reconstruction(const GeometryConfig& config) : config_(config) {}
 
   /// Appends the images of a session, where the cleaned path has their antenna. `session` must outlive it.
-  void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations,
-           std::vector<Eigen::Quaterniond> travel, const PathHeights& heights);
+  void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations);
   /// Appends those of another one, with its landmarks, as they are there.
   void append(const Reconstruction& other);
 

@@ -72,8 +72,10 @@ class MountingPrior {
 
 }  // namespace
 
-AveragedRotations averageRotations(const std::vector<Eigen::Quaterniond>& travel,
+AveragedRotations averageRotations(const std::vector<double>& travel_yaws_rad,
                                    const std::vector<RelativeRotation>& relative) {
+  std::vector<Eigen::Quaterniond> travel;
+  for (const double yaw_rad : travel_yaws_rad) travel.push_back(levelCamera(yaw_rad));
   std::vector<Eigen::Vector3d> turns(travel.size(), Eigen::Vector3d::Zero());
   AveragedRotations result;
 

@@ -9,7 +9,6 @@
 #include "base/parallel.h"
 #include "geometry/feature_tracks.h"
 #include "geometry/keypoint_rays.h"
-#include "geometry/path_heights.h"
 #include "geometry/reconstruction.h"
 #include "geometry/revisits.h"
 #include "geometry/rotation_averaging.h"
@@ -129,22 +128,16 @@ class SessionAdjuster {
   }
 
   void start(std::vector<KeypointRays> rays) {
-    const PathHeights heights = pathHeights(session_.images, session_.fixes);
-    std::vector<Eigen::Quaterniond> level;
-    std::vector<Eigen::Quaterniond> travel;
-    for (std::size_t i = 0; i < session_.images.size(); ++i) {
-      level.push_back(levelCamera(session_.images[i].yaw_rad));
-      travel.push_back(uprightCamera(session_.images[i].yaw_rad, heights.slope.empty() ? 0.0 : heights.slope[i]));
-    }
+    std::vector<double> yaws_rad;
+    for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
     std::vector<RelativeRotation> relative;
     for (const Pair& pair : pairs_) {
       const auto& [a, b, inliers] = pair.matches;
       if (b - a <= kRotationSpan) relative.push_back({a, b, pair.view->b_from_a});
       matches_.push_back(pair.matches);
     }
-    // Not the slopes yet: a camera turned aside by much would explain how a robot leans across them, too.
-    const AveragedRotations rotations = averageRotations(level, relative);
-    reconstruction_.add(session_, std::move(rays), rotations, std::move(travel), heights);
+    // Level, whatever the altitudes say: a camera turned aside by much would explain how a robot leans across a slope.
+    reconstruction_.add(session_, std::move(rays), averageRotations(yaws_rad, relative));
     reconstruction_.setMatches(matches_);
   }
 

@@ -25,8 +25,7 @@ BundleProblem truthOf(const std::vector<DrivenPose>& poses, double noise, std::m
   std::vector<Landmark> landmarks(world.size());
   for (std::uint32_t i = 0; i < poses.size(); ++i) {
     problem.cameras.push_back(poses[i].camera);
-    problem.travel.push_back(levelCamera(poses[i].travel_yaw_rad));
-    problem.slopes.push_back(0.0);
+    problem.road.push_back({poses[i].travel_yaw_rad, 0.0});
     problem.positions.push_back({i, poses[i].camera.position_m.head<2>(), 1.0});
     const test::View view = test::viewOf(world, test::streetCamera(), poses[i].camera, 0.0, random);
     for (std::uint32_t k = 0; k < view.points.size(); ++k) {
@@ -98,7 +97,7 @@ TEST(BundleAdjustment, FindsHowTheCameraIsMounted) {
   const auto poses = test::drive(street);
   BundleProblem problem = truthOf(poses, 0.0, random);
   adjust(problem, thorough());
-  const Eigen::Quaterniond mounting = problem.travel[0].conjugate() * poses[0].camera.rotation;
+  const Eigen::Quaterniond mounting = levelCamera(poses[0].travel_yaw_rad).conjugate() * poses[0].camera.rotation;
   const Eigen::AngleAxisd expected(mounting);
   EXPECT_LT((problem.sessions.front().mounting_rad - expected.angle() * expected.axis()).norm(), 1e-4);
 }
@@ -183,7 +182,7 @@ TEST(BundleAdjustment, OfNothingChangesNothing) {
   problem.sessions.emplace_back();
   EXPECT_EQ(adjust(problem, {}), 0.0);
   problem.cameras.resize(1);
-  problem.travel.push_back(problem.cameras[0].rotation);
+  problem.road.resize(1);
   adjust(problem, {});
   EXPECT_TRUE(problem.cameras[0].position_m.allFinite());
 }

@@ -41,6 +41,7 @@ std::vector<MapFix> fixes(double noise_m) {
 
 TEST(PathHeights, FollowTheAltitudesOfTheFixes) {
   const PathHeights heights = pathHeights(images(), fixes(0.3));
+  ASSERT_TRUE(heights.measured);
   ASSERT_EQ(heights.up_m.size(), kImages);
   EXPECT_EQ(heights.up_m.front(), 0.0);
   EXPECT_DOUBLE_EQ(heights.sigma_m, 0.6);
@@ -63,26 +64,24 @@ TEST(PathHeights, FixesFarFromThePathSayNothing) {
   for (std::size_t i = 0; i < kImages; ++i) EXPECT_NEAR(found.up_m[i], right.up_m[i], 0.05) << i;
 }
 
-TEST(PathHeights, AreUnknownWithoutMeasuredAltitudes) {
-  EXPECT_TRUE(pathHeights({}, {}).up_m.empty());
-  EXPECT_TRUE(pathHeights(images(), {}).up_m.empty());
-  auto unknown = fixes(0.3);
-  for (MapFix& fix : unknown) fix.up_m = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(pathHeights(images(), unknown).up_m.empty());
-  auto constant = fixes(0.3);
-  for (MapFix& fix : constant) fix.up_m = 445.0;
-  EXPECT_TRUE(pathHeights(images(), constant).up_m.empty()) << "the receiver measures none";
-  auto half = fixes(0.3);
-  half.resize(half.size() / 3);
-  EXPECT_TRUE(pathHeights(images(), half).up_m.empty()) << "there are images that no fix is near";
+void expectLevel(const PathHeights& heights, std::size_t images) {
+  EXPECT_FALSE(heights.measured);
+  EXPECT_EQ(heights.up_m, std::vector<double>(images));
+  EXPECT_EQ(heights.slope, std::vector<double>(images));
 }
 
-TEST(PathHeights, AnUprightCameraLooksAlongTheRoad) {
-  const Eigen::Vector3d ahead = uprightCamera(0.5, 0.1) * Eigen::Vector3d::UnitZ();
-  EXPECT_NEAR(ahead.z() / ahead.head<2>().norm(), 0.1, 1e-12);
-  EXPECT_NEAR(std::atan2(ahead.y(), ahead.x()), 0.5, 1e-12);
-  const Eigen::Vector3d right = uprightCamera(0.5, 0.1) * Eigen::Vector3d::UnitX();
-  EXPECT_NEAR(right.z(), 0.0, 1e-12);
+TEST(PathHeights, AreLevelWithoutMeasuredAltitudes) {
+  expectLevel(pathHeights({}, {}), 0);
+  expectLevel(pathHeights(images(), {}), kImages);
+  auto unknown = fixes(0.3);
+  for (MapFix& fix : unknown) fix.up_m = std::numeric_limits<double>::quiet_NaN();
+  expectLevel(pathHeights(images(), unknown), kImages);
+  auto constant = fixes(0.3);
+  for (MapFix& fix : constant) fix.up_m = 445.0;
+  expectLevel(pathHeights(images(), constant), kImages);  // the receiver measures none
+  auto half = fixes(0.3);
+  half.resize(half.size() / 3);
+  expectLevel(pathHeights(images(), half), kImages);  // there are images that no fix is near
 }
 
 }  // namespace

@@ -48,15 +48,9 @@ double largestError_rad(const AveragedRotations& averaged, const std::vector<Dri
   return largest;
 }
 
-std::vector<Eigen::Quaterniond> levelCameras(const std::vector<double>& yaws_rad) {
-  std::vector<Eigen::Quaterniond> cameras;
-  for (const double yaw_rad : yaws_rad) cameras.push_back(levelCamera(yaw_rad));
-  return cameras;
-}
-
 TEST(RotationAveraging, IsExactWhenAllAgree) {
   const auto poses = test::drive({});
-  const auto averaged = averageRotations(levelCameras(travelYawsOf(poses)), relativeOf(poses));
+  const auto averaged = averageRotations(travelYawsOf(poses), relativeOf(poses));
   ASSERT_EQ(averaged.camera_in_map.size(), poses.size());
   EXPECT_LT(largestError_rad(averaged, poses), 1e-6);
   EXPECT_LT(averaged.mounting_rad.norm(), 1e-6);
@@ -67,7 +61,7 @@ TEST(RotationAveraging, FindsThePitchOfTheMountingInTurns) {
   test::StreetDrive street;
   street.pitch_rad = 5.0 * kDegree_rad;
   const auto poses = test::drive(street);
-  const auto averaged = averageRotations(levelCameras(travelYawsOf(poses)), relativeOf(poses));
+  const auto averaged = averageRotations(travelYawsOf(poses), relativeOf(poses));
   EXPECT_NEAR(averaged.mounting_rad.x(), street.pitch_rad, 0.1 * kDegree_rad);
   EXPECT_LT(largestError_rad(averaged, poses), 0.1 * kDegree_rad);
 }
@@ -78,7 +72,7 @@ TEST(RotationAveraging, IgnoresPairsThatAreWrong) {
   auto relative = relativeOf(poses);
   std::mt19937 random(1);
   for (std::size_t i = 0; i < relative.size(); i += 5) relative[i].b_from_a = randomRotation(random);
-  const auto averaged = averageRotations(levelCameras(travelYawsOf(poses)), relative);
+  const auto averaged = averageRotations(travelYawsOf(poses), relative);
   EXPECT_LT(largestError_rad(averaged, poses), 0.1 * kDegree_rad);
 }
 
@@ -90,7 +84,7 @@ TEST(RotationAveraging, IgnoresDirectionsOfTravelThatAreWrongInPlaces) {
   for (std::size_t i = 0; i < yaws_rad.size(); ++i) {
     if (i % 25 >= 10 && i % 25 < 15) yaws_rad[i] += 20.0 * kDegree_rad;
   }
-  const auto averaged = averageRotations(levelCameras(yaws_rad), relativeOf(poses));
+  const auto averaged = averageRotations(yaws_rad, relativeOf(poses));
   EXPECT_LT(largestError_rad(averaged, poses), 0.5 * kDegree_rad);
 }
 
@@ -99,7 +93,7 @@ TEST(RotationAveraging, KeepsTheShapeWhenTheCameraLooksAside) {
   test::StreetDrive street;
   street.yaw_rad = 15.0 * kDegree_rad;
   const auto poses = test::drive(street);
-  const auto averaged = averageRotations(levelCameras(travelYawsOf(poses)), relativeOf(poses));
+  const auto averaged = averageRotations(travelYawsOf(poses), relativeOf(poses));
   const Eigen::Quaterniond off = averaged.camera_in_map[0] * poses[0].camera.rotation.conjugate();
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Eigen::Quaterniond expected = off * poses[i].camera.rotation;
@@ -110,7 +104,7 @@ TEST(RotationAveraging, KeepsTheShapeWhenTheCameraLooksAside) {
 
 TEST(RotationAveraging, WithoutPairsFollowsTheDirectionsOfTravel) {
   const auto poses = test::drive({});
-  EXPECT_LT(largestError_rad(averageRotations(levelCameras(travelYawsOf(poses)), {}), poses), 1e-6);
+  EXPECT_LT(largestError_rad(averageRotations(travelYawsOf(poses), {}), poses), 1e-6);
 }
 
 TEST(RotationAveraging, OfNothingIsNothing) {

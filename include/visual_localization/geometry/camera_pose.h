@@ -34,4 +34,10 @@ inline Eigen::Quaterniond levelCamera(double yaw_rad) {
   return Eigen::Quaterniond(axes);
 }
 
+/// Camera_in_map of a camera that looks along a road that climbs by `slope` (rise over run), and leans to no side.
+inline Eigen::Quaterniond uprightCamera(double yaw_rad, double slope) {
+  if (slope == 0.0) return levelCamera(yaw_rad);
+  return levelCamera(yaw_rad) * Eigen::AngleAxisd(std::atan(slope), Eigen::Vector3d::UnitX());
+}
+
 }  // namespace visual_localization

@@ -1,0 +1,109 @@
+// What a reconstruction came to, as the map takes it.
+#include <algorithm>
+#include <cmath>
+
+#include "base/statistics.h"
+#include "geometry/landmark_covariance.h"
+#include "geometry/reconstruction.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kFar_m = 3.0;                ///< an image moved by more than this is far from the cleaned path
+constexpr std::size_t kEnoughTracked = 20;    ///< features of an image on average, for their share to say anything
+constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
+
+}  // namespace
+
+std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) const {
+  std::vector<SessionGeometry> geometries(sessions_.size());
+  std::vector<std::vector<double>> errors_px(sessions_.size());
+  std::vector<std::size_t> tracked(sessions_.size());
+  std::vector<ImageGeometry> images(images_.size());
+  const std::vector<std::set<std::uint32_t>> tied = tiedSessions();
+  for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i, tied[i]);
+  for (const Landmark& landmark : problem_.landmarks) {
+    const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_.cameras);
+    ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
+    for (const LandmarkSighting& sighting : landmark.sightings) {
+      errors_px[sessionOf(sighting.image)].push_back(error(landmark, sighting) * focal_px(sighting.image));
+      addSighting(landmark, covariance, sighting.feature, first_id, images[sighting.image]);
+    }
+    ++first_id;
+  }
+  for (const FeatureTrack& track : tracks_) {
+    for (const FeatureObservation& seen : track) ++tracked[sessionOf(seen.image)];
+  }
+  addPath(images, geometries);
+  for (std::size_t k = 0; k < geometries.size(); ++k) {
+    SessionGeometry& geometry = geometries[k];
+    geometry.sightings = errors_px[k].size();
+    if (tracked[k] >= kEnoughTracked * geometry.images.size()) {
+      geometry.agreeing_share = static_cast<double>(geometry.sightings) / static_cast<double>(tracked[k]);
+    }
+    geometry.median_error_px = median(errors_px[k]);
+    geometry.mounting_rad = problem_.sessions[k].mounting_rad;
+    geometry.fix_delay_s = problem_.sessions[k].fix_delay_s;
+  }
+  return geometries;
+}
+
+/// The sessions that show landmarks of each image, its own included.
+std::vector<std::set<std::uint32_t>> Reconstruction::tiedSessions() const {
+  std::vector<std::set<std::uint32_t>> tied(images_.size());
+  for (std::size_t i = 0; i < images_.size(); ++i) tied[i].insert(images_[i].session);
+  for (const Landmark& landmark : problem_.landmarks) {
+    std::set<std::uint32_t> sessions;
+    for (const LandmarkSighting& sighting : landmark.sightings) sessions.insert(images_[sighting.image].session);
+    if (sessions.size() == 1) continue;
+    for (const LandmarkSighting& sighting : landmark.sightings)
+      tied[sighting.image].insert(sessions.begin(), sessions.end());
+  }
+  return tied;
+}
+
+/// Receivers err slowly, each recording by itself: where several are tied, their errors average out.
+double Reconstruction::fixBias_m(const std::set<std::uint32_t>& tied) const {
+  double information = 0.0;
+  for (const std::uint32_t session : tied) {
+    const double bias_m = std::max(config_.fix_bias * fix_sigmas_m_[session], 0.01);
+    information += 1.0 / (bias_m * bias_m);
+  }
+  return 1.0 / std::sqrt(information);
+}
+
+ImageGeometry Reconstruction::imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const {
+  ImageGeometry geometry;
+  geometry.camera = problem_.cameras[image];
+  Eigen::Matrix<double, 6, 1> sigmas;
+  const double bias_m = fixBias_m(tied);
+  sigmas << bias_m, bias_m, bias_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
+  geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
+  return geometry;
+}
+
+/// Images with enough landmarks, and how far they were moved.
+void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    SessionGeometry& geometry = geometries[sessionOf(i)];
+    const auto least = static_cast<std::size_t>(config_.min_landmarks);
+    if (images[i].landmarks.size() < least || isAstray(i)) {
+      geometry.images.emplace_back();
+      continue;
+    }
+    ImageGeometry& image = geometry.images.emplace_back(images[i]).value();
+    std::sort(image.landmarks.begin(), image.landmarks.end(),
+              [](const SeenLandmark& a, const SeenLandmark& b) { return a.feature < b.feature; });
+    ++geometry.located;
+    const double shift_m = shiftOf_m(i).head<2>().norm();
+    geometry.mean_shift_m += shift_m;
+    geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
+    geometry.far_share += shift_m > kFar_m ? 1.0 : 0.0;
+  }
+  for (SessionGeometry& geometry : geometries) {
+    if (geometry.located > 0) geometry.mean_shift_m /= static_cast<double>(geometry.located);
+    geometry.far_share /= static_cast<double>(std::max<std::size_t>(1, geometry.images.size()));
+  }
+}
+
+}  // namespace visual_localization
