@@ -11,9 +11,9 @@
 #include <ceres/rotation.h>
 #include <ceres/sized_cost_function.h>
 #include <ceres/solver.h>
-#include <glog/logging.h>
 
 #include "geometry/bundle_residuals.h"
+#include "geometry/quiet_ceres.h"
 #include "geometry/rotation_vector.h"
 
 namespace visual_localization {
@@ -22,18 +22,6 @@ namespace {
 constexpr double kTiltLoss = 2.0;      ///< sigmas
 constexpr double kAltitudeLoss = 2.0;  ///< sigmas
 constexpr double kRoughness_m = 0.01;  ///< of a level road, from one image to the next
-
-/// A step that cannot be solved is tried again with more damping. Ceres warns of each on stderr.
-class QuietCeres {
- public:
-  QuietCeres() : before_(std::exchange(FLAGS_minloglevel, google::GLOG_ERROR)) {}
-  ~QuietCeres() { FLAGS_minloglevel = before_; }
-  QuietCeres(const QuietCeres&) = delete;
-  QuietCeres& operator=(const QuietCeres&) = delete;
-
- private:
-  int before_;
-};
 
 /// The problem as Ceres takes it. Losses and parameters must live as long as Ceres works on it.
 class Adjustment {
