@@ -98,6 +98,13 @@ void printFile(std::ostream& out, const std::string& path, const TrainingMap& ma
       << " features\n";
 }
 
+void printHistory(std::ostream& out, const std::vector<std::string>& history) {
+  constexpr std::size_t kMostShown = 10;
+  const std::size_t first = history.size() - std::min(history.size(), kMostShown);
+  for (std::size_t i = first; i < history.size(); ++i) out << key("edited") << oneLine(history[i]) << '\n';
+  if (first > 0) out << key("") << "and " << first << " times before\n";
+}
+
 void printFeatures(std::ostream& out, const TrainingMap& map) {
   std::vector<std::size_t> counts;
   std::size_t total = 0;
@@ -284,6 +291,7 @@ void printAmbiguity(std::ostream& out, const TrainingMap& map, const AmbiguousPl
 
 void printMapReport(std::ostream& out, const std::string& path, const TrainingMap& map, const MapFindings& findings) {
   printFile(out, path, map);
+  printHistory(out, map.header().history);
   printFeatures(out, map);
   printLandmarks(out, map, findings.landmarks);
   printSessions(out, map, findings.survey);

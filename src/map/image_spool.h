@@ -8,6 +8,7 @@
 
 #include "base/files.h"
 #include "map/map_writer.h"
+#include "map/strict_loading.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 
@@ -37,8 +38,7 @@ class ImageSpool {
     if (!writer_) return std::make_shared<const TrainingMap>(header, std::move(in_memory_));
     writer_->finish(header);
     writer_.reset();
-    // An image that cannot be read back is no image without features: the map would be wrong without a word.
-    return loadMap(file_->path(), {kSpoolCache_bytes, [](const std::string& reason) { throw MapStoreError(reason); }});
+    return loadMap(file_->path(), strictLoading(kSpoolCache_bytes));
   }
 
  private:

@@ -53,7 +53,8 @@ std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<co
 
 }  // namespace
 
-MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources)
+MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources,
+                       const std::optional<MapBase>& base)
     : config_(requireValid(config)),
       resources_(resources),
       extraction_(std::make_unique<ExtractionPool>(config_.sift, config_.sift_backend, config_.preview_width_px,
@@ -61,6 +62,9 @@ MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
       spool_(std::make_unique<ImageSpool>(resources.spool_beside)) {
   header_.sift = config_.sift;
+  if (!base) return;
+  frame_ = LocalFrame(base->datum);
+  header_.image_size = report_.image_size = base->image_size;
 }
 
 MapBuilder::~MapBuilder() = default;
@@ -133,7 +137,9 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   if (!fits(grey.size())) return;
   SessionImages& session = report_.session_images.back();
   if (session.recorded.empty()) session.recorded = grey.size();
-  if (report_.images_kept == 0) header_.image_size = requireBounded(session.name, session.recorded);
+  if (header_.image_size.empty()) {
+    header_.image_size = report_.image_size = requireBounded(session.name, session.recorded);
+  }
   if (session.kept == 0) fitCamera();
   if (grey.size() != session.recorded) ++session.other_sizes[{grey.cols, grey.rows}];
   RawImage image;
@@ -245,6 +251,15 @@ std::shared_ptr<const TrainingMap> MapBuilder::build(const Progress& progress) {
 
 void MapBuilder::save(const std::string& path, const Progress& progress) {
   MapWriter writer(path);
+  write(writer, progress);
+}
+
+void MapBuilder::save(const PartialFile& file, const Progress& progress) {
+  MapWriter writer(file);
+  write(writer, progress);
+}
+
+void MapBuilder::write(MapWriter& writer, const Progress& progress) {
   finish([&writer](const TrainingImage& image) { writer.append(image); }, progress);
   writer.finish(header_);
 }

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "geometry/self_calibration.h"
+#include "map/image_placement.h"
+#include "map/spacing_filter.h"
 
 namespace visual_localization {
 namespace {
@@ -22,16 +24,8 @@ UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::siz
   return session;
 }
 
-/// The image is where the adjustment has the robot.
-void place(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry) {
-  const Eigen::Isometry3d base = mount.baseInMap(geometry.camera);
-  image.position_m = base.translation().head<2>();
-  image.yaw_rad = yawOf(base);
-  image.geometry = std::move(geometry);
-}
-
 /// From the antenna to the robot, which looks where it drives.
-void place(TrainingImage& image, const SensorMount& mount) {
+void placeByAntenna(TrainingImage& image, const SensorMount& mount) {
   image.position_m -= Eigen::Rotation2Dd(image.yaw_rad) * mount.antenna_m.head<2>();
 }
 
@@ -82,22 +76,20 @@ std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& 
   const std::vector<std::size_t> begin = begins(pruned, geometries.size());
   std::size_t thinned = 0;
   for (std::size_t k = 0; k < geometries.size(); ++k) {
-    const double spacing_m = geometries[k] ? std::max(config.spacing_m, config.geometry.spacing_m) : config.spacing_m;
-    std::optional<Eigen::Vector2d> last_m;
+    SpacingFilter spacing(geometries[k] ? std::max(config.spacing_m, config.geometry.spacing_m) : config.spacing_m);
     for (std::size_t i = begin[k]; i < begin[k + 1]; ++i) {
       TrainingImage image = pruned.image(i);
       const SensorMount mount = sessions[k].mount.value_or(SensorMount());
       if (geometries[k] && geometries[k]->images[i - begin[k]]) {
-        place(image, mount, std::move(*geometries[k]->images[i - begin[k]]));
+        placeByCamera(image, mount, std::move(*geometries[k]->images[i - begin[k]]));
       } else {
-        place(image, mount);
+        placeByAntenna(image, mount);
       }
-      if (last_m && (image.position_m - *last_m).norm() < spacing_m) {
+      if (spacing.keeps(image.position_m)) {
+        sink(image);
+      } else {
         ++thinned;
-        continue;
       }
-      last_m = image.position_m;
-      sink(image);
     }
   }
   return thinned;

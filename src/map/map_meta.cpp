@@ -15,6 +15,7 @@ constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
 constexpr const char* kMount = "/mount/";    ///< likewise
 constexpr const char* kMask = "/mask";
 constexpr const char* kGeometryCount = "geometry/images";
+constexpr const char* kHistory = "history/";  ///< before the number of the edit
 
 /// Removes `key` from `meta` and returns its value.
 template <class T>
@@ -144,6 +145,15 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
   return sessions;
 }
 
+std::vector<std::string> takeHistory(ParameterValues& meta) {
+  std::vector<std::string> history;
+  for (std::string key = kHistory + std::string("0"); meta.count(key) != 0;
+       key = kHistory + std::to_string(history.size())) {
+    history.push_back(take<std::string>(meta, key));
+  }
+  return history;
+}
+
 }  // namespace
 
 ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
@@ -156,6 +166,7 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
   meta["image/height_px"] = std::int64_t{header.image_size.height};
   meta["package_version"] = std::string(VISUAL_LOCALIZATION_VERSION);
   meta[kGeometryCount] = static_cast<std::int64_t>(geometry_count);
+  for (std::size_t i = 0; i < header.history.size(); ++i) meta[kHistory + std::to_string(i)] = header.history[i];
   for (std::size_t i = 0; i < header.sessions.size(); ++i) {
     const Session& session = header.sessions[i];
     const std::string key = sessionKey(i);
@@ -190,6 +201,7 @@ MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
   take<std::string>(meta, "package_version");
   header.sift = takeSift(meta);
   header.sessions = takeSessions(meta, version, header.image_size, masks);
+  if (version >= kSinceHistory) header.history = takeHistory(meta);
   if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");
   return header;
 }

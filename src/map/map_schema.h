@@ -32,6 +32,8 @@ constexpr int kSinceCameras = 4;
 constexpr int kSinceLandmarks = 4;
 /// From this version on the checksum of a row covers all that the table `images` says of its image.
 constexpr int kSinceBoundRows = 5;
+/// From this version on a map has a history.
+constexpr int kSinceHistory = 6;
 
 struct Table {
   const char* name;

@@ -46,11 +46,15 @@ LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig
   return LocalFrame(datumAt(fixes[static_cast<std::size_t>(first - cleaned.verdicts.begin())].position));
 }
 
+double distanceBetween_m(const GeodeticPoint& a, const GeodeticPoint& b) {
+  double distance_m = 0.0;
+  GeographicLib::Geodesic::WGS84().Inverse(a.latitude_deg, a.longitude_deg, b.latitude_deg, b.longitude_deg,
+                                           distance_m);
+  return distance_m;
+}
+
 void requireNear(const std::vector<Fix>& fixes, const GeodeticPoint& datum) {
-  const GeodeticPoint position = middleOf(fixes);
-  double distance_m = 0.0;  // on the earth, since a tangent plane shows its far side near the datum again
-  GeographicLib::Geodesic::WGS84().Inverse(datum.latitude_deg, datum.longitude_deg, position.latitude_deg,
-                                           position.longitude_deg, distance_m);
+  const double distance_m = distanceBetween_m(datum, middleOf(fixes));
   if (distance_m <= kFarthestSession_m) return;
   throw std::runtime_error("is " + std::to_string(std::llround(1e-3 * distance_m)) +
                            " km away from where the map begins, and one map reaches " +

@@ -11,6 +11,8 @@ namespace visual_localization {
 
 /// A frame around the first believable fix.
 LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config);
+/// On the earth, since a tangent plane shows its far side near the datum again.
+double distanceBetween_m(const GeodeticPoint& a, const GeodeticPoint& b);
 /// Refuses fixes whose middle is farther than kFarthestSession_m from the datum.
 void requireNear(const std::vector<Fix>& fixes, const GeodeticPoint& datum);
 /// Refuses a path that spans less than kSmallestSession_m: all images of the drive would be on one spot.

@@ -23,7 +23,7 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 
 TEST_F(MapStore, NamesBothVersions) {
   tamper("PRAGMA user_version = 7");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("versions 3 to 5")));
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("versions 3 to 6")));
 }
 
 TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
@@ -35,7 +35,7 @@ TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
   EXPECT_THAT(refusal(path_), HasSubstr("'geometry/images' is unknown"));
   tamper("DELETE FROM meta WHERE key = 'geometry/images'");
   EXPECT_THAT(refusal(path_), HasSubstr("'session/0/camera/cx' is unknown"));
-  tamper("PRAGMA user_version = 5");
+  tamper("PRAGMA user_version = 6");
   EXPECT_THAT(refusal(path_), HasSubstr("its schema has an unexpected table"));
 }
 

@@ -24,6 +24,8 @@ namespace visual_localization {
 
 class ExtractionPool;
 class ImageSpool;
+class MapWriter;
+class PartialFile;
 struct MapFix;
 struct RawImage;
 
@@ -57,7 +59,7 @@ struct SessionCamera {
 struct SessionImages {
   std::string name;
   std::size_t kept = 0;
-  cv::Size recorded;  ///< SessionCamera::image_size, or the size of its first image; the map's is the first session's
+  cv::Size recorded;  ///< SessionCamera::image_size, or the size of its first image
   SessionCamera camera;
   bool calibrated_by_images = false;  ///< nobody gave `camera` a model: its images did
   SessionLandmarks geometry = {};     ///< complete when the map is built
@@ -75,6 +77,7 @@ constexpr double kStandingTime_s = 10.0;
 
 /// What was kept and why the rest was dropped.
 struct MapBuildReport {
+  cv::Size image_size;  ///< of the map's images, pixels; empty until the first one
   std::size_t images_kept = 0;
   std::size_t images_without_position = 0;  ///< before the first or after the last believable fix
   std::size_t images_too_close = 0;         ///< nearer than min_spacing_m
@@ -96,10 +99,18 @@ struct MapBuilderResources {
   std::string spool_beside;
 };
 
+/// What new sessions take over from a map that they will be added to.
+struct MapBase {
+  GeodeticPoint datum;
+  cv::Size image_size;
+};
+
 /// Collects sessions and makes the map: first all fixes of a session, then its images in order of time.
 class MapBuilder {
  public:
-  explicit MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources = {});
+  /// Without a `base` the first session decides about datum and image size.
+  explicit MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources = {},
+                      const std::optional<MapBase>& base = {});
   ~MapBuilder();
 
   /// Starts a session: cleans its fixes. The first believable fix ever given becomes the datum. Throws
@@ -122,6 +133,8 @@ class MapBuilder {
   /// The same map as a file, written image by image: what is in memory does not grow with the map, but for the poses.
   /// Throws MapStoreError besides.
   void save(const std::string& path, const Progress& progress = {});
+  /// The same into a file that stays the caller's: nothing is put in place.
+  void save(const PartialFile& file, const Progress& progress = {});
 
   /// Its features are complete when the map is built.
   const MapBuildReport& report() const { return report_; }
@@ -136,6 +149,7 @@ class MapBuilder {
   void extractWaiting();
   void calibrate(const TrainingMap& pruned);
   void finish(const Sink& sink, const Progress& progress);
+  void write(MapWriter& writer, const Progress& progress);
   void prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress);
   bool hasCalibratedSession() const;
   bool adjusts() const;

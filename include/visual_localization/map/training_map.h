@@ -67,10 +67,11 @@ struct Session {
 
 /// What holds for all images of a map.
 struct MapHeader {
-  GeodeticPoint datum;            ///< origin of the map frame
-  cv::Size image_size;            ///< pixels; live images are resized to it
-  SiftConfig sift;                ///< how features were extracted
-  std::vector<Session> sessions;  ///< its recordings
+  GeodeticPoint datum;                    ///< origin of the map frame
+  cv::Size image_size;                    ///< pixels; live images are resized to it
+  SiftConfig sift;                        ///< how features were extracted
+  std::vector<Session> sessions;          ///< its recordings
+  std::vector<std::string> history = {};  ///< what became of it after it was built: a line for each edit, oldest first
 };
 
 /// Axis-aligned rectangle in the map frame, metres. A range may be zero (a single straight street).
