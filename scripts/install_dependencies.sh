@@ -16,6 +16,7 @@ libceres-dev: adjustment of landmarks and poses
 libnanoflann-dev: search for the training images near a position
 libgeographiclib-dev: GPS positions to metres
 libcli11-dev: command lines of the programs
+libboost-dev: polygons; bags
 libyaml-cpp-dev: configuration files
 nlohmann-json3-dev: GeoJSON export of maps
 libhwy-dev: vectorised SIFT and comparison of descriptors
@@ -28,7 +29,7 @@ libcv-bridge-dev libimage-transport-dev: images from a camera
 libjpeg-dev libpng-dev: compressed images
 libcamera-calibration-parsers-dev: calibration files of cameras
 libtf2-ros-dev libtf2-geometry-msgs-dev libtf2-eigen-dev: tf
-librosbag-dev librosbag-storage-dev libroslz4-dev libbz2-dev libboost-dev: bags
+librosbag-dev librosbag-storage-dev libroslz4-dev libbz2-dev: bags
 libdiagnostic-updater-dev: diagnostics
 libdynamic-reconfigure-config-init-mutex-dev: parameters that change while it runs
 librostest-dev: tests of the running node

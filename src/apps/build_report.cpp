@@ -109,12 +109,6 @@ void printOtherSizes(const SessionImages& session) {
   std::cout << '\n';
 }
 
-/// The size of the map's images is that of the first.
-void printSessionImages(const std::vector<SessionImages>& sessions) {
-  const auto first = std::find_if(sessions.begin(), sessions.end(), [](const auto& session) { return session.kept; });
-  for (const SessionImages& session : sessions) printImages(session, first->recorded);
-}
-
 std::size_t fixesKept(const MapBuildReport& report) {
   std::size_t kept = 0;
   for (const CleanedTrajectory& session : report.sessions) {
@@ -148,7 +142,9 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
     if (geometry.enabled) printGeometry(session);
   }
   for (const SessionImages& session : report.session_images) printOtherSizes(session);
-  if (sessions.size() > 1) printSessionImages(report.session_images);
+  for (const SessionImages& session : report.session_images) {
+    if (sessions.size() > 1 || session.recorded != report.image_size) printImages(session, report.image_size);
+  }
   std::cout << "images: " << (report.images_kept - report.images_thinned) << " kept, " << report.images_without_position
             << " without position, " << report.images_too_close << " too close, " << report.images_thinned
             << " left out after the adjustment, " << report.images_disordered << " out of order, "

@@ -23,6 +23,9 @@ constexpr int kFailedRun = 1;
 constexpr int kBadUsage = 2;
 
 constexpr std::size_t kMostThreads = 1024;
+constexpr int kMostMaps = 100'000;
+constexpr double kLeastSpacing_m = 0.01;
+constexpr double kMostSpacing_m = 1000.0;
 
 /// "I/N" as part I of N; nothing for anything else.
 std::optional<Shard> shardOf(const std::string& text) {
@@ -62,7 +65,8 @@ void declareCamera(CLI::App& app, Options& options, const std::string& otherwise
   app.add_option("--mask", options.mask, "Grey PNG of the camera's size: features are used where it is white");
 }
 
-void declareOptions(CLI::App& app, MapBuilderOptions& options) {
+/// Where sessions come from.
+void declareRecordings(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--bag", options.bags, "Recording; repeat it for more sessions in one map")
       ->required()
       ->take_all()
@@ -71,7 +75,6 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--image-topic", options.image_topic, "Raw or compressed images; finds \"/compressed\" itself")
       ->capture_default_str();
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix")->capture_default_str();
-  app.add_option("--output", options.output, "Map file to write")->required();
   declareCamera(app, options, "the camera_info beside the image topic");
   app.add_option("--config", options.config, "Parameters, YAML (see config/map_builder.yaml)");
   app.add_option("--min-spacing", options.min_spacing_m,
@@ -79,15 +82,64 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--spacing", options.spacing_m,
                  "Metres between training images that are kept after the adjustment (parameters 'map/spacing', "
                  "'geometry/spacing')");
-  app.add_option("--threads", options.threads, "Threads for extraction; the map does not depend on it")
+}
+
+void declareThreads(CLI::App& app, std::size_t& threads) {
+  app.add_option("--threads", threads, "Threads to use; the map does not depend on it")
       ->check(CLI::Range(std::size_t{1}, kMostThreads))
       ->capture_default_str();
+}
+
+void declareOptions(CLI::App& app, MapBuilderOptions& options) {
+  declareRecordings(app, options);
+  app.add_option("--output", options.output, "Map file to write")->required();
+  declareThreads(app, options.threads);
   app.add_option("--sift-backend", options.sift_backend, "'native' or 'opencv' (parameter 'map/sift_backend')");
   app.add_flag("--self-calibrate", options.self_calibrate,
                "Without a calibration find the focal length by the images (parameter 'geometry/self_calibration')");
   app.add_option("--plot", options.plot,
                  "Draw fixes, path and landmarks of each session into this PNG, SVG or PDF, by the ending")
       ->check(must(isPicture, "end in .png, .svg or .pdf"));
+}
+
+/// One of map_edit's commands, on one map.
+CLI::App& declareCommand(CLI::App& app, MapEditOptions& options, const char* name, const char* what) {
+  CLI::App& command = *app.add_subcommand(name, what);
+  command.callback([&options, name] { options.command = name; });
+  command.add_option("--output", options.output, "Map file to write")->required();
+  return command;
+}
+
+void declareOptions(CLI::App& app, MapEditOptions& options) {
+  app.require_subcommand(1);
+  const auto declare = [&](const char* name, const char* what) -> CLI::App& {
+    CLI::App& command = declareCommand(app, options, name, what);
+    command.add_option("--map", options.map, "Map file; it stays as it is")->required();
+    return command;
+  };
+  CLI::App& add = declare("add", "Adds recordings to a map, without those that it was made of");
+  declareRecordings(add, options.build);
+  declareThreads(add, options.build.threads);
+  CLI::App& merge = declareCommand(app, options, "merge", "Makes one map of several; the oldest one stays in place");
+  merge.add_option("maps", options.maps, "Map files; they stay as they are")->required()->expected(2, kMostMaps);
+  declareThreads(merge, options.build.threads);
+  declare("remove", "Leaves out a session").add_option("--session", options.session, "Its name")->required();
+  declare("cut", "Keeps what is inside polygons")
+      .add_option("--polygon", options.polygon, "GeoJSON file with a Polygon or several")
+      ->required();
+  declare("thin", "Leaves out images that are close to the one before")
+      .add_option("--spacing", options.spacing_m, "Metres between images of a session")
+      ->required()
+      ->check(CLI::Range(kLeastSpacing_m, kMostSpacing_m));
+  CLI::App& summarise = declare("summarise", "Keeps what drives used, and one image of each session at each place");
+  summarise.add_option("--usage", options.usage, "What a drive used (localize --usage); repeat it for more drives")
+      ->required()
+      ->take_all()
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  summarise.add_option("--per-place", options.images_per_place, "Images that stay within 5 m, all sessions together")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1000}))
+      ->capture_default_str();
 }
 
 void declareOptions(CLI::App& app, MapInfoOptions& options) {
@@ -133,6 +185,7 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
       ->capture_default_str();
   declareCamera(app, options, "the camera_info beside the image topic, or the map's");
   app.add_option("--truth-topic", options.truth_topic, "NavSatFix with true positions: prints the error");
+  app.add_option("--usage", options.usage, "Write which training images and landmarks the poses rest on, CSV");
 }
 
 void declareOptions(CLI::App& app, EvaluateOptions& options) {
@@ -211,6 +264,11 @@ std::size_t allCores() { return std::max(1U, std::thread::hardware_concurrency()
 int runProgram(int argc, char** argv, void (*body)(const MapBuilderOptions& options)) {
   CLI::App app("Builds a map from recordings: images and DGPS fixes in, training images with positions out.",
                "map_builder");
+  return run(app, argc, argv, body);
+}
+
+int runProgram(int argc, char** argv, void (*body)(const MapEditOptions& options)) {
+  CLI::App app("Makes a map of others: adds, merges, removes, cuts, thins and summarises.", "map_edit");
   return run(app, argc, argv, body);
 }
 

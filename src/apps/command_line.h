@@ -31,6 +31,19 @@ struct MapBuilderOptions {
   bool self_calibrate = false;
 };
 
+struct MapEditOptions {
+  std::string command;  ///< "add", "merge", "remove", "cut", "thin" or "summarise"
+  std::string map;
+  std::vector<std::string> maps;  ///< of "merge"
+  std::string output;
+  MapBuilderOptions build;  ///< of "add"; its threads are of "merge", too
+  std::string session;
+  std::string polygon;
+  double spacing_m = 0.0;
+  std::vector<std::string> usage;
+  std::size_t images_per_place = 4;
+};
+
 struct MapInfoOptions {
   std::string map;
   bool check = false;
@@ -54,6 +67,7 @@ struct LocalizeOptions {
   std::string truth_topic;
   std::string camera_info;
   std::string mask;
+  std::string usage;
   std::optional<std::int64_t> particles;
   std::optional<std::int64_t> seed;
   std::optional<std::int64_t> map_cache_mb;
@@ -76,6 +90,7 @@ struct EvaluateOptions {
 /// run, 2 for bad usage. Whatever goes wrong becomes one line on standard error. Unfinished output disappears, also
 /// when the program is interrupted.
 int runProgram(int argc, char** argv, void (*body)(const MapBuilderOptions& options));
+int runProgram(int argc, char** argv, void (*body)(const MapEditOptions& options));
 int runProgram(int argc, char** argv, void (*body)(const MapInfoOptions& options));
 int runProgram(int argc, char** argv, void (*body)(const LocalizeOptions& options));
 int runProgram(int argc, char** argv, void (*body)(const EvaluateOptions& options));

@@ -9,6 +9,7 @@
 #include "apps/app_support.h"
 #include "apps/command_line.h"
 #include "base/files.h"
+#include "editing/map_usage.h"
 #include "evaluation/drive_order.h"
 #include "evaluation/metrics.h"
 #include "evaluation/round_recorder.h"
@@ -180,9 +181,13 @@ void setCamera(const LocalizeOptions& options, const NodeConfig& config, const B
 
 void run(const LocalizeOptions& options) {
   const NodeParameters config = configOf(options);
-  requireNoInput("--output", options.output,
-                 {options.map, options.bag, options.config, options.camera_info, options.mask});
+  std::vector<std::string> inputs{options.map, options.bag, options.config, options.camera_info, options.mask};
+  requireNoInput("--output", options.output, inputs);
+  inputs.push_back(options.output);
+  if (!options.usage.empty()) requireNoInput("--usage", options.usage, inputs);
   PartialFile output(options.output);  // fails now, not after the run
+  std::optional<PartialFile> usage_file;
+  if (!options.usage.empty()) usage_file.emplace(options.usage);
   const auto warn_of_map = [](const std::string& reason) { warn("localize: " + reason); };
   Localizer localizer(loadMap(options.map, config.node.mapLoading(warn_of_map)), config.localizer);
   const BagReader bag(options.bag);
@@ -196,6 +201,7 @@ void run(const LocalizeOptions& options) {
   std::vector<double> errors_m;
   std::string first_refusal;
   Totals totals;
+  MapUsage usage;
   ProgressBar progress("localize");
   for (std::size_t step = 0; step < order.size(); ++step) {
     progress.show(step, order.size());
@@ -206,6 +212,7 @@ void run(const LocalizeOptions& options) {
     }
     track += trackCsvRow(*estimate);
     totals.add(*estimate);
+    if (estimate->source == PoseSource::kMetric) usage.add(localizer.map(), localizer.lastLandmarks());
     const auto true_point = truth ? truth->at(estimate->stamp_ns) : std::nullopt;
     if (true_point) errors_m.push_back((estimate->pose.position_m - true_point->position_m).norm());
   }
@@ -213,6 +220,8 @@ void run(const LocalizeOptions& options) {
   if (totals.images == 0) throw BagError(options.bag + ": no usable image on " + images.topic() + ": " + first_refusal);
   output.write(track);
   output.commit();
+  if (usage_file) usage_file->write(usage.toCsv());
+  if (usage_file) usage_file->commit();
   if (!first_refusal.empty())
     warn("localize: " + std::to_string(totals.unusable) + " images skipped, first " + first_refusal);
   if (!totals.camera_trouble.empty()) warn("localize: camera: " + totals.camera_trouble);

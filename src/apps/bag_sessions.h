@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/command_line.h"
+#include "apps/map_plot.h"
+#include "visual_localization/map/map_builder.h"
+
+/// How recordings become sessions of a map.
+namespace visual_localization::apps {
+
+/// The parameters of a file, if there is one, and what the options say otherwise. Throws ParameterError or UsageError.
+MapBuilderConfig readConfig(const MapBuilderOptions& options);
+
+/// Throws UsageError when two of these are one file: the map would be twice as large and show nothing more, while two
+/// sessions seemed to see every position.
+void requireDifferent(const std::string& what, const std::vector<std::string>& files);
+
+/// Gives the builder what the bag has: fixes, camera, mount and images. Appends it to `sessions`, with a name that none
+/// of them has. Throws BagError and whatever MapBuilder throws.
+void addSession(MapBuilder& builder, const std::string& bag, const MapBuilderOptions& options,
+                const MapBuilderConfig& config, std::vector<PlottedSession>& sessions);
+
+}  // namespace visual_localization::apps
