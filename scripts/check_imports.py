@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Iterator, Optional, Tuple
 
 PACKAGE = 'visual_localization'
-ORDER = ['base', 'parameters', 'geo', 'camera', 'features', 'geometry', 'map', 'localization', 'survey', 'editing', 'ros', 'bag',
+ORDER = ['base', 'parameters', 'geo', 'camera', 'features', 'geometry', 'map', 'localization', 'editing', 'survey', 'ros', 'bag',
          'evaluation', 'node', 'apps']
 KNOWS_ROS = {'ros', 'bag', 'node', 'apps'}
 READS_BAGS = {'round_recorder'}  # of evaluation/: the rest of it belongs to the library without ROS

@@ -1,4 +1,4 @@
-#include <chrono>
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <iomanip>
@@ -8,18 +8,20 @@
 #include <utility>
 #include <vector>
 
+#include <pwd.h>
+#include <unistd.h>
+
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/build_report.h"
 #include "apps/command_line.h"
-#include "apps/provenance.h"
 #include "apps/region.h"
 #include "base/files.h"
 #include "base/text.h"
 #include "editing/map_merger.h"
 #include "editing/map_selection.h"
 #include "editing/map_usage.h"
-#include "map/strict_loading.h"
+#include "map/map_writer.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
 
@@ -28,6 +30,26 @@ namespace {
 
 constexpr std::size_t kCache_bytes = std::size_t{512} << 20U;  ///< of all maps together
 constexpr std::size_t kMostText_bytes = std::size_t{256} << 20U;
+
+std::string user() {
+  const passwd* entry = ::getpwuid(::geteuid());
+  return entry == nullptr ? std::to_string(::geteuid()) : entry->pw_name;
+}
+
+std::string host() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "?";
+}
+
+/// For MapHeader::history: what was done, from which files, by which version, and by whom: "merge of north.map,
+/// south.map by map_edit 0.2.0, anna@workshop".
+std::string provenance(const std::string& command, const std::vector<std::string>& from) {
+  constexpr std::size_t kLongest = 4000;  // a job of a thousand maps names the first hundred
+  std::vector<std::string> names;
+  for (const std::string& path : from) names.push_back(std::filesystem::path(path).filename().string());
+  return oneLine(command + " of " + joined(names), kLongest) + " by map_edit " + VISUAL_LOCALIZATION_VERSION + ", " +
+         oneLine(user() + "@" + host());
+}
 
 std::shared_ptr<const TrainingMap> openMap(const std::string& path, std::size_t of = 1) {
   return loadMap(path, strictLoading(kCache_bytes / of));

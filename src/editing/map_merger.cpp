@@ -11,7 +11,7 @@
 
 #include "editing/frame_change.h"
 #include "editing/map_alignment.h"
-#include "map/image_placement.h"
+#include "map/map_geometry.h"
 #include "map/map_writer.h"
 #include "map/session_frame.h"
 #include "visual_localization/map/map_builder.h"

@@ -8,7 +8,6 @@
 
 #include "base/files.h"
 #include "map/map_writer.h"
-#include "map/strict_loading.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 

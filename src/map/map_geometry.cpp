@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "geometry/self_calibration.h"
-#include "map/image_placement.h"
 #include "map/spacing_filter.h"
 
 namespace visual_localization {
@@ -38,6 +37,13 @@ std::vector<std::size_t> begins(const TrainingMap& map, std::size_t sessions) {
 }
 
 }  // namespace
+
+void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry) {
+  const Eigen::Isometry3d base = mount.baseInMap(geometry.camera);
+  image.position_m = base.translation().head<2>();
+  image.yaw_rad = yawOf(base);
+  image.geometry = std::move(geometry);
+}
 
 std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned, const std::vector<Session>& sessions,
                                                        const std::vector<std::vector<MapFix>>& fixes,

@@ -11,6 +11,9 @@
 
 namespace visual_localization {
 
+/// The image is where the robot was by the pose of its camera.
+void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry);
+
 /// Landmarks and poses of the sessions that have a camera, from their pruned images, which follow each other session by
 /// session. `fixes`: of each session.
 std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned, const std::vector<Session>& sessions,

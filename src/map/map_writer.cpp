@@ -172,6 +172,10 @@ class MapWriter::Tables {
   map_schema::Checksum checksum_;
 };
 
+MapLoading strictLoading(std::size_t cache_bytes) {
+  return {cache_bytes, [](const std::string& reason) { throw MapStoreError(reason); }};
+}
+
 MapWriter::MapWriter(const std::string& path)
     : path_(path),
       file_(withPath(path, [&path] { return std::make_unique<PartialFile>(path); })),

@@ -1,13 +1,19 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 
+#include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 
 class PartialFile;
+
+/// For a map that is copied image by image: an image that cannot be read is no image without features, since the copy
+/// would be wrong without a word. It throws MapStoreError.
+MapLoading strictLoading(std::size_t cache_bytes);
 
 /// Writes a map image by image, so that it need not fit into memory; only the poses are kept until the end. One SQLite
 /// file, filled in one transaction under a temporary name beside its own: without finish() nothing has happened.

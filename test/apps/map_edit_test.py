@@ -6,14 +6,15 @@ import re
 import resource
 import shutil
 import sqlite3
+import subprocess
 import sys
 import tempfile
 import unittest
 from pathlib import Path
 
-from program_runner import ProgramTest, run
+from program_runner import PROGRAMS, ProgramTest, run
 
-MAP, SUNNY, CLOUDY = (Path(argument) for argument in sys.argv[2:5])
+MAP, SUNNY, CLOUDY, MAP_ERROR = (Path(argument) for argument in sys.argv[2:6])
 
 
 class MapEditTest(ProgramTest):
@@ -71,6 +72,15 @@ class MapEditTest(ProgramTest):
         self.assertIn('edited:      add of campus_sunny_1.map, campus_cloudy_1.bag by map_edit',
                       run('map_info', self.both).stdout)
         self.assertLess(float(self.driven.stdout.split('mean ')[1].split(' m')[0]), .3, self.driven.stdout)
+
+    def test_the_same_place_lies_once(self):
+        command = [sys.executable, MAP_ERROR, '--map', self.both, '--bag', SUNNY, '--bag', CLOUDY, '--programs', PROGRAMS]
+        result = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=True)
+        images, mean, most = re.search(r'same place as before at (\d+) images, apart mean ([\d.]+) m, 95 % ([\d.]+)',
+                                       result.stdout).groups()
+        self.assertGreater(int(images), 100)
+        self.assertLess(float(mean), .1)
+        self.assertLess(float(most), .2)
 
     def test_merged_maps_are_those_of_an_addition(self):
         cloudy = self.folder / 'cloudy.map'

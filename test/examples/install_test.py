@@ -94,7 +94,7 @@ class InstallTest(unittest.TestCase):
 
     def test_programs_and_scripts_run_where_they_are_installed(self):
         names = sorted(path.name for path in PROGRAMS.iterdir() if path.is_file())
-        for name in ('map_builder', 'map_info', 'localize', 'evaluate', 'localizer_node', 'plot_map.py',
+        for name in ('map_builder', 'map_edit', 'map_info', 'localize', 'evaluate', 'localizer_node', 'plot_map.py',
                      'plot_status.py', 'record_track.py', 'report_track.py', 'report_evaluation.py'):
             self.assertIn(name, names)
             result = run('bash', '-c', f'source {PREFIX}/setup.bash && exec {PROGRAMS / name} --help')
