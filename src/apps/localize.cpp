@@ -1,5 +1,6 @@
 // Localises a recorded drive against a map: what the robot does, without a robot.
 
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <optional>
@@ -115,11 +116,10 @@ void print(const ErrorStatistics& errors) {
 }
 
 /// One image; nothing when it cannot be used: that does not end the run, and the first reason is kept.
-std::optional<Estimate> localizeImage(const BagImages& images, std::size_t index, Localizer& localizer,
+std::optional<Estimate> localizeImage(const BagImage& image, std::size_t index, Localizer& localizer,
                                       std::string& reason) {
   std::string refusal;
   try {
-    const BagImage image = images.read(index);
     return localizer.process(image.stamp_ns, image.decode());
   } catch (const ImageError& error) {
     refusal = error.what();
@@ -179,6 +179,41 @@ void setCamera(const LocalizeOptions& options, const NodeConfig& config, const B
   if (!other.empty()) std::printf("camera: not the map's: %s\n", other.c_str());
 }
 
+/// Odometry of the drive, as the robot would get it: up to the stamp of an image before the image. What lies between
+/// two images that do not follow each other was not driven.
+class OdometryFeed {
+ public:
+  explicit OdometryFeed(std::vector<OdometryReading> readings) : readings_(std::move(readings)) {
+    std::stable_sort(readings_.begin(), readings_.end(), isBefore);
+  }
+
+  void feed(std::int64_t stamp_ns, bool follows, Localizer& localizer) {
+    if (!follows) next_ = first(stamp_ns - kBefore_ns);
+    for (; next_ < readings_.size() && readings_[next_].stamp_ns <= stamp_ns; ++next_) {
+      localizer.addOdometry(readings_[next_]);
+    }
+  }
+
+ private:
+  static constexpr std::int64_t kBefore_ns = 500'000'000;
+
+  static bool isBefore(const OdometryReading& a, const OdometryReading& b) { return a.stamp_ns < b.stamp_ns; }
+
+  std::size_t first(std::int64_t stamp_ns) const {
+    const auto found =
+        std::lower_bound(readings_.begin(), readings_.end(), OdometryReading{stamp_ns, {}, 0.0}, isBefore);
+    return static_cast<std::size_t>(found - readings_.begin());
+  }
+
+  std::vector<OdometryReading> readings_;
+  std::size_t next_ = 0;
+};
+
+OdometryFeed odometryOf(const LocalizeOptions& options, const NodeConfig& config, const BagReader& bag) {
+  if (options.odom_topic.empty()) return OdometryFeed({});
+  return OdometryFeed(bag.odometry(options.odom_topic, config.base_frame_id, config.global_frame_id));
+}
+
 void run(const LocalizeOptions& options) {
   const NodeParameters config = configOf(options);
   std::vector<std::string> inputs{options.map, options.bag, options.config, options.camera_info, options.mask};
@@ -202,10 +237,14 @@ void run(const LocalizeOptions& options) {
   std::string first_refusal;
   Totals totals;
   MapUsage usage;
+  OdometryFeed odometry = odometryOf(options, config.node, bag);
   ProgressBar progress("localize");
   for (std::size_t step = 0; step < order.size(); ++step) {
     progress.show(step, order.size());
-    const std::optional<Estimate> estimate = localizeImage(images, order[step], localizer, first_refusal);
+    const bool follows = step > 0 && order[step] == order[step - 1] + 1;
+    const BagImage image = images.read(order[step]);
+    odometry.feed(image.stamp_ns, follows, localizer);
+    const std::optional<Estimate> estimate = localizeImage(image, order[step], localizer, first_refusal);
     if (!estimate) {
       ++totals.unusable;
       continue;

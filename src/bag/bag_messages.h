@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <nav_msgs/Odometry.h>
 #include <ros/serialization.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
@@ -123,6 +124,12 @@ inline void requireLengths(std::string_view bytes, const sensor_msgs::CameraInfo
   constexpr std::uint64_t kBinning = 2 * 4;
   constexpr std::uint64_t kRegion = 4 * 4 + 1;
   skipHeader(bytes).skip(8).skipArray().skipArray(sizeof(double)).skip(kMatrices + kBinning + kRegion);
+}
+
+inline void requireLengths(std::string_view bytes, const nav_msgs::Odometry*) {
+  constexpr std::uint64_t kPose = (7 + 36) * sizeof(double);
+  constexpr std::uint64_t kTwist = (6 + 36) * sizeof(double);
+  skipHeader(bytes).skipArray().skip(kPose + kTwist);
 }
 
 inline void requireLengths(std::string_view bytes, const tf2_msgs::TFMessage*) {

@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "base/time.h"
 #include "ros/camera_info.h"
+#include "ros/odometry_message.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
@@ -156,6 +157,27 @@ std::optional<CameraModel> BagReader::camera(const std::string& image_topic) con
 
 bool BagReader::hasFixes(const std::string& topic) const {
   return withBag(path_, [&] { return topicsOf<sensor_msgs::NavSatFix>(*file_).count(topic) != 0; });
+}
+
+std::vector<OdometryReading> BagReader::odometry(const std::string& topic, const std::string& base_frame,
+                                                 const std::string& map_frame) const {
+  return withBag(path_, [&] {
+    if (topicsOf<nav_msgs::Odometry>(*file_).count(topic) == 0) {
+      throw BagError(path_ + ": no odometry topic '" + topic +
+                     "'; odometry topics in this bag: " + listTopics<nav_msgs::Odometry>(*file_));
+    }
+    std::vector<OdometryReading> readings;
+    for (const bag::Message& message : messagesOf<nav_msgs::Odometry>(*file_, topic)) {
+      const auto reading = deserialize<nav_msgs::Odometry>(file_->read(message));
+      try {
+        readings.push_back(toReading(*reading, stampOf(reading->header, message), base_frame, map_frame));
+      } catch (const std::invalid_argument& error) {
+        throw BagError(path_ + ": " + oneLine(topic) + ": message " + std::to_string(readings.size()) + ": " +
+                       error.what());
+      }
+    }
+    return readings;
+  });
 }
 
 std::vector<Fix> BagReader::fixes(const std::string& topic) const {

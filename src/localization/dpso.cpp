@@ -4,35 +4,11 @@
 #include <cmath>
 #include <utility>
 
-#include "visual_localization/geo/local_frame.h"
+#include "localization/motion_model.h"
 #include "visual_localization/localization/particles.h"
 
 namespace visual_localization {
 namespace {
-
-/// Keeps a particle inside the area and stops the velocity that led out of it.
-void keepInside(Particle& particle, const Area& area) {
-  for (int axis = 0; axis < 2; ++axis) {
-    const double inside = std::clamp(particle.position_m[axis], area.min_m[axis], area.max_m[axis]);
-    if (inside != particle.position_m[axis]) particle.velocity_m[axis] = 0.0;
-    particle.position_m[axis] = inside;
-  }
-}
-
-/// Keeps a particle this close to a position and stops the velocity that led away from it.
-void keepNear(Particle& particle, const Eigen::Vector2d& position_m, double farthest_m) {
-  const Eigen::Vector2d offset_m = particle.position_m - position_m;
-  const double distance_m = offset_m.norm();
-  if (distance_m <= farthest_m) return;
-  const Eigen::Vector2d away = offset_m / distance_m;
-  particle.position_m = position_m + farthest_m * away;
-  particle.velocity_m -= std::max(0.0, particle.velocity_m.dot(away)) * away;
-}
-
-Area wholeFrame() {
-  const Eigen::Vector2d farthest_m = Eigen::Vector2d::Constant(kLargestCoordinate_m);
-  return {-farthest_m, farthest_m};
-}
 
 /// Length of a displacement in shares of the area's range; an axis without range cannot be travelled.
 double relativeLength(const Eigen::Vector2d& displacement_m, const Eigen::Vector2d& range_m) {
@@ -52,8 +28,14 @@ double approach(double from, double to, double start, double share) {
 
 }  // namespace
 
-Dpso::Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed)
-    : map_(map), config_(config), fitness_config_(fitness), random_(seed), area_(map.area()) {
+Dpso::Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed,
+           const OdometryConfig& odometry)
+    : map_(map),
+      config_(config),
+      fitness_config_(fitness),
+      odometry_config_(odometry),
+      random_(seed),
+      area_(map.area()) {
   particles_.resize(static_cast<std::size_t>(config.particles));
   fitness_.resize(particles_.size());
   reset();
@@ -88,6 +70,7 @@ void Dpso::reset(const Prior& prior) {
 void Dpso::configure(const TrackerConfig& config) {
   const DpsoConfig before = std::exchange(config_, config.dpso);
   fitness_config_ = config.fitness;
+  odometry_config_ = config.odometry;
   if (config_.v0 != before.v0) tuning_.v0 = config_.v0;
   if (config_.quantum_share != before.quantum_share) tuning_.quantum_share = config_.quantum_share;
   if (config_.phi2 != before.phi2) tuning_.phi2 = config_.phi2;
@@ -98,6 +81,7 @@ void Dpso::configure(const TrackerConfig& config) {
 }
 
 TrackerEstimate Dpso::update(const TrackerInput& input) {
+  if (seen_an_image_ && input.travel.odometry) shift(*input.travel.odometry);
   for (Particle& particle : particles_) {
     if (particle.kind == ParticleKind::kQuantum && isGuided()) {
       particle.velocity_m.setZero();
@@ -121,6 +105,17 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   return result;
 }
 
+/// The swarm moves with the robot; what is left for it to do is small.
+void Dpso::shift(const OdometryIncrement& odometry) {
+  for (Particle& particle : particles_) {
+    if (random_.uniform(0.0, 1.0) < odometry_config_.share) {
+      particle.position_m += wayInMap(map_, particle.position_m, odometry);
+    }
+  }
+  if (attractor_m_) *attractor_m_ += wayInMap(map_, *attractor_m_, odometry);
+  if (centre_of_mass_m_) centre_of_mass_m_ = centreOfMass();
+}
+
 void Dpso::attract(const Eigen::Vector2d& position_m) {
   attractor_m_ = position_m;
   position_unknown_ = false;
@@ -139,15 +134,6 @@ void Dpso::assignKinds() {
                          : i + high_energy >= particles_.size() ? ParticleKind::kHighEnergy
                                                                 : ParticleKind::kStandard;
   }
-}
-
-/// The papers let particles go where they will; nothing is known of positions outside of the map's frame.
-void Dpso::confine(Particle& particle) const {
-  if (config_.confine == "box") return keepInside(particle, area_);
-  keepInside(particle, wholeFrame());
-  if (config_.confine == "none") return;
-  const std::size_t nearest = map_.nearest(particle.position_m).image;
-  keepNear(particle, map_.position_m(nearest), config_.corridor_m);
 }
 
 /// Kronfeld et al. (journal), Eq. 4 and 5, with r0 in [-1, 1] so that the swarm does not drift one way.

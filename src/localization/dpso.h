@@ -13,7 +13,8 @@ namespace visual_localization {
 class Dpso final : public Tracker {
  public:
   /// `map` must outlive the tracker. Starts anywhere in the map's area.
-  Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed);
+  Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed,
+       const OdometryConfig& odometry = {});
 
   void reset() override;
   void reset(const Prior& prior) override;
@@ -27,6 +28,7 @@ class Dpso final : public Tracker {
  private:
   void assignKinds();
   void confine(Particle& particle) const;
+  void shift(const OdometryIncrement& odometry);
   void move(Particle& particle);
   Eigen::Vector2d limited(const Eigen::Vector2d& velocity_m, double limit) const;
   void moveQuantum(Particle& particle);
@@ -45,6 +47,7 @@ class Dpso final : public Tracker {
   const TrainingMap& map_;
   DpsoConfig config_;
   FitnessConfig fitness_config_;
+  OdometryConfig odometry_config_;
   Random random_;
   Area area_;
   TrackerTuning tuning_;

@@ -36,7 +36,10 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       tracker_(makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed))),
       choice_(config_.features, config_.hybrid),
       assessor_(config_.state),
-      verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric)) {}
+      odometry_(config_.odometry),
+      verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric)) {
+  verifier_->useOdometry(odometry_, config_.odometry);
+}
 
 Localizer::~Localizer() = default;
 
@@ -57,7 +60,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   scores_.startImage(metric ? FeatureKind::kSift : choice_.next(),
                      [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
   sweep_.startImage();
-  const TrackerEstimate tracked = track(metric);
+  const TrackerEstimate tracked = track(stamp_ns, metric);
   if (!metric) metric = poseNearProposal(tracked);
   const Evidence evidence = verify(tracked, metric);
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
@@ -176,10 +179,12 @@ std::optional<MetricPose> Localizer::poseNearProposal(const TrackerEstimate& tra
 }
 
 /// A verified pose takes the place of all comparisons but one: that with the training image that it is nearest to.
-TrackerEstimate Localizer::track(const std::optional<MetricPose>& metric) {
-  if (!metric) return tracker_->update({scores_, sweep_});
+TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric) {
+  const Travel travel{tracked_ns_ ? odometry_.between(*tracked_ns_, stamp_ns) : std::nullopt};
+  tracked_ns_ = stamp_ns;
+  if (!metric) return tracker_->update({scores_, sweep_, travel});
   const Eigen::Vector2d position_m = metric->base.translation().head<2>();
-  TrackerEstimate tracked = tracker_->update({scores_, sweep_, {}, position_m});
+  TrackerEstimate tracked = tracker_->update({scores_, sweep_, travel, position_m});
   bringTracker(tracked, *metric);
   tracked.best_image = verifier_->compared().front();
   tracked.best = scores_[tracked.best_image];
@@ -209,7 +214,9 @@ void Localizer::choosePose(Estimate& estimate) {
   estimate.source = estimate.tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
   const auto predicted = isMetric() ? verifier_->predicted() : std::nullopt;
   if (!predicted) return;
-  if ((predicted->position_m - estimate.pose.position_m).norm() > config_.state.max_distance_m) return;
+  const double apart_m = (predicted->position_m - estimate.pose.position_m).norm();
+  const bool knows_better = predicted->by_odometry && !estimate.tracked.best.recognised;
+  if (apart_m > config_.state.max_distance_m && !knows_better) return;
   estimate.pose.position_m = predicted->position_m;
   estimate.pose.yaw_rad = predicted->yaw_rad;
   estimate.pose.covariance_m2 = predicted->covariance_m2;

@@ -14,6 +14,8 @@ void Localizer::configure(const LocalizerConfig& config) {
   choice_.configure(config_.features, config_.hybrid);
   assessor_.configure(config_.state);
   verifier_->configure(config_.metric);
+  odometry_.configure(config_.odometry);
+  verifier_->useOdometry(odometry_, config_.odometry);
   configureTracker(before.tracker);
   last_.reset();
 }

@@ -45,6 +45,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   metric.declare(visitor);
   dpso.declare(visitor);
   pf.declare(visitor);
+  odometry.declare(visitor);
 }
 
 FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map) {

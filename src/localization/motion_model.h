@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "visual_localization/localization/particles.h"
@@ -57,6 +58,24 @@ class PullToMap final : public MotionModel {
   const TrainingMap& map_;
   double share_;
 };
+
+/// By odometry where there is any, along the direction of the nearest training image; otherwise as another model.
+class OdometryMotion final : public MotionModel {
+ public:
+  /// `map` must outlive the model.
+  OdometryMotion(const TrainingMap& map, const OdometryConfig& config, std::unique_ptr<MotionModel> otherwise)
+      : map_(map), config_(config), otherwise_(std::move(otherwise)) {}
+  void start(Particle& particle, Random& random) const override { otherwise_->start(particle, random); }
+  void move(Particle& particle, const Travel& travel, Random& random) const override;
+
+ private:
+  const TrainingMap& map_;
+  OdometryConfig config_;
+  std::unique_ptr<MotionModel> otherwise_;
+};
+
+/// The way of a robot at `position_m` that looks where the nearest training image does, in the map frame, metres.
+Eigen::Vector2d wayInMap(const TrainingMap& map, const Eigen::Vector2d& position_m, const OdometryIncrement& odometry);
 
 /// Several models, one after the other.
 class CombinedMotion final : public MotionModel {

@@ -11,14 +11,16 @@
 namespace visual_localization {
 
 std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
-                                             const TrainingMap& map) {
-  std::vector<std::unique_ptr<MotionModel>> parts;
+                                             const TrainingMap& map, const OdometryConfig& odometry) {
+  std::unique_ptr<MotionModel> of_papers;
   if (tracker == "pf_gaussian") {
-    parts.push_back(std::make_unique<GaussianMotion>(config.gaussian_std_m));
+    of_papers = std::make_unique<GaussianMotion>(config.gaussian_std_m);
   } else {
-    parts.push_back(std::make_unique<LinearMotion>(config.rotation_std_deg * kPi / 180.0, config.acceleration_std,
-                                                   config.initial_speed_m));
+    of_papers = std::make_unique<LinearMotion>(config.rotation_std_deg * kPi / 180.0, config.acceleration_std,
+                                               config.initial_speed_m);
   }
+  std::vector<std::unique_ptr<MotionModel>> parts;
+  parts.push_back(std::make_unique<OdometryMotion>(map, odometry, std::move(of_papers)));
   if (config.pull > 0.0) parts.push_back(std::make_unique<PullToMap>(map, config.pull));
   return std::make_unique<CombinedMotion>(std::move(parts));
 }
@@ -50,7 +52,7 @@ void ParticleFilter::reset(const Prior& prior) {
 void ParticleFilter::configure(const TrackerConfig& config) {
   config_ = config.pf;
   fitness_config_ = config.fitness;
-  motion_ = makeMotionModel(config.tracker, config.pf, map_);
+  motion_ = makeMotionModel(config.tracker, config.pf, map_, config.odometry);
 }
 
 TrackerEstimate ParticleFilter::update(const TrackerInput& input) {

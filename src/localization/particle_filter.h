@@ -15,7 +15,7 @@ namespace visual_localization {
 /// The motion of the tracker called `tracker`, "pf_gaussian" or "pf_linear", with the pull towards the training images.
 /// `map` must outlive it.
 std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
-                                             const TrainingMap& map);
+                                             const TrainingMap& map, const OdometryConfig& odometry = {});
 
 /// Particle filter without odometry (Weiss et al., section IV.A): resample, move, weigh, estimate the weighted
 /// mean, replace the worst by random particles.

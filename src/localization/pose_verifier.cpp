@@ -7,6 +7,7 @@
 #include "base/angles.h"
 #include "base/time.h"
 #include "geometry/rotation_vector.h"
+#include "localization/covariance.h"
 
 namespace visual_localization {
 namespace {
@@ -15,7 +16,10 @@ constexpr std::size_t kNeighbours = 32;  ///< looked at for those that face alik
 constexpr std::size_t kHypotheses = 2;   ///< of positions that look alike
 constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way
 constexpr double kTurn_rad_per_m = 0.1;  ///< standard deviation of how much it turns on the way
-constexpr double kApart_m = 5.0;         ///< training images closer than this belong to one hypothesis
+constexpr double kSlipped_m = 0.3;       ///< odometry that is off by more, beside its own uncertainty, is wrong
+constexpr double kSlipped_rad = 0.3;
+constexpr std::size_t kImagesOfDistrust = 10;
+constexpr double kApart_m = 5.0;  ///< training images closer than this belong to one hypothesis
 
 Eigen::Matrix3d covarianceOf(const SeenLandmark& landmark) {
   const Eigen::Vector3d ray = landmark.offset_m.cast<double>().normalized();
@@ -31,11 +35,36 @@ MetricPose::Covariance atBase(const MetricPose::Covariance& of_camera, const Met
   return by_camera * of_camera * by_camera.transpose();
 }
 
+/// Where odometry leads from `last`. A wrong heading moves it aside, the more the farther it goes.
+PoseVerifier::Prediction predictedBy(const MetricPose& last, const OdometryIncrement& way,
+                                     const OdometryConfig& config) {
+  const MetricPose::Covariance covariance = last.covariance + last.map_covariance;
+  const double turn_rad = config.turn_sigma_rad_m * way.distance_m;
+  const Eigen::Vector2d way_m = Eigen::Rotation2Dd(yawOf(last.base)) * way.translation_m;
+  const Eigen::Vector2d aside_m(-way_m.y(), way_m.x());
+  const double yaw_variance = covariance(5, 5) + 0.25 * turn_rad * turn_rad;
+  PoseVerifier::Prediction prediction;
+  prediction.position_m = last.base.translation().head<2>() + way_m;
+  prediction.yaw_rad = std::remainder(yawOf(last.base) + way.rotation_rad, 2.0 * kPi);
+  prediction.sigma_m = config.distance_sigma * way.distance_m;
+  prediction.covariance_m2 = covariance.topLeftCorner<2, 2>() +
+                             prediction.sigma_m * prediction.sigma_m * Eigen::Matrix2d::Identity() +
+                             yaw_variance * aside_m * aside_m.transpose();
+  prediction.yaw_variance_rad2 = covariance(5, 5) + turn_rad * turn_rad;
+  prediction.by_odometry = true;
+  return prediction;
+}
+
 }  // namespace
 
 void PoseVerifier::configure(const MetricConfig& config) {
   config_ = config;
   focal_.configure(config.max_focal_error);
+}
+
+void PoseVerifier::useOdometry(const OdometryTrack& track, const OdometryConfig& config) {
+  odometry_ = &track;
+  odometry_config_ = config;
 }
 
 void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
@@ -49,11 +78,16 @@ void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& feature
   compared_.clear();
 }
 
+/// Wheels may slip: then the velocity before may still lead there.
 std::optional<MetricPose> PoseVerifier::nearPrediction() {
-  const std::optional<Prediction> expected = predicted();
-  if (!expected) return std::nullopt;
+  const std::optional<MetricPose> pose = near(byOdometry());
+  return pose ? pose : near(byVelocity());
+}
+
+std::optional<MetricPose> PoseVerifier::near(const std::optional<Prediction>& prediction) {
+  if (!prediction) return std::nullopt;
   const auto few = static_cast<std::size_t>(std::min(config_.min_inliers, config_.min_inliers_predicted));
-  const auto pose = solveNear(expected->position_m, expected->yaw_rad, few);
+  const auto pose = solveNear(prediction->position_m, prediction->yaw_rad, few);
   if (!pose) return std::nullopt;
   if (pose->inliers < static_cast<std::size_t>(config_.min_inliers) && !isPredicted(*pose)) return std::nullopt;
   return accepted(*pose);
@@ -76,6 +110,18 @@ std::optional<MetricPose> PoseVerifier::nearOneOf(const std::vector<std::size_t>
 }
 
 std::optional<PoseVerifier::Prediction> PoseVerifier::predicted() const {
+  const std::optional<Prediction> prediction = byOdometry();
+  return prediction ? prediction : byVelocity();
+}
+
+std::optional<PoseVerifier::Prediction> PoseVerifier::byOdometry() const {
+  if (!last_ || odometry_ == nullptr || distrust_ > 0) return std::nullopt;
+  const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
+  if (!way || way->distance_m > odometry_config_.max_distance_m) return std::nullopt;
+  return predictedBy(last_->pose, *way, odometry_config_);
+}
+
+std::optional<PoseVerifier::Prediction> PoseVerifier::byVelocity() const {
   if (!last_) return std::nullopt;
   const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
   if (!(elapsed_s >= 0.0 && elapsed_s <= config_.max_gap_s)) return std::nullopt;
@@ -99,10 +145,28 @@ std::vector<std::size_t> PoseVerifier::compared() const {
   return images;
 }
 
+/// By odometry or by the velocity before.
 bool PoseVerifier::isPredicted(const MetricPose& pose) const {
-  const std::optional<Prediction> expected = predicted();
-  return expected && (pose.base.translation().head<2>() - expected->position_m).norm() <=
-                         config_.max_prediction_error_m + expected->sigma_m;
+  const auto agrees = [&](const std::optional<Prediction>& expected) {
+    return expected && (pose.base.translation().head<2>() - expected->position_m).norm() <=
+                           config_.max_prediction_error_m + expected->sigma_m;
+  };
+  return agrees(byOdometry()) || agrees(byVelocity());
+}
+
+/// Wheels that slip or a robot that was carried: what odometry says is worth nothing until it agrees again for a while.
+void PoseVerifier::judgeOdometry(const MetricPose& pose) {
+  if (!last_ || odometry_ == nullptr) return;
+  const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
+  if (!way) return;
+  const Prediction expected = predictedBy(last_->pose, *way, odometry_config_);
+  const double off_m = (pose.base.translation().head<2>() - expected.position_m).norm();
+  const double turned_rad = std::abs(angleDifference(expected.yaw_rad, yawOf(pose.base)));
+  if (off_m > kSlipped_m + 3.0 * largerSigma(expected.covariance_m2) || turned_rad > kSlipped_rad) {
+    distrust_ = kImagesOfDistrust;
+  } else if (distrust_ > 0) {
+    --distrust_;
+  }
 }
 
 std::optional<MetricPose> PoseVerifier::solveNear(const Eigen::Vector2d& position_m, double yaw_rad,
@@ -194,6 +258,7 @@ void PoseVerifier::keepMatched(const std::vector<std::size_t>& training_images, 
 }
 
 MetricPose PoseVerifier::accepted(MetricPose pose) {
+  judgeOdometry(pose);
   pose.confirmed =
       focal_.confirms() && (pose.inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isPredicted(pose));
   Known known{stamp_ns_, pose, {}};

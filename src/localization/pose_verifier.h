@@ -12,6 +12,7 @@
 #include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/localization/matched_landmarks.h"
 #include "visual_localization/localization/metric_pose.h"
+#include "visual_localization/localization/odometry.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -27,6 +28,7 @@ class PoseVerifier {
     double sigma_m = 0.0;                                     ///< of each axis of the way since the last verified pose
     Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< of all of it, the map's own included
     double yaw_variance_rad2 = 0.0;
+    bool by_odometry = false;
   };
 
   /// `map` must outlive it.
@@ -34,6 +36,9 @@ class PoseVerifier {
       : map_(map), config_(config), focal_(config.max_focal_error) {}
 
   void configure(const MetricConfig& config);
+  /// How far odometry moves since the last verified pose are believed, from now on. Until then there is none. `track`
+  /// must outlive it.
+  void useOdometry(const OdometryTrack& track, const OdometryConfig& config);
   /// Forgets the motion.
   void reset() { last_.reset(); }
   /// Another camera, or another calibration of it.
@@ -47,7 +52,8 @@ class PoseVerifier {
   std::optional<MetricPose> nearPrediction();
   /// The same near the first of `training_images` that verifies a pose; the most similar come first.
   std::optional<MetricPose> nearOneOf(const std::vector<std::size_t>& training_images);
-  /// Where the motion since the last verified pose leads to; nothing when that was longer ago than a prediction holds.
+  /// Where the motion since the last verified pose leads to, by odometry or else by the velocity before; nothing when
+  /// that was longer ago than a prediction holds.
   std::optional<Prediction> predicted() const;
   /// Training images whose landmarks were matched with the image, each once.
   std::vector<std::size_t> compared() const;
@@ -82,13 +88,20 @@ class PoseVerifier {
   const std::vector<Match>& matchesWith(std::size_t training_image);
   void match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches);
   void keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers);
+  std::optional<Prediction> byOdometry() const;
+  std::optional<Prediction> byVelocity() const;
+  std::optional<MetricPose> near(const std::optional<Prediction>& prediction);
   bool isPredicted(const MetricPose& pose) const;
+  void judgeOdometry(const MetricPose& pose);
   MetricPose accepted(MetricPose pose);
 
   const TrainingMap& map_;
   MetricConfig config_;
   std::optional<Known> last_;
   FocalCheck focal_;
+  const OdometryTrack* odometry_ = nullptr;
+  OdometryConfig odometry_config_;
+  std::size_t distrust_ = 0;  ///< verified poses that odometry must agree with before it is believed again
   std::size_t images_since_ = 0;
   std::int64_t stamp_ns_ = 0;
   const SiftFeatures* features_ = nullptr;

@@ -6,9 +6,9 @@
 namespace visual_localization {
 
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) {
-  if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed);
-  return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf, map), config.pf,
-                                          config.fitness, seed);
+  if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed, config.odometry);
+  return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf, map, config.odometry),
+                                          config.pf, config.fitness, seed);
 }
 
 }  // namespace visual_localization

@@ -1,6 +1,8 @@
 #include "node/localizer_nodelet.h"
 
+#include <cstdint>
 #include <exception>
+#include <stdexcept>
 #include <utility>
 
 #include <nodelet/exception.h>
@@ -8,13 +10,15 @@
 
 #include "base/text.h"
 #include "node/parameter_server.h"
+#include "ros/odometry_message.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr double kTimerPeriod_s = 1.0;  ///< of diagnostics, and of the status while there is no map
+constexpr std::uint32_t kOdometryQueue = 200;  ///< two seconds at 100 Hz
+constexpr double kTimerPeriod_s = 1.0;         ///< of diagnostics, and of the status while there is no map
 
 }  // namespace
 
@@ -47,6 +51,7 @@ void LocalizerNodelet::stop() {
   services_.clear();
   reconfigure_.reset();
   initial_pose_.shutdown();
+  odometry_.shutdown();
   if (images_) images_->shutdown();
   worker_.reset();
   camera_.reset();
@@ -87,6 +92,10 @@ void LocalizerNodelet::start() {
     }
   }
   initial_pose_ = node.subscribe("initialpose", 1, &LocalizerNodelet::onInitialPose, this);
+  if (parameters_.node.use_odometry) {
+    odometry_ = node.subscribe("odom", kOdometryQueue, &LocalizerNodelet::onOdometry, this);
+    NODELET_INFO_STREAM(getName() << " uses odometry of " << odometry_.getTopic());
+  }
   offerServices();
   timer_ = node.createWallTimer(ros::WallDuration(kTimerPeriod_s), &LocalizerNodelet::onTimer, this);
   worker_->start(images_->topic());
@@ -120,6 +129,16 @@ void LocalizerNodelet::onInitialPose(const geometry_msgs::PoseWithCovarianceStam
                         << " m; the heading comes from the training images");
   } catch (const std::exception& error) {
     log_.warn("initial pose", std::string("Initial pose refused: ") + error.what());
+  }
+}
+
+void LocalizerNodelet::onOdometry(const nav_msgs::OdometryConstPtr& odometry) {
+  try {
+    const auto stamp_ns = static_cast<std::int64_t>(odometry->header.stamp.toNSec());
+    localizer_->addOdometry(
+        toReading(*odometry, stamp_ns, parameters_.node.base_frame_id, parameters_.node.global_frame_id));
+  } catch (const std::invalid_argument& error) {
+    log_.warn("odometry", "Odometry on " + odometry_.getTopic() + " refused: " + error.what());
   }
 }
 

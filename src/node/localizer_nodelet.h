@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
 #include <ros/callback_queue.h>
 #include <ros/service_server.h>
@@ -42,6 +43,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   void offerServices();
 
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose);
+  void onOdometry(const nav_msgs::OdometryConstPtr& odometry);
   bool onRelocalize(Relocalize::Request& request, Relocalize::Response& response);
   bool onGlobalLocalization(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
   bool onLoadMap(LoadMap::Request& request, LoadMap::Response& response);
@@ -61,6 +63,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   std::unique_ptr<ImageSource> images_;
   std::unique_ptr<CameraWatch> camera_;
   ros::Subscriber initial_pose_;
+  ros::Subscriber odometry_;
   ros::CallbackQueue service_queue_;
   std::vector<ros::ServiceServer> services_;
   std::unique_ptr<ReconfigureServer> reconfigure_;

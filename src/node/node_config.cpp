@@ -86,6 +86,9 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.flag({"tf_metric_only", "",
                 "where landmarks can verify poses, only METRIC ones while TRACKING move the robot on tf", kAtStartOnly},
                tf_metric_only);
+  visitor.flag(
+      {"use_odometry", "", "wheel odometry on the topic odom bridges images that show nothing known", kAtStartOnly},
+      use_odometry);
   visitor.real({"transform_tolerance", "s", "added to the image stamp in the stamp of the transform"},
                transform_tolerance_s, 0.0, 60.0);
   visitor.real({"image_timeout", "s",

@@ -21,6 +21,7 @@ struct NodeConfig {
   std::string mask_file;
   std::string tf_mode = "none";
   bool tf_metric_only = true;
+  bool use_odometry = false;
   double transform_tolerance_s = 0.1;
   double image_timeout_s = 5.0;
   std::string global_frame_id = "map";

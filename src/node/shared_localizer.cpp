@@ -93,10 +93,31 @@ std::shared_ptr<const TrainingMap> SharedLocalizer::map() const {
 std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return std::nullopt;
+  passOdometry();
   const Estimate estimate = localizer_->process(stamp_ns, grey);
   return Result{estimate,      localizer_->particles(),     localizer_->lastSift(),
                 config_.match, localizer_->lastLandmarks(), localizer_->camera(),
                 map_};
+}
+
+void SharedLocalizer::addOdometry(const OdometryReading& reading) {
+  constexpr std::size_t kMostWaiting = 1000;
+  if (!reading.position_m.allFinite() || !std::isfinite(reading.yaw_rad)) {
+    throw std::invalid_argument("its pose is not finite");
+  }
+  const std::lock_guard<std::mutex> lock(odometry_mutex_);
+  odometry_.push_back(reading);
+  if (odometry_.size() > kMostWaiting) odometry_.pop_front();
+}
+
+/// To the localizer, which is locked.
+void SharedLocalizer::passOdometry() {
+  std::deque<OdometryReading> readings;
+  {
+    const std::lock_guard<std::mutex> lock(odometry_mutex_);
+    readings.swap(odometry_);
+  }
+  for (const OdometryReading& reading : readings) localizer_->addOdometry(reading);
 }
 
 std::optional<LocalizationState> SharedLocalizer::doubt() {

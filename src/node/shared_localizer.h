@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -55,6 +56,10 @@ class SharedLocalizer {
   void setMount(const SensorMount& mount);
   void setMask(const Mask& mask);
 
+  /// A reading of odometry for the next image. Never waits for the one that is being processed. Throws
+  /// std::invalid_argument, in words, when a number is not finite.
+  void addOdometry(const OdometryReading& reading);
+
   /// See Localizer::process. Nothing without a map. Throws std::invalid_argument for an unusable image.
   std::optional<Result> process(std::int64_t stamp_ns, const cv::Mat& grey);
 
@@ -72,6 +77,7 @@ class SharedLocalizer {
 
  private:
   LocalizerConfig configuration() const;
+  void passOdometry();
 
   mutable std::mutex mutex_;
   LocalizerConfig config_;
@@ -81,6 +87,8 @@ class SharedLocalizer {
   std::shared_ptr<const TrainingMap> map_;
   std::unique_ptr<Localizer> localizer_;
   std::optional<Prior> waiting_prior_;
+  std::mutex odometry_mutex_;             ///< held for moments only
+  std::deque<OdometryReading> odometry_;  ///< that the localizer has not seen yet
   std::atomic<bool> has_map_{false};
 };
 

@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nav_msgs/Odometry.h>
 #include <opencv2/imgcodecs.hpp>
 #include <rosbag/bag.h>
 #include <sensor_msgs/CompressedImage.h>
@@ -109,6 +110,32 @@ TEST_F(BagReaderTest, UsesTheTimeOfRecordingWithoutStamp) {
   const BagReader bag(path_);
   EXPECT_EQ(bag.images("/camera").read(1).stamp_ns, 2'250'000'000);
   EXPECT_EQ(bag.fixes("/gps").back().stamp_ns, 2'500'000'000);
+}
+
+TEST_F(BagReaderTest, ReadsOdometryOfTheRobot) {
+  EXPECT_THAT(reason([&] { BagReader(path_).odometry("/odom", "base_link", "map"); }),
+              testing::AllOf(HasSubstr("no odometry topic '/odom'"), HasSubstr("odometry topics in this bag: none")));
+  nav_msgs::Odometry odometry;
+  odometry.child_frame_id = "base_link";
+  odometry.pose.pose.orientation.w = 1.0;
+  {
+    rosbag::Bag bag(path_, rosbag::bagmode::Write);
+    for (const double time_s : {1.0, 2.0}) {
+      odometry.header.stamp = ros::Time(time_s);
+      odometry.pose.pose.position.x = 3.0 * time_s;
+      bag.write("/odom", ros::Time(time_s), odometry);
+      odometry.pose.pose.position.x = std::numeric_limits<double>::quiet_NaN();
+      if (time_s > 1.0) bag.write("/wrong", ros::Time(time_s), odometry);
+    }
+  }
+  const BagReader bag(path_);
+  const auto readings = bag.odometry("/odom", "base_link", "map");
+  ASSERT_EQ(readings.size(), 2U);
+  EXPECT_EQ(readings[1].stamp_ns, 2'000'000'000);
+  EXPECT_EQ(readings[1].position_m, Eigen::Vector2d(6.0, 0.0));
+  EXPECT_THAT(reason([&] { bag.odometry("/wrong", "base_link", "map"); }),
+              HasSubstr("/wrong: message 0: its pose is not finite"));
+  EXPECT_THAT(reason([&] { bag.odometry("/odom", "robot", "map"); }), HasSubstr("instead of 'robot'"));
 }
 
 TEST_F(BagReaderTest, ImagesKeepTheirBagOpen) {

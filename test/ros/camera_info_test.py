@@ -6,6 +6,7 @@ import unittest
 import rospy
 import rostest
 from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
@@ -105,6 +106,21 @@ class CameraInfoTest(unittest.TestCase):
             return [line for line in self.log.messages()
                     if 'carries the camera as base_link to stereo_left' in line.msg and line.name == '/by_file']
         fixture.wait_for(told, DEADLINE_S, 'the mount of the camera')
+
+    def test_7_odometry_is_subscribed_when_asked_for_and_refused_when_it_is_none(self):
+        publisher = rospy.Publisher('/odom', Odometry, queue_size=10)
+        fixture.wait_for(publisher.get_num_connections, DEADLINE_S, 'a subscriber of /odom')
+        self.assertEqual(publisher.get_num_connections(), 1, 'the other node does without')
+        good = Odometry(child_frame_id='base_link')
+        good.header.frame_id, good.pose.pose.orientation.w = 'odom', 1.0
+        good.header.stamp = rospy.Time.now()
+        publisher.publish(good)
+        rospy.sleep(1.0)
+        self.assertEqual(self.logged('Odometry on'), [])
+        good.pose.pose.position.x = float('nan')
+        publisher.publish(good)
+        self.log.wait_for('Odometry on /odom refused: its pose is not finite', DEADLINE_S)
+        self.assertEqual(len(self.logged('Odometry on')), 1)
 
 
 if __name__ == '__main__':

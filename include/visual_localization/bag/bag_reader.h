@@ -15,6 +15,7 @@
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geo/geodetic_point.h"
 #include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/localization/odometry.h"
 #include "visual_localization/ros/image_error.h"
 
 namespace visual_localization {
@@ -71,6 +72,11 @@ class BagReader {
   /// All fixes of a sensor_msgs/NavSatFix topic in the order of recording, believable or not. Throws BagError
   /// naming the fix topics that the bag does have.
   std::vector<Fix> fixes(const std::string& topic) const;
+
+  /// All readings of a nav_msgs/Odometry topic in the order of recording, of the robot's frame `base_frame`. Throws
+  /// BagError naming the odometry topics that the bag does have, or why a message is none.
+  std::vector<OdometryReading> odometry(const std::string& topic, const std::string& base_frame,
+                                        const std::string& map_frame) const;
 
   /// Whether it has such a topic.
   bool hasFixes(const std::string& topic) const;

@@ -13,6 +13,7 @@
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/localization/matched_landmarks.h"
+#include "visual_localization/localization/odometry.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker.h"
@@ -38,6 +39,10 @@ class Localizer {
   /// (state/frozen_images, state/frozen_time) the camera counts as frozen, and the position must be confirmed anew.
   /// With state/frozen_images 0 a repeated image with another stamp is an image like any other.
   Estimate process(std::int64_t stamp_ns, const cv::Mat& grey);
+
+  /// A reading of odometry, which may help from the next image on; see OdometryTrack::add. Without any the localizer
+  /// does without, as in the papers.
+  void addOdometry(const OdometryReading& reading) { odometry_.add(reading); }
 
   /// Goes on with other parameters from the next image on, without losing the track: another tracker, or another number
   /// of particles, begins with particles drawn from the present ones; the rest keeps all it knows. The seed holds for
@@ -93,7 +98,7 @@ class Localizer {
   bool isMetric() const;
   std::optional<MetricPose> poseNearPrediction(std::int64_t stamp_ns);
   std::optional<MetricPose> poseNearProposal(const TrackerEstimate& tracked);
-  TrackerEstimate track(const std::optional<MetricPose>& metric);
+  TrackerEstimate track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
   void choosePose(Estimate& estimate);
   PoseEstimate poseOf(const MetricPose& metric) const;
@@ -113,6 +118,8 @@ class Localizer {
   std::unique_ptr<Tracker> tracker_;
   FeatureChoice choice_;
   StateAssessor assessor_;
+  OdometryTrack odometry_;
+  std::optional<std::int64_t> tracked_ns_;  ///< the stamp of the last image that the tracker saw
   std::unique_ptr<PoseVerifier> verifier_;
   std::vector<Neighbour> neighbours_;  ///< of the last estimate
   std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "visual_localization/localization/odometry.h"
 #include "visual_localization/localization/random.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker_config.h"
@@ -26,15 +27,9 @@ struct Particle {
   ParticleKind kind = ParticleKind::kStandard;
 };
 
-/// What odometry says about the way from the last image to this one, in the robot's frame at the last image.
-struct OdometryIncrement {
-  Eigen::Vector2d translation_m = Eigen::Vector2d::Zero();  ///< forward, left
-  double rotation_rad = 0.0;                                ///< counter-clockwise
-};
-
 /// What is known about the way from the last image to this one.
 struct Travel {
-  std::optional<OdometryIncrement> odometry;  ///< the papers' models do without
+  std::optional<OdometryIncrement> odometry = {};  ///< the papers' models do without
 };
 
 /// Mean and covariance of a weighted cloud, metres.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <string>
 
+#include "visual_localization/localization/odometry.h"
 #include "visual_localization/parameters/parameter_visitor.h"
 
 namespace visual_localization {
@@ -67,6 +68,7 @@ struct TrackerConfig {
   DpsoConfig dpso;
   ParticleFilterConfig pf;
   FitnessConfig fitness;
+  OdometryConfig odometry;
 
   /// Number of particles of the chosen tracker.
   std::size_t particles() const { return static_cast<std::size_t>(tracker == "dpso" ? dpso.particles : pf.particles); }

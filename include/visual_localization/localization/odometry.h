@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "visual_localization/parameters/parameter_visitor.h"
+
+namespace visual_localization {
+
+/// How far odometry is believed.
+struct OdometryConfig {
+  double max_speed_mps = 10.0;
+  double max_gap_s = 0.5;
+  double distance_sigma = 0.05;
+  double turn_sigma_rad_m = 0.01;
+  double max_distance_m = 100.0;
+  double share = 0.5;
+
+  void declare(ParameterVisitor& visitor);
+};
+
+/// Where odometry has the robot, in a frame of its own that drifts.
+struct OdometryReading {
+  std::int64_t stamp_ns = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  double yaw_rad = 0.0;
+};
+
+/// What odometry says about the way from one time to another, in the robot's frame at the first.
+struct OdometryIncrement {
+  Eigen::Vector2d translation_m = Eigen::Vector2d::Zero();  ///< forward, left
+  double rotation_rad = 0.0;                                ///< counter-clockwise
+  double distance_m = 0.0;                                  ///< along the way
+};
+
+/// The last readings of odometry.
+class OdometryTrack {
+ public:
+  explicit OdometryTrack(const OdometryConfig& config) : config_(config) {}
+
+  void configure(const OdometryConfig& config) { config_ = config; }
+  /// Readings must come in order of time: a late one is ignored, and where time goes back by more than kLate_s all
+  /// begins anew. Throws std::invalid_argument when a number is not finite, and then nothing has changed.
+  void add(const OdometryReading& reading);
+  /// Nothing unless readings cover the time: a gap (odometry/max_gap) or a jump (odometry/max_speed, or a turn faster
+  /// than 2 pi/s) in it, or one before
+  /// the first or too long after the last of them. Up to odometry/max_gap after the last one the motion goes on.
+  std::optional<OdometryIncrement> between(std::int64_t from_ns, std::int64_t to_ns) const;
+
+  static constexpr double kLate_s = 1.0;
+
+ private:
+  struct Point {
+    OdometryReading at;
+    double way_m = 0.0;   ///< since the first reading
+    bool joined = false;  ///< to the one before
+  };
+
+  std::optional<Point> pointAt(std::int64_t stamp_ns) const;
+
+  OdometryConfig config_;
+  std::deque<Point> points_;
+};
+
+}  // namespace visual_localization

@@ -1,0 +1,155 @@
+// Odometry leads over images that show nothing known, and does no harm where it is wrong.
+#include <memory>
+#include <random>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "localization/pose_verifier.h"
+#include "test/localization/street_map.h"
+#include "test/support/fake_image.h"
+#include "visual_localization/localization/localizer.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+/// Shows whatever features it is given.
+class GivenImage final : public test::FakeImage {
+ public:
+  explicit GivenImage(const TrainingMap& map) : map_(map) {}
+  Score compare(FeatureKind, std::size_t i) override { return SiftSimilarity({}, {}).compare(features, *map_.sift(i)); }
+  std::size_t siftFeatures() override { return features.size(); }
+  const SiftFeatures* unprunedSift() override { return &features; }
+
+  SiftFeatures features;
+
+ private:
+  const TrainingMap& map_;
+};
+
+/// A robot on the street, one image a second and a metre, whose odometry begins somewhere else.
+class DriveWithOdometry : public testing::Test {
+ protected:
+  explicit DriveWithOdometry(const char* tracker = "dpso") {
+    LocalizerConfig config;
+    config.tracker = tracker;
+    const std::shared_ptr<const TrainingMap> map(std::shared_ptr<void>(), &street_.map());
+    image_ = std::make_shared<GivenImage>(street_.map());
+    localizer_ = std::make_unique<Localizer>(map, config, image_);
+  }
+
+  /// Readings up to image `i`; the wheels turn `slip` times as far as the robot goes.
+  void odometryTo(std::size_t i, double slip = 1.0) {
+    const CameraPose here = street_.mappedNear(i, Eigen::Vector3d::Zero());
+    const CameraPose before = street_.mappedNear(i - 1, Eigen::Vector3d::Zero());
+    const Eigen::Vector2d step_m = (here.position_m - before.position_m).head<2>();
+    for (int k = 1; k <= 10; ++k) {
+      driven_m_ += slip * 0.1 * step_m;
+      const Eigen::Vector2d turned_m = Eigen::Rotation2Dd(1.0) * driven_m_;
+      const double yaw_rad = here.yaw_rad() + 1.0;
+      localizer_->addOdometry({(static_cast<std::int64_t>(i) - 1) * kSecond_ns + k * kSecond_ns / 10,
+                               turned_m + Eigen::Vector2d(100.0, -50.0), yaw_rad});
+    }
+  }
+  Estimate see(std::size_t i) {
+    image_->features = street_.seenFrom(street_.trueNear(i, Eigen::Vector3d::Zero()));
+    return localizer_->process(static_cast<std::int64_t>(i) * kSecond_ns, cv::Mat());
+  }
+  Estimate seeNothing(std::size_t i) {
+    image_->features = SiftFeatures();
+    return localizer_->process(static_cast<std::int64_t>(i) * kSecond_ns, cv::Mat());
+  }
+  double error_m(const Estimate& estimate, std::size_t i) {
+    return (estimate.pose.position_m - street_.mappedNear(i, Eigen::Vector3d::Zero()).position_m.head<2>()).norm();
+  }
+
+  test::StreetMap street_;
+  std::shared_ptr<GivenImage> image_;
+  std::unique_ptr<Localizer> localizer_;
+  Eigen::Vector2d driven_m_ = Eigen::Vector2d::Zero();
+};
+
+TEST_F(DriveWithOdometry, LeadsOverAStretchOfNothing) {
+  for (std::size_t i = 2; i <= 6; ++i) {
+    odometryTo(i);
+    ASSERT_EQ(see(i).source, PoseSource::kMetric) << i;
+  }
+  double sigma_before_m = 0.0;
+  for (std::size_t i = 7; i <= 36; ++i) {  // round both bends
+    odometryTo(i);
+    const Estimate estimate = seeNothing(i);
+    EXPECT_EQ(estimate.source, PoseSource::kNone) << i;
+    EXPECT_LT(error_m(estimate, i), 1.0) << i;
+    const double sigma_m = std::sqrt(estimate.pose.covariance_m2.trace());
+    EXPECT_GT(sigma_m, sigma_before_m) << i;
+    EXPECT_LT(error_m(estimate, i), 3.0 * sigma_m) << i;
+    sigma_before_m = sigma_m;
+  }
+  odometryTo(37);
+  EXPECT_EQ(see(37).source, PoseSource::kMetric);
+}
+
+TEST_F(DriveWithOdometry, WithoutOdometryTheWayIsUnknown) {
+  for (std::size_t i = 2; i <= 6; ++i) see(i);
+  Estimate estimate;
+  for (std::size_t i = 7; i <= 36; ++i) estimate = seeNothing(i);
+  EXPECT_GT(error_m(estimate, 36), 5.0);
+}
+
+TEST_F(DriveWithOdometry, WheelsThatSlipDoNoHarm) {
+  for (std::size_t i = 2; i <= 40; ++i) {
+    odometryTo(i, i % 7 < 3 ? 4.0 : 1.0);
+    const Estimate estimate = see(i);
+    EXPECT_EQ(estimate.source, PoseSource::kMetric) << i;
+    EXPECT_LT(error_m(estimate, i), 0.3) << i;
+  }
+}
+
+TEST_F(DriveWithOdometry, WheelsThatStandWhileTheRobotIsCarriedDoNoHarm) {
+  for (std::size_t i = 2; i <= 40; ++i) {
+    odometryTo(i, i > 10 ? 0.0 : 1.0);
+    const Estimate estimate = see(i);
+    EXPECT_EQ(estimate.source, PoseSource::kMetric) << i;
+    EXPECT_LT(error_m(estimate, i), 0.3) << i;
+  }
+}
+
+TEST_F(DriveWithOdometry, OdometryThatWasWrongIsNotBelievedAtOnce) {
+  for (std::size_t i = 2; i <= 8; ++i) {
+    odometryTo(i, 4.0);
+    see(i);
+  }
+  odometryTo(9, 4.0);
+  EXPECT_LT(error_m(seeNothing(9), 9), 1.0) << "by the velocity before";
+}
+
+TEST_F(DriveWithOdometry, ARobotThatWasCarriedElsewhereIsFound) {
+  for (std::size_t i = 2; i <= 10; ++i) {
+    odometryTo(i);
+    see(i);
+  }
+  odometryTo(11);
+  image_->features = street_.seenFrom(street_.trueNear(35, Eigen::Vector3d::Zero()));
+  const Estimate estimate = localizer_->process(11 * kSecond_ns, cv::Mat());
+  EXPECT_EQ(estimate.source, PoseSource::kMetric);
+  EXPECT_LT(error_m(estimate, 35), 0.3);
+}
+
+TEST_F(DriveWithOdometry, NoReadingsNoDifference) {
+  test::StreetMap other;
+  const auto image = std::make_shared<GivenImage>(other.map());
+  Localizer without(std::shared_ptr<const TrainingMap>(std::shared_ptr<void>(), &other.map()), {}, image);
+  localizer_->addOdometry({0, {0.0, 0.0}, 0.0});  // long before the images: of no use
+  for (std::size_t i = 2; i <= 20; ++i) {
+    const Estimate with = i % 5 == 0 ? seeNothing(i) : see(i);
+    image->features = image_->features;
+    const Estimate plain = without.process(static_cast<std::int64_t>(i) * kSecond_ns, cv::Mat());
+    EXPECT_EQ(with.pose.position_m, plain.pose.position_m) << i;
+    EXPECT_EQ(with.comparisons, plain.comparisons) << i;
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization
