@@ -82,7 +82,8 @@ std::string describe(const TrainingMap& map) {
 }
 
 void printSummary(const std::string& path) {
-  std::cout << oneLine(path) << ": " << describe(*openMap(path)) << ", "
+  const auto map = loadMap(path, strictLoading(0));  // what images look like stays in the file
+  std::cout << oneLine(path) << ": " << describe(*map) << ", "
             << humanSize(static_cast<double>(std::filesystem::file_size(path))) << '\n';
 }
 
