@@ -42,6 +42,7 @@ readonly ROS_RUN='
 libnodeletlib-tools python3-nodelet python3-bond: nodelet managers
 image-transport-tools: image_transport republish
 topic-tools: rosrun topic_tools throttle
+parallel: maps of many bags
 rosout rosbash python3-roslaunch python3-rosmaster: roscore, rosrun and roslaunch
 python3-rosbag: rosbag play and the scripts that read bags
 python3-rosmsg python3-rosnode python3-rosparam python3-rosservice python3-rostopic: tools of the command line
