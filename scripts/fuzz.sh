@@ -3,12 +3,12 @@
 set -euo pipefail
 repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo build=$repo/build/fuzz
-readonly targets=(map bag config messages unit_result)
+readonly targets=(map bag config messages unit_result edits)
 
 usage() {
   cat <<'USAGE'
 Usage: fuzz.sh [--seconds N] [TARGET ...]
-Runs each target, map, bag, config, messages or unit_result (default: all, one after the other), under
+Runs each target, map, bag, config, messages, unit_result or edits (default: all, one after the other), under
 AddressSanitizer and UndefinedBehaviorSanitizer.
   --seconds N  how long each target runs (default: 60)
 What is found is kept in build/fuzz/findings, new inputs in build/fuzz/corpus; those that ship are in test/fuzz/corpus.

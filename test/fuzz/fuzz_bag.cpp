@@ -1,4 +1,4 @@
-/// A bag file: its structure, its fixes and its images, the camera and where the robot carries it.
+/// A bag file: its structure, its fixes, odometry and images, the camera and where the robot carries it.
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -44,6 +44,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::expect<BagError>([&] {
     const BagReader bag(path);
     fuzz::expect<BagError>([&] { bag.fixes("/fix"); });
+    fuzz::expect<BagError>([&] { bag.odometry("/odom", "base_link", "map"); });
     for (const char* topic : {"/raw", "/jpeg"}) readTopic(bag, topic);
   });
   return 0;
