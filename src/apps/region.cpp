@@ -12,6 +12,7 @@
 #include <boost/geometry/strategies/strategies.hpp>
 #include <nlohmann/json.hpp>
 
+#include "base/text.h"
 #include "visual_localization/geo/local_frame.h"
 
 namespace visual_localization::apps {
@@ -55,7 +56,7 @@ Polygon polygonOf(const json& rings) {
   for (std::size_t i = 1; i < rings.size(); ++i) polygon.inners().push_back(ringOf(rings[i]));
   bg::correct(polygon);
   std::string reason;
-  if (!bg::is_valid(polygon, reason)) throw RegionError("a polygon is not simple: " + reason);
+  if (!bg::is_valid(polygon, reason)) throw RegionError("a polygon is not simple: " + oneLine(reason));
   return polygon;
 }
 
@@ -98,7 +99,7 @@ json parsed(const std::string& text) {
   try {
     return json::parse(text, isDeep);
   } catch (const json::exception& error) {
-    throw RegionError(std::string("no JSON: ") + error.what());
+    throw RegionError("no JSON: " + oneLine(error.what()));
   }
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/angles.h"
+#include "base/text.h"
 
 namespace visual_localization {
 namespace {
@@ -45,7 +46,7 @@ Integer takeNumber(std::string_view& text, char separator, std::size_t line) {
   Integer number = 0;
   const auto read = std::from_chars(field.data(), field.data() + field.size(), number);
   if (read.ec != std::errc() || read.ptr != field.data() + field.size()) {
-    refuse(line, "'" + std::string(field.substr(0, 40)) + "' is no number of the right kind");
+    refuse(line, "'" + oneLine(std::string(field), 40) + "' is no number of the right kind");
   }
   return number;
 }
