@@ -6,14 +6,9 @@
 #include <Eigen/Geometry>
 
 #include "base/text.h"
+#include "ros/static_transforms.h"
 
 namespace visual_localization {
-namespace {
-
-std::string withoutSlash(const std::string& frame) { return frame.rfind('/', 0) == 0 ? frame.substr(1) : frame; }
-
-}  // namespace
-
 OdometryReading toReading(const nav_msgs::Odometry& message, std::int64_t stamp_ns, const std::string& base_frame,
                           const std::string& map_frame) {
   constexpr double kRounding = 0.01;

@@ -8,11 +8,6 @@
 namespace visual_localization {
 namespace {
 
-/// tf2 knows frames without the slash that tf gave them.
-std::string withoutSlash(const std::string& frame) {
-  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-}
-
 bool isRigid(const geometry_msgs::Transform& transform) {
   constexpr double kUnitTolerance = 1e-3;
   const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y,
@@ -22,6 +17,10 @@ bool isRigid(const geometry_msgs::Transform& transform) {
 }
 
 }  // namespace
+
+std::string withoutSlash(const std::string& frame) {
+  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
+}
 
 void StaticTransforms::add(const tf2_msgs::TFMessage& message) {
   for (geometry_msgs::TransformStamped transform : message.transforms) {

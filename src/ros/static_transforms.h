@@ -9,6 +9,9 @@
 
 namespace visual_localization {
 
+/// tf2 knows frames without the slash that tf gave them.
+std::string withoutSlash(const std::string& frame);
+
 /// Where the parts of a robot are that do not move, as /tf_static tells. Not thread-safe.
 class StaticTransforms {
  public:
