@@ -15,7 +15,7 @@ namespace {
 // The picture, in pixels: a header, rows of figures, a band of states.
 constexpr int kWidth = 640;
 constexpr int kHeader = 70;
-constexpr int kRow = 48;
+constexpr int kRowHeight = 48;
 constexpr int kBand = 32;
 constexpr int kMargin = 18;
 constexpr int kValueRight = 318;  ///< figures end here
@@ -125,7 +125,7 @@ void drawCurve(cv::Mat& canvas, const Statuses& statuses, const Figure& figure, 
 void drawRow(cv::Mat& canvas, const Statuses& statuses, const Row& row, int top) {
   write(canvas, row.label, kMargin, top + 33, 0.65, kLabel);
   write(canvas, row.value, kValueRight, top + 33, 0.8, kBrightColour, Align::kRight, 2);
-  drawCurve(canvas, statuses, row.figure, top + 9, top + kRow - 8);
+  drawCurve(canvas, statuses, row.figure, top + 9, top + kRowHeight - 8);
 }
 
 void drawBand(cv::Mat& canvas, const Statuses& statuses, int top) {
@@ -169,13 +169,13 @@ void Dashboard::add(const LocalizationStatus& status) {
 cv::Mat Dashboard::draw() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   constexpr int kRows = 7;
-  cv::Mat canvas(kHeader + kRows * kRow + kBand + 10, kWidth, CV_8UC3, kBackground);
+  cv::Mat canvas(kHeader + kRows * kRowHeight + kBand + 10, kWidth, CV_8UC3, kBackground);
   if (statuses_.empty()) return canvas;
   drawHeader(canvas, statuses_.back());
   int top = kHeader + 4;
   for (const Row& row : rowsOf(statuses_.back())) {
     drawRow(canvas, statuses_, row, top);
-    top += kRow;
+    top += kRowHeight;
   }
   drawBand(canvas, statuses_, top + 4);
   return canvas;

@@ -23,7 +23,7 @@ std::set<std::string> knownTransports(const image_transport::ImageTransport& ima
   return names;
 }
 
-void requireKnown(const std::string& transport, const std::set<std::string>& known) {
+void requireTransport(const std::string& transport, const std::set<std::string>& known) {
   if (known.count(transport) != 0) return;
   throw ParameterError("parameter 'image_transport' = '" + transport + "' is not allowed: installed are " +
                        joined(known));
@@ -39,7 +39,7 @@ ReceivedImage received(const MessagePtr& message) {
 ImageSource::ImageSource(ros::NodeHandle node, const ros::NodeHandle& private_node, const std::string& transport,
                          Callback callback)
     : image_transport_(node) {
-  requireKnown(transport, knownTransports(image_transport_));
+  requireTransport(transport, knownTransports(image_transport_));
   if (transport == kCompressed) {
     const boost::function<void(const sensor_msgs::CompressedImageConstPtr&)> forward =
         [callback](const sensor_msgs::CompressedImageConstPtr& message) { callback(received(message)); };

@@ -27,7 +27,7 @@ bool isZero(const Matrix& matrix) {
   return std::all_of(matrix.begin(), matrix.end(), [](double value) { return value == 0.0; });
 }
 
-void require(bool condition, const std::string& what) {
+void requireValue(bool condition, const std::string& what) {
   if (!condition) throw CameraError(what);
 }
 
@@ -42,8 +42,8 @@ template <class Matrix>
 void requireElement(const Matrix& matrix, const char* name, std::size_t columns, std::size_t row, std::size_t column,
                     double value) {
   const double found = matrix[row * columns + column];
-  require(found == value, std::string(name) + "[" + std::to_string(row * columns + column) + "] = " + text(found) +
-                              ", must be " + text(value) + ": no camera matrix");
+  requireValue(found == value, std::string(name) + "[" + std::to_string(row * columns + column) + "] = " + text(found) +
+                                   ", must be " + text(value) + ": no camera matrix");
 }
 
 /// Reads focal lengths and principal point from K (3 columns) or P (4), whose other elements must be a camera's.
@@ -68,9 +68,9 @@ void readDistortion(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
 }
 
 void requireFull(const sensor_msgs::CameraInfo& info) {
-  require(info.width >= 1 && info.width <= kLargestSide_px && info.height >= 1 && info.height <= kLargestSide_px,
-          "the image size " + std::to_string(info.width) + " x " + std::to_string(info.height) + " is not in [1, " +
-              std::to_string(kLargestSide_px) + "]");
+  requireValue(info.width >= 1 && info.width <= kLargestSide_px && info.height >= 1 && info.height <= kLargestSide_px,
+               "the image size " + std::to_string(info.width) + " x " + std::to_string(info.height) +
+                   " is not in [1, " + std::to_string(kLargestSide_px) + "]");
 }
 
 /// Cuts the region of interest out of the camera's images. One of no size is the whole image.
@@ -79,9 +79,10 @@ void cutOut(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
   if (roi.width == 0 && roi.height == 0) return;
   const bool inside = roi.width >= 1 && roi.height >= 1 && roi.x_offset <= info.width && roi.y_offset <= info.height &&
                       roi.width <= info.width - roi.x_offset && roi.height <= info.height - roi.y_offset;
-  require(inside, "the region of interest " + std::to_string(roi.width) + " x " + std::to_string(roi.height) + " at (" +
-                      std::to_string(roi.x_offset) + ", " + std::to_string(roi.y_offset) + ") is not in the image of " +
-                      std::to_string(info.width) + " x " + std::to_string(info.height));
+  requireValue(inside, "the region of interest " + std::to_string(roi.width) + " x " + std::to_string(roi.height) +
+                           " at (" + std::to_string(roi.x_offset) + ", " + std::to_string(roi.y_offset) +
+                           ") is not in the image of " + std::to_string(info.width) + " x " +
+                           std::to_string(info.height));
   camera.size = {static_cast<int>(roi.width), static_cast<int>(roi.height)};
   camera.cx -= roi.x_offset;
   camera.cy -= roi.y_offset;
@@ -90,7 +91,7 @@ void cutOut(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
 /// Pixels that are read together along one axis; 0 means the same as 1.
 void bin(std::uint32_t binning, int& side_px, double& focal_length, double& centre) {
   if (binning <= 1) return;
-  require(binning <= kMostBinned, "binning " + std::to_string(binning) + " is not in [0, 64]");
+  requireValue(binning <= kMostBinned, "binning " + std::to_string(binning) + " is not in [0, 64]");
   side_px /= static_cast<int>(binning);
   focal_length /= binning;
   centre = (centre + 0.5) / binning - 0.5;
@@ -135,7 +136,7 @@ bool endsIn(const std::string& text, const std::string& ending) {
 
 sensor_msgs::CameraInfo parseFile(const std::string& path) {
   const bool yaml = endsIn(path, ".yaml") || endsIn(path, ".yml");
-  require(yaml || endsIn(path, ".ini"), "must end in .yaml, .yml or .ini");
+  requireValue(yaml || endsIn(path, ".ini"), "must end in .yaml, .yml or .ini");
   const std::string content = readFile(path, kLargestFile_bytes);
   if (yaml) requireCalibrationYaml(content, path);
   sensor_msgs::CameraInfo info;
@@ -143,7 +144,7 @@ sensor_msgs::CameraInfo parseFile(const std::string& path) {
   std::istringstream in(content);
   const bool parsed = yaml ? camera_calibration_parsers::readCalibrationYml(in, name, info)
                            : camera_calibration_parsers::parseCalibrationIni(content, name, info);
-  require(parsed, "is no camera calibration");
+  requireValue(parsed, "is no camera calibration");
   return info;
 }
 

@@ -9,6 +9,7 @@
 #include "ros/static_transforms.h"
 
 namespace visual_localization {
+
 OdometryReading toReading(const nav_msgs::Odometry& message, std::int64_t stamp_ns, const std::string& base_frame,
                           const std::string& map_frame) {
   constexpr double kRounding = 0.01;
