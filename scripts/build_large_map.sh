@@ -136,9 +136,11 @@ main() {
   mkdir -p "$work"
   work=$(cd "$work" && pwd)
   build_shards
+  local built=${#shards[@]}
   merge_shards
-  cp "${shards[0]}" "$output.copy.partial" && mv "$output.copy.partial" "$output"
-  echo "$output: of ${#bags[@]} bags"
+  cp "${shards[0]}" "$output.copy.partial"
+  mv "$output.copy.partial" "$output"
+  echo "$output: of $built of ${#bags[@]} bags"
 }
 
 main "$@"

@@ -47,6 +47,7 @@ class BuildLargeMapTest(ProgramTest):
         result = self.build('--allow-failures', SUNNY, bad)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn('bad.bag: is not a bag', result.stderr)
+        self.assertIn('all.map: of 1 of 2 bags', result.stdout)
         self.assertEqual(run('map_info', '--check', self.folder / 'all.map').returncode, 0)
 
     def test_refuses_bad_usage(self):
