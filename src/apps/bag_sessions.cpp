@@ -1,10 +1,12 @@
 #include "apps/bag_sessions.h"
 
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include "apps/app_support.h"
 #include "base/text.h"
+#include "map/session_names.h"
 #include "ros/camera_info.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/parameters/parameters.h"
@@ -23,14 +25,9 @@ void overrideWith(MapBuilderConfig& config, const char* option, const char* para
 
 /// Bags of the same name in different folders get different session names.
 std::string sessionName(const std::string& bag, const std::vector<PlottedSession>& sessions) {
-  const std::string stem = oneLine(std::filesystem::path(bag).stem().string());
-  std::string name = stem;
-  for (std::size_t n = 2;; ++n) {
-    bool taken = false;
-    for (const PlottedSession& session : sessions) taken = taken || session.name == name;
-    if (!taken) return name;
-    name = stem + "_" + std::to_string(n);
-  }
+  std::set<std::string> used;
+  for (const PlottedSession& session : sessions) used.insert(session.name);
+  return unusedName(oneLine(std::filesystem::path(bag).stem().string()), used);
 }
 
 /// An image that cannot be decoded is worth one line the first time, and is counted.

@@ -14,6 +14,7 @@
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
 #include "map/session_frame.h"
+#include "map/session_names.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
@@ -103,7 +104,8 @@ class Merger {
     const auto first_session = static_cast<int>(header_.sessions.size());
     for (const Session& session : map.header().sessions) {
       header_.sessions.push_back(session);
-      header_.sessions.back().name = free(session.name);
+      header_.sessions.back().name = unusedName(session.name, names_);
+      names_.insert(header_.sessions.back().name);
     }
     header_.history.insert(header_.history.end(), map.header().history.begin(), map.header().history.end());
     const std::uint64_t first_id = next_id_;
@@ -151,12 +153,6 @@ class Merger {
       landmark.id = static_cast<std::uint32_t>(id);
       next_id_ = std::max(next_id_, id + 1);
     }
-  }
-
-  std::string free(const std::string& name) {
-    std::string numbered = name;
-    for (std::size_t n = 2; !names_.insert(numbered).second; ++n) numbered = name + "_" + std::to_string(n);
-    return numbered;
   }
 
   MapWriter writer_;

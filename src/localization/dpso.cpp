@@ -105,7 +105,7 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   return result;
 }
 
-/// The swarm moves with the robot; what is left for it to do is small.
+/// A share of the swarm moves with the robot; the rest finds out when the wheels slip.
 void Dpso::shift(const OdometryIncrement& odometry) {
   for (Particle& particle : particles_) {
     if (random_.uniform(0.0, 1.0) < odometry_config_.share) {
