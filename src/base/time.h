@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <ctime>
 #include <string>
 
@@ -20,6 +22,13 @@ inline std::string secondsText(std::int64_t stamp_ns) {
   const std::string decimals = std::to_string(magnitude % kNanoseconds);
   return (stamp_ns < 0 ? "-" : "") + std::to_string(magnitude / kNanoseconds) + '.' +
          std::string(9 - decimals.size(), '0') + decimals;
+}
+
+/// How far apart the times of day of two stamps are, at most half a day.
+inline std::int64_t apartInDay_ns(std::int64_t a_ns, std::int64_t b_ns) {
+  constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+  const std::int64_t apart = std::abs(a_ns % kDay_ns - b_ns % kDay_ns);
+  return std::min(apart, kDay_ns - apart);
 }
 
 /// Wall-clock time since it was made.

@@ -72,7 +72,8 @@ class Aligner {
   void findTies(std::size_t other, std::size_t begin, std::size_t end, std::vector<FoundTie>& found) const {
     const PlacedMap& placed = placed_[other];
     if (!placed.map->hasGeometry()) return;
-    PoseVerifier verifier(*placed.map, MetricConfig());
+    SessionChoice all_sessions(*placed.map, false);
+    PoseVerifier verifier(*placed.map, MetricConfig(), all_sessions);
     std::vector<Neighbour> neighbours;
     for (std::size_t camera = begin; camera < end; ++camera) {
       const auto anchor = anchorIn(other, camera, neighbours);

@@ -178,7 +178,7 @@ std::size_t Dpso::evaluate(const TrackerInput& input) {
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector2d& position_m = particles_[i].position_m;
     fitness_[i] = input.verified_m ? Fitness{fitnessAbout(*input.verified_m, position_m), 0, {}}
-                                   : evaluateFitness(position_m, map_, input.scores, fitness_config_);
+                                   : evaluateFitness(input.nearest(map_, position_m), input.scores, fitness_config_);
     particles_[i].weight = fitness_[i].value;
     if (fitness_[i].value > fitness_[best].value) best = i;
   }

@@ -7,6 +7,7 @@
 #include "base/time.h"
 #include "localization/path_interpolation.h"
 #include "localization/pose_verifier.h"
+#include "localization/session_choice.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -37,7 +38,8 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       choice_(config_.features, config_.hybrid),
       assessor_(config_.state),
       odometry_(config_.odometry),
-      verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric)) {
+      sessions_(std::make_unique<SessionChoice>(*map_, config_.choose_session)),
+      verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric, *sessions_)) {
   verifier_->useOdometry(odometry_, config_.odometry);
 }
 
@@ -54,6 +56,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   if (isRepetition(stamp_ns)) return lastAgain(stamp_ns, stopwatch.elapsed_ms());
   last_.reset();  // should this image fail, its repetition must not get the answer of the one before
 
+  sessions_->startImage(stamp_ns);
   // Geometry looks where the motion leads. Without success the tracker proposes, and geometry disposes.
   std::optional<MetricPose> metric = poseNearPrediction(stamp_ns);
   // Similarities to the training images are computed when somebody asks for them, each at most once.
@@ -62,6 +65,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   sweep_.startImage();
   const TrackerEstimate tracked = track(stamp_ns, metric);
   if (!metric) metric = poseNearProposal(tracked);
+  if (!metric) learnSession(tracked);
   const Evidence evidence = verify(tracked, metric);
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
@@ -85,6 +89,7 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.metric = metric;
   estimate.images_since_metric = verifier_->imagesSince();
   estimate.tracked = tracked;
+  if (const auto session = sessions_->chosen()) estimate.session = map_->header().sessions[*session].name;
   choosePose(estimate);
   if (isMetric()) {
     scores_.count(verifier_->compared());
@@ -182,7 +187,7 @@ std::optional<MetricPose> Localizer::poseNearProposal(const TrackerEstimate& tra
 TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric) {
   const Travel travel{tracked_ns_ ? odometry_.between(*tracked_ns_, stamp_ns) : std::nullopt};
   tracked_ns_ = stamp_ns;
-  if (!metric) return tracker_->update({scores_, sweep_, travel});
+  if (!metric) return tracker_->update({scores_, sweep_, travel, {}, sessions_.get()});
   const Eigen::Vector2d position_m = metric->base.translation().head<2>();
   TrackerEstimate tracked = tracker_->update({scores_, sweep_, travel, position_m});
   bringTracker(tracked, *metric);
@@ -190,6 +195,15 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
   tracked.best = scores_[tracked.best_image];
   tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
   return tracked;
+}
+
+/// Without landmarks the most similar training image is compared with one of another session beside it.
+void Localizer::learnSession(const TrackerEstimate& tracked) {
+  const std::size_t best = tracked.best_image;
+  sessions_->sawSomething(tracked.best.recognised);
+  const auto trial = tracked.best.recognised ? sessions_->trial(map_->position_m(best), map_->yaw_rad(best))
+                                             : std::optional<std::size_t>();
+  if (trial) sessions_->learn(best, tracked.best.matches, *trial, scores_[*trial].matches);
 }
 
 /// To a pose that landmarks verify: the next image is searched around it.

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "localization/pose_verifier.h"
+#include "localization/session_choice.h"
 #include "visual_localization/localization/localizer.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -12,6 +13,7 @@ void Localizer::configure(const LocalizerConfig& config) {
   image_->configure(frontEndConfig(), config_.similarity);
   if (config_.sweep_images != before.sweep_images) sweep_.configure(static_cast<std::size_t>(config_.sweep_images));
   choice_.configure(config_.features, config_.hybrid);
+  sessions_->configure(config_.choose_session);
   assessor_.configure(config_.state);
   verifier_->configure(config_.metric);
   odometry_.configure(config_.odometry);

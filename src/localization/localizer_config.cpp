@@ -26,6 +26,8 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
       {"seed", "1", "of the random generator; the same seed, map and images give the same track", kAtStartOnly}, seed,
       0, std::numeric_limits<int>::max());
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);
+  visitor.flag({"choose_session", "", "in a map of several sessions, compare with the one that matches best lately"},
+               choose_session);
   visitor.real({"max_image_gap", "s", "after a longer pause the image before is not used for pruning"}, max_image_gap_s,
                0.001, 3600.0);
   visitor.real({"min_position_std", "m", "no position without landmarks claims to be more accurate than this"},

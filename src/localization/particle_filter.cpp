@@ -91,9 +91,9 @@ void ParticleFilter::resample() {
 void ParticleFilter::weigh(const TrackerInput& input) {
   best_ = Fitness();
   for (Particle& particle : particles_) {
-    const Fitness fitness = input.verified_m
-                                ? Fitness{fitnessAbout(*input.verified_m, particle.position_m), 0, {}}
-                                : evaluateFitness(particle.position_m, map_, input.scores, fitness_config_);
+    const Fitness fitness =
+        input.verified_m ? Fitness{fitnessAbout(*input.verified_m, particle.position_m), 0, {}}
+                         : evaluateFitness(input.nearest(map_, particle.position_m), input.scores, fitness_config_);
     particle.weight = fitness.value;
     if (fitness.score.similarity > best_.score.similarity) best_ = fitness;
   }

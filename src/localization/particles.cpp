@@ -124,9 +124,7 @@ Prior drawnFrom(std::vector<Particle> cloud) {
   };
 }
 
-Fitness evaluateFitness(const Eigen::Vector2d& position_m, const TrainingMap& map, Scores& scores,
-                        const FitnessConfig& config) {
-  const Neighbour nearest = map.nearest(position_m);
+Fitness evaluateFitness(const Neighbour& nearest, Scores& scores, const FitnessConfig& config) {
   const double offset = nearest.distance_m / config.distance_sigma_m;
   const Score score = scores[nearest.image];
   return {score.weight * std::exp(-0.5 * offset * offset), nearest.image, score};

@@ -12,7 +12,6 @@
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kNeighbours = 32;  ///< looked at for those that face alike
 constexpr std::size_t kHypotheses = 2;   ///< of positions that look alike
 constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way
 constexpr double kTurn_rad_per_m = 0.1;  ///< standard deviation of how much it turns on the way
@@ -87,7 +86,11 @@ std::optional<MetricPose> PoseVerifier::nearPrediction() {
 std::optional<MetricPose> PoseVerifier::near(const std::optional<Prediction>& prediction) {
   if (!prediction) return std::nullopt;
   const auto few = static_cast<std::size_t>(std::min(config_.min_inliers, config_.min_inliers_predicted));
-  const auto pose = solveNear(prediction->position_m, prediction->yaw_rad, few);
+  std::vector<std::size_t> images =
+      sessions_.around(prediction->position_m, prediction->yaw_rad, static_cast<std::size_t>(config_.training_images));
+  const std::optional<std::size_t> trial = sessions_.trial(prediction->position_m, prediction->yaw_rad);
+  if (trial) images.push_back(*trial);
+  const auto pose = solve(images, few, trial);
   if (!pose) return std::nullopt;
   if (pose->inliers < static_cast<std::size_t>(config_.min_inliers) && !isPredicted(*pose)) return std::nullopt;
   return accepted(*pose);
@@ -102,8 +105,11 @@ std::optional<MetricPose> PoseVerifier::nearOneOf(const std::vector<std::size_t>
       continue;
     }
     tried.push_back(position_m);
-    const auto pose = solveNear(position_m, map_.yaw_rad(image), static_cast<std::size_t>(config_.min_inliers));
-    if (pose) return accepted(*pose);
+    const auto pose = solveLike(image);
+    if (pose) {
+      sessions_.choose(matched_.training_image);
+      return accepted(*pose);
+    }
     if (tried.size() == kHypotheses) break;
   }
   return std::nullopt;
@@ -169,9 +175,23 @@ void PoseVerifier::judgeOdometry(const MetricPose& pose) {
   }
 }
 
-std::optional<MetricPose> PoseVerifier::solveNear(const Eigen::Vector2d& position_m, double yaw_rad,
-                                                  std::size_t min_inliers) {
-  const std::vector<std::size_t> images = around(position_m, yaw_rad);
+/// Near a training image: by the landmarks of its session, or else by those of all. What looks most alike need not have
+/// the best landmarks.
+std::optional<MetricPose> PoseVerifier::solveLike(std::size_t training_image) {
+  const auto count = static_cast<std::size_t>(config_.training_images);
+  const auto inliers = static_cast<std::size_t>(config_.min_inliers);
+  const std::vector<std::size_t> alike = sessions_.aroundLike(training_image, count);
+  const std::optional<MetricPose> pose = solve(alike, inliers);
+  if (pose) return pose;
+  const std::vector<std::size_t> any =
+      sessions_.aroundAny(map_.position_m(training_image), map_.yaw_rad(training_image), count);
+  return any == alike ? std::nullopt : solve(any, inliers);
+}
+
+/// `trial`: the last of the training images, if its session is being tried.
+std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& images, std::size_t min_inliers,
+                                              std::optional<std::size_t> trial) {
+  if (images.empty()) return std::nullopt;
   std::vector<LandmarkMatch> sights;
   std::vector<Pair> seen;  // training images share landmarks
   for (const std::size_t image : images) {
@@ -186,7 +206,8 @@ std::optional<MetricPose> PoseVerifier::solveNear(const Eigen::Vector2d& positio
   if (!solved) return std::nullopt;
   std::vector<Pair> inliers;
   for (const std::size_t i : solved->inliers) inliers.push_back(seen[i]);
-  keepMatched(images, std::move(inliers));
+  const std::vector<std::size_t> agreeing = keepMatched(images, std::move(inliers));
+  if (trial) sessions_.learn(images.front(), agreeing.front(), *trial, agreeing.back());
   MetricPose pose;
   pose.camera = solved->camera;
   pose.base = mount_.baseInMap(pose.camera);
@@ -197,16 +218,6 @@ std::optional<MetricPose> PoseVerifier::solveNear(const Eigen::Vector2d& positio
   if (!(pose.sigma_m() <= config_.max_sigma_m)) return std::nullopt;
   focal_.add(solved->focal_scale, solved->focal_sigma);
   return focal_.contradicts() ? std::nullopt : std::optional<MetricPose>(pose);
-}
-
-std::vector<std::size_t> PoseVerifier::around(const Eigen::Vector2d& position_m, double yaw_rad) {
-  map_.nearest(position_m, kNeighbours, neighbours_);
-  std::vector<std::size_t> chosen;
-  for (const Neighbour& neighbour : neighbours_) {
-    if (chosen.size() == static_cast<std::size_t>(config_.training_images)) break;
-    if (faceAlike(map_.yaw_rad(neighbour.image), yaw_rad)) chosen.push_back(neighbour.image);
-  }
-  return chosen;
 }
 
 /// Each training image is compared at most once.
@@ -239,8 +250,11 @@ void PoseVerifier::match(std::size_t training_image, const ImageGeometry& geomet
   }
 }
 
-void PoseVerifier::keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers) {
+/// How many inliers each training image shows.
+std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t>& training_images,
+                                                   std::vector<Pair> inliers) {
   std::sort(inliers.begin(), inliers.end());
+  std::vector<std::size_t> counts;
   std::size_t most = 0;
   for (const std::size_t image : training_images) {
     MatchedLandmarks matched{image, {}};
@@ -251,10 +265,12 @@ void PoseVerifier::keepMatched(const std::vector<std::size_t>& training_images, 
       matched.landmarks.push_back({{keypoint.x_px, keypoint.y_px}, match.training_feature, inlier});
       agreeing += inlier ? 1 : 0;
     }
+    counts.push_back(agreeing);
     if (agreeing <= most) continue;
     most = agreeing;
     matched_ = std::move(matched);
   }
+  return counts;
 }
 
 MetricPose PoseVerifier::accepted(MetricPose pose) {

@@ -8,6 +8,7 @@
 #include "geometry/keypoint_rays.h"
 #include "geometry/pose_solver.h"
 #include "localization/focal_check.h"
+#include "localization/session_choice.h"
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/localization/matched_landmarks.h"
@@ -31,9 +32,9 @@ class PoseVerifier {
     bool by_odometry = false;
   };
 
-  /// `map` must outlive it.
-  PoseVerifier(const TrainingMap& map, const MetricConfig& config)
-      : map_(map), config_(config), focal_(config.max_focal_error) {}
+  /// `map` and `sessions`, which is told how well its sessions match, must outlive it.
+  PoseVerifier(const TrainingMap& map, const MetricConfig& config, SessionChoice& sessions)
+      : map_(map), config_(config), sessions_(sessions), focal_(config.max_focal_error) {}
 
   void configure(const MetricConfig& config);
   /// How far odometry moves since the last verified pose are believed, from now on. Until then there is none. `track`
@@ -83,11 +84,12 @@ class PoseVerifier {
   };
   using Pair = std::pair<std::uint32_t, std::size_t>;  ///< a landmark and a feature of the image
 
-  std::optional<MetricPose> solveNear(const Eigen::Vector2d& position_m, double yaw_rad, std::size_t min_inliers);
-  std::vector<std::size_t> around(const Eigen::Vector2d& position_m, double yaw_rad);
+  std::optional<MetricPose> solve(const std::vector<std::size_t>& training_images, std::size_t min_inliers,
+                                  std::optional<std::size_t> trial = {});
+  std::optional<MetricPose> solveLike(std::size_t training_image);
   const std::vector<Match>& matchesWith(std::size_t training_image);
   void match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches);
-  void keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers);
+  std::vector<std::size_t> keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers);
   std::optional<Prediction> byOdometry() const;
   std::optional<Prediction> byVelocity() const;
   std::optional<MetricPose> near(const std::optional<Prediction>& prediction);
@@ -97,6 +99,7 @@ class PoseVerifier {
 
   const TrainingMap& map_;
   MetricConfig config_;
+  SessionChoice& sessions_;
   std::optional<Known> last_;
   FocalCheck focal_;
   const OdometryTrack* odometry_ = nullptr;
@@ -113,7 +116,6 @@ class PoseVerifier {
   SiftFeatures landmarks_;  ///< of a training image: its features that show one
   std::vector<std::size_t> indices_;
   std::vector<FeatureMatch> found_;
-  std::vector<Neighbour> neighbours_;
 };
 
 }  // namespace visual_localization

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <vector>
 
-#include "map/position_index.h"
+#include "map/session_index.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -21,13 +20,8 @@ class PruningNeighbours {
   std::vector<std::size_t> of(std::size_t image) const;
 
  private:
-  struct Session {
-    std::vector<std::size_t> images;
-    std::unique_ptr<const PositionIndex> index;  ///< of their positions
-  };
-
   const TrainingMap& map_;
-  std::vector<Session> sessions_;
+  SessionIndex sessions_;
 };
 
 }  // namespace visual_localization

@@ -9,6 +9,8 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include "base/text.h"
+
 namespace visual_localization {
 namespace {
 
@@ -148,6 +150,7 @@ LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& he
   message.best_matches = count(estimate.tracked.best.matches);
   message.best_scale = estimate.tracked.best.scale;
   message.best_image = estimate.comparisons > 0 ? static_cast<std::int64_t>(estimate.tracked.best_image) : -1;
+  message.session = oneLine(estimate.session);
   message.features = static_cast<std::uint8_t>(estimate.evidence.features);
   message.comparisons = count(estimate.comparisons);
   message.swept = count(estimate.swept);

@@ -34,7 +34,8 @@ class MatchedLandmarksTest : public testing::Test {
   std::vector<test::WorldPoint> world_ = test::pointsAlong(poses_, 6.0, random_);
   std::shared_ptr<const TrainingMap> map_ = test::mapOf(test::record(poses_, world_, 0.1, random_));
   SiftFeatures seen_ = seenWithStrangers();
-  PoseVerifier verifier_{*map_, {}};
+  SessionChoice sessions_{*map_, true};
+  PoseVerifier verifier_{*map_, {}, sessions_};
 };
 
 TEST_F(MatchedLandmarksTest, AgreeWhereTheProjectionIsAndDisagreeElsewhere) {

@@ -67,7 +67,8 @@ class PoseVerifierTest : public testing::Test {
   const Eigen::Vector3d kBeside_m{0.3, -0.1, 0.4};
   StreetMap street_;
   SiftFeatures features_;  ///< of the last image
-  PoseVerifier verifier_{street_.map(), {}};
+  SessionChoice sessions_{street_.map(), true};
+  PoseVerifier verifier_{street_.map(), {}, sessions_};
 };
 
 TEST_F(PoseVerifierTest, FindsThePoseToCentimetres) {

@@ -28,8 +28,8 @@ TEST(Fitness, IsTheWeightTimesAGaussianOfTheDistance) {
   });
   FitnessConfig config;
   config.distance_sigma_m = 5.0;
-  EXPECT_DOUBLE_EQ(evaluateFitness({0.0, 0.0}, *map, scores, config).value, 0.4);
-  const Fitness beside = evaluateFitness({97.0, 4.0}, *map, scores, config);
+  EXPECT_DOUBLE_EQ(evaluateFitness(map->nearest({0.0, 0.0}), scores, config).value, 0.4);
+  const Fitness beside = evaluateFitness(map->nearest({97.0, 4.0}), scores, config);
   EXPECT_EQ(beside.training_image, 1u);
   EXPECT_DOUBLE_EQ(beside.value, 0.8 * std::exp(-0.5));
   EXPECT_EQ(scores.comparisons(), 2u);

@@ -28,6 +28,7 @@ Estimate someEstimate() {
   estimate.pose.geodetic = {48.5, 9.05, 340.0};
   estimate.tracked.best = {0.25, 0.25, 31, true, 1.25};
   estimate.tracked.best_image = 7;
+  estimate.session = "sunny_1";
   estimate.comparisons = 12;
   estimate.tracked.spread_m = {3.0, 2.0};
   estimate.image.extract_ms = 10.0;
@@ -176,6 +177,7 @@ TEST(MessageConversions, StatusNamesTheStateAndTheEvidence) {
   const auto message = toStatus(someEstimate(), header());
   EXPECT_EQ(message.state, LocalizationStatus::TRACKING);
   EXPECT_EQ(message.state_name, "TRACKING");
+  EXPECT_EQ(message.session, "sunny_1");
   EXPECT_EQ(message.best_matches, 31U);
   EXPECT_EQ(message.best_scale, 1.25);
   EXPECT_EQ(message.best_image, 7);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include <Eigen/Core>
@@ -36,6 +37,7 @@ struct Estimate {
   double focal_scale = 1.0;          ///< focal length by the last images with a pose, as a share of the calibration's
   bool camera_contradicted = false;  ///< by them: no pose is metric
   double motion_residual_m = 0.0;    ///< see MotionConsistency; of the last estimates
+  std::string session;               ///< of the map, that the next image is compared with; empty: all alike
   std::size_t comparisons = 0;       ///< distinct training images that particles or landmarks were compared with
   std::size_t swept = 0;             ///< distinct training images compared beside these, see MapSweep
   ImageReport image;                 ///< statistics, features, times

@@ -22,6 +22,7 @@
 namespace visual_localization {
 
 class PoseVerifier;
+class SessionChoice;
 
 /// One image in, one estimate out: the whole method. The nodelet, the offline programs and the experiments all
 /// run through this class. Not thread-safe.
@@ -99,6 +100,7 @@ class Localizer {
   std::optional<MetricPose> poseNearPrediction(std::int64_t stamp_ns);
   std::optional<MetricPose> poseNearProposal(const TrackerEstimate& tracked);
   TrackerEstimate track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric);
+  void learnSession(const TrackerEstimate& tracked);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
   void choosePose(Estimate& estimate);
   PoseEstimate poseOf(const MetricPose& metric) const;
@@ -120,6 +122,7 @@ class Localizer {
   StateAssessor assessor_;
   OdometryTrack odometry_;
   std::optional<std::int64_t> tracked_ns_;  ///< the stamp of the last image that the tracker saw
+  std::unique_ptr<SessionChoice> sessions_;
   std::unique_ptr<PoseVerifier> verifier_;
   std::vector<Neighbour> neighbours_;  ///< of the last estimate
   std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again

@@ -22,6 +22,7 @@ struct LocalizerConfig : TrackerConfig {
   std::string sift_backend = kNativeSift;
   int seed = 1;
   bool prune = true;
+  bool choose_session = true;
   double max_image_gap_s = 10.0;
   double min_position_std_m = 0.5;
   double min_yaw_std_rad = 0.1;

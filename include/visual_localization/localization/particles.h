@@ -76,9 +76,8 @@ struct Fitness {
 };
 
 /// f(x, t) = m(i_M(x), s(t)) * zeta(distance to i_M(x)), Kronfeld et al. (journal), Eq. 3, zeta a Gaussian of
-/// height one; m as the weight that its similarity gives it.
-Fitness evaluateFitness(const Eigen::Vector2d& position_m, const TrainingMap& map, Scores& scores,
-                        const FitnessConfig& config);
+/// height one; m as the weight that its similarity gives it. `nearest`: i_M(x) and its distance.
+Fitness evaluateFitness(const Neighbour& nearest, Scores& scores, const FitnessConfig& config);
 
 /// In its stead where landmarks verify the position: a Gaussian of height one about it.
 double fitnessAbout(const Eigen::Vector2d& verified_m, const Eigen::Vector2d& position_m);

@@ -1,0 +1,221 @@
+#include "localization/session_choice.h"
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "localization/dpso.h"
+#include "test/support/synthetic.h"
+#include "test/support/world.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kHour_ns = 3'600'000'000'000;
+
+/// A street along x, an image every 2 m, once at 8, at 13 and at 18 o'clock; the last session has only its second half.
+std::shared_ptr<const TrainingMap> street() {
+  MapHeader header;
+  header.image_size = {320, 240};
+  header.sessions = {{"morning"}, {"noon"}, {"evening"}};
+  std::vector<TrainingImage> images;
+  for (int session = 0; session < 3; ++session) {
+    for (int i = session == 2 ? 25 : 0; i < 50; ++i) {
+      TrainingImage image;
+      image.stamp_ns = (8 + 5 * session) * kHour_ns + i * 1'000'000'000LL;
+      image.session = session;
+      image.position_m = {2.0 * i, 0.1 * session};
+      images.push_back(image);
+    }
+  }
+  return std::make_shared<const TrainingMap>(header, images);
+}
+
+class SessionChoiceTest : public testing::Test {
+ protected:
+  int sessionAt(const Eigen::Vector2d& position_m) const {
+    return map_->pose(sessions_.nearest(position_m).image).session;
+  }
+  /// The next images until another session is to be tried at x = 80 m; its training image.
+  std::size_t nextTrial() {
+    for (int i = 0; i < 10; ++i) {
+      sessions_.startImage(8 * kHour_ns);
+      const auto trial = sessions_.trial({80.0, 0.0}, 0.0);
+      if (trial) return *trial;
+    }
+    ADD_FAILURE() << "nothing was tried in ten images";
+    return 0;
+  }
+
+  std::shared_ptr<const TrainingMap> map_ = street();
+  SessionChoice sessions_{*map_, true};
+};
+
+TEST_F(SessionChoiceTest, BeginsWithTheNearestTimeOfDay) {
+  sessions_.startImage((24 * 1000 + 12) * kHour_ns);
+  EXPECT_EQ(sessions_.chosen(), 1U);
+  EXPECT_EQ(sessionAt({80.0, 0.0}), 1);
+}
+
+TEST_F(SessionChoiceTest, TheDayBeginsAgainAtMidnight) {
+  sessions_.startImage((24 * 1000 + 1) * kHour_ns);  // 7 h after 18 o'clock, 7 h before 8: the later recording
+  EXPECT_EQ(sessions_.chosen(), 2U);
+}
+
+TEST_F(SessionChoiceTest, TakesAnotherSessionWhereTheChosenOneWasNot) {
+  sessions_.startImage(18 * kHour_ns);
+  EXPECT_EQ(sessionAt({80.0, 0.0}), 2);
+  EXPECT_NE(sessionAt({20.0, 0.0}), 2);
+  for (const std::size_t image : sessions_.around({80.0, 0.0}, 0.0, 5)) EXPECT_EQ(map_->pose(image).session, 2);
+  for (const std::size_t image : sessions_.around({20.0, 0.0}, 0.0, 5)) EXPECT_NE(map_->pose(image).session, 2);
+}
+
+TEST_F(SessionChoiceTest, LooksAroundLikeATrainingImage) {
+  sessions_.startImage(8 * kHour_ns);
+  const std::size_t of_noon = 60;
+  ASSERT_EQ(map_->pose(of_noon).session, 1);
+  for (const std::size_t image : sessions_.aroundLike(of_noon, 5)) EXPECT_EQ(map_->pose(image).session, 1);
+}
+
+TEST_F(SessionChoiceTest, LooksAroundInAllSessions) {
+  sessions_.startImage(8 * kHour_ns);
+  std::set<int> seen;
+  for (const std::size_t image : sessions_.aroundAny({80.0, 0.1}, 0.0, 3)) seen.insert(map_->pose(image).session);
+  EXPECT_EQ(seen.size(), 3U);
+}
+
+TEST_F(SessionChoiceTest, FindsNothingThatFacesAnotherWay) {
+  sessions_.startImage(8 * kHour_ns);
+  EXPECT_TRUE(sessions_.around({80.0, 0.0}, 3.1, 5).empty());
+  EXPECT_TRUE(sessions_.aroundAny({80.0, 0.0}, 3.1, 5).empty());
+}
+
+TEST_F(SessionChoiceTest, ChoosesTheSessionThatMatchesBetter) {
+  sessions_.startImage(8 * kHour_ns);
+  ASSERT_EQ(sessions_.chosen(), 0U);
+  for (int i = 0; i < 8 && *sessions_.chosen() == 0; ++i) {
+    const std::size_t trial = nextTrial();
+    sessions_.learn(40, 20, trial, map_->pose(trial).session == 1 ? 60 : 10);
+  }
+  EXPECT_EQ(sessions_.chosen(), 1U);
+}
+
+TEST_F(SessionChoiceTest, StaysWithWhatMatchesAsWell) {
+  sessions_.startImage(8 * kHour_ns);
+  for (int i = 0; i < 20; ++i) sessions_.learn(40, 20, nextTrial(), 20);
+  EXPECT_EQ(sessions_.chosen(), 0U);
+}
+
+TEST_F(SessionChoiceTest, TriesTheFirstSessionEverySecondTime) {
+  sessions_.startImage(18 * kHour_ns);
+  ASSERT_EQ(sessions_.chosen(), 2U);
+  int first = 0;
+  int other = 0;
+  for (int i = 0; i < 8; ++i) map_->pose(nextTrial()).session == 0 ? ++first : ++other;
+  EXPECT_GE(first, 4);
+  EXPECT_GE(other, 2);
+}
+
+TEST_F(SessionChoiceTest, TriesOneImageInFour) {
+  int trials = 0;
+  for (int i = 0; i < 40; ++i) {
+    sessions_.startImage(8 * kHour_ns);
+    trials += sessions_.trial({80.0, 0.0}, 0.0) ? 1 : 0;
+  }
+  EXPECT_EQ(trials, 10);
+}
+
+TEST_F(SessionChoiceTest, TriesOneSessionInAnImage) {
+  nextTrial();
+  EXPECT_EQ(sessions_.trial({80.0, 0.0}, 0.0), sessions_.trial({80.0, 0.0}, 0.0));
+}
+
+TEST_F(SessionChoiceTest, TriesTheOthersWhenNothingIsSeen) {
+  sessions_.startImage(8 * kHour_ns);
+  sessions_.sawSomething(false);
+  sessions_.sawSomething(false);
+  EXPECT_EQ(sessions_.chosen(), 0U) << "one bad image says nothing about the light";
+  std::vector<bool> asked(3);
+  for (int i = 0; i < 6; ++i) {
+    sessions_.sawSomething(false);
+    asked[*sessions_.chosen()] = true;
+  }
+  EXPECT_EQ(asked, std::vector<bool>(3, true));
+}
+
+TEST_F(SessionChoiceTest, StaysWithTheSessionOfAVerifiedPose) {
+  sessions_.startImage(8 * kHour_ns);
+  for (int i = 0; i < 4; ++i) sessions_.learn(40, 20, nextTrial(), 19);
+  sessions_.choose(110);
+  ASSERT_EQ(sessions_.chosen(), 2U);
+  sessions_.learn(110, 20, 40, 20);
+  EXPECT_EQ(sessions_.chosen(), 2U);
+}
+
+TEST_F(SessionChoiceTest, ChoosesNothingWhenItIsOff) {
+  sessions_.configure(false);
+  sessions_.startImage(8 * kHour_ns);
+  EXPECT_EQ(sessions_.chosen(), std::nullopt);
+  EXPECT_EQ(sessions_.trial({80.0, 0.0}, 0.0), std::nullopt);
+  for (const double x_m : {3.0, 41.0, 97.0}) {
+    EXPECT_EQ(sessions_.nearest({x_m, 0.0}).image, map_->nearest({x_m, 0.0}).image);
+  }
+}
+
+/// A swarm on a round with two sessions of which one shows today's light.
+TEST(SessionChoice, ASwarmComparesWithOneSession) {
+  MapHeader header;
+  header.image_size = {320, 240};
+  header.sessions = {{"dark"}, {"bright"}};
+  std::vector<TrainingImage> images;
+  const std::vector<Eigen::Vector2d> round = test::circle(200, 30.0);
+  for (int session = 0; session < 2; ++session) {
+    for (std::size_t i = 0; i < round.size(); ++i) {
+      TrainingImage image;
+      image.stamp_ns = static_cast<std::int64_t>(i) * 1'000'000'000;
+      image.session = session;
+      image.position_m = round[i] * (session == 0 ? 1.0 : 1.01);
+      const Eigen::Vector2d along = round[(i + 1) % round.size()] - round[i];
+      image.yaw_rad = std::atan2(along.y(), along.x());
+      images.push_back(image);
+    }
+  }
+  const TrainingMap map(header, images);
+  const auto meanComparisons = [&](bool choose) {
+    SessionChoice sessions(map, choose);
+    Scores scores(map.size());
+    MapSweep sweep(map, 100000, 100000);
+    TrackerConfig config;
+    Dpso swarm(map, config.dpso, config.fitness, 1);
+    double sum = 0.0;
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector2d robot_m = test::onCircle(0.6 * i);
+      sessions.startImage(i * 1'000'000'000LL);
+      scores.startImage(FeatureKind::kSift, [&](FeatureKind, std::size_t image) {
+        const double bell = std::exp(-0.125 * (map.position_m(image) - robot_m).squaredNorm());
+        return test::World::scoreAt((map.pose(image).session == 1 ? 0.5 : 0.1) * bell);
+      });
+      sweep.startImage();
+      const TrackerEstimate estimate = swarm.update({scores, sweep, {}, {}, &sessions});
+      sessions.sawSomething(estimate.best.recognised);
+      const auto trial = sessions.trial(map.position_m(estimate.best_image), map.yaw_rad(estimate.best_image));
+      if (trial) {
+        sessions.learn(estimate.best_image, estimate.best.matches, *trial, scores[*trial].matches);
+      }
+      if (i >= 50) sum += static_cast<double>(scores.comparisons());
+    }
+    if (choose) {
+      EXPECT_EQ(sessions.chosen(), 1U);
+    }
+    return sum / 50.0;
+  };
+  EXPECT_LT(meanComparisons(true), 0.75 * meanComparisons(false));
+}
+
+}  // namespace
+}  // namespace visual_localization
