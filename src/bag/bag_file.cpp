@@ -140,6 +140,8 @@ void BagFile::readChunks(Range range) {
       chunk->compression = field(record.fields, "compression");
       chunk->size = number(record.fields, "size", 4);
       requireChunk(*chunk);
+    } else if (record.op == Op::kConnection || record.op == Op::kChunkInfo) {
+      chunk = nullptr;  // an older summary: see BagWriter
     } else {
       require(record.op == Op::kIndex && chunk != nullptr, "a record stands where a chunk or an index should");
       readIndex(record, chunk_at, *chunk);
