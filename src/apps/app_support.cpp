@@ -65,9 +65,7 @@ std::string errorOutputOf(const std::vector<std::string>& command) {
   ::close(pipe[1]);
   const std::string output = readAll(pipe[0]);
   ::close(pipe[0]);
-  // The file exists: what is missing is the interpreter that its first line names.
-  if (error != 0)
-    throw std::runtime_error(std::string("cannot be started: is Python 3 installed? ") + std::strerror(error));
+  if (error != 0) throw std::runtime_error(std::string("cannot be started: ") + std::strerror(error));
   int status = 0;
   while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
   }
@@ -132,16 +130,29 @@ std::string humanSize(double bytes) {
   return text.data();
 }
 
-void runScript(const std::string& name, const std::vector<std::string>& arguments) {
-  const fs::path script = fs::read_symlink("/proc/self/exe").parent_path() / name;
-  std::vector<std::string> command{script.string(), "--"};
+void runProgramBeside(const std::string& name, const std::vector<std::string>& arguments) {
+  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / name;
+  std::vector<std::string> command{program.string()};
   command.insert(command.end(), arguments.begin(), arguments.end());
   std::fflush(stdout);
   try {
-    if (!fs::exists(script)) throw std::runtime_error("is missing");
+    if (!fs::exists(program)) throw std::runtime_error("is missing");
     std::cerr << errorOutputOf(command);  // warnings
   } catch (const std::runtime_error& error) {
-    throw std::runtime_error(script.string() + ": " + error.what());
+    throw std::runtime_error(program.string() + ": " + error.what());
+  }
+}
+
+void runScript(const std::string& name, const std::vector<std::string>& arguments) {
+  std::vector<std::string> words{"--"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  try {
+    runProgramBeside(name, words);
+  } catch (const std::runtime_error& error) {
+    const std::string text = error.what();
+    // The file exists: what is missing is the interpreter that its first line names.
+    throw std::runtime_error(text.find("cannot be started") == std::string::npos ? text
+                                                                                 : text + ": is Python 3 installed?");
   }
 }
 

@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "base/time.h"
 #include "ros/camera_info.h"
+#include "ros/fix_message.h"
 #include "ros/odometry_message.h"
 #include "visual_localization/ros/image_conversion.h"
 
@@ -45,20 +46,6 @@ BagImage readImage(std::string bytes, const bag::Message& from) {
   } catch (const ImageError& error) {
     return {from.stamp_ns, [error]() -> cv::Mat { throw error; }, {}};
   }
-}
-
-/// Of a variance that the receiver claims; 0 when it claims none, or what cannot be.
-double sigmaOf(const sensor_msgs::NavSatFix& message, double variance_m2) {
-  if (message.position_covariance_type == sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) return 0.0;
-  return std::isfinite(variance_m2) && variance_m2 > 0.0 ? std::sqrt(variance_m2) : 0.0;
-}
-
-Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
-  return {stamp_ns,
-          {message.latitude, message.longitude, message.altitude},
-          message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX,
-          sigmaOf(message, 0.5 * (message.position_covariance[0] + message.position_covariance[4])),
-          sigmaOf(message, message.position_covariance[8])};
 }
 
 /// That of all these messages. Throws std::runtime_error when they do not say the same.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/text.h"
+#include "node/recording_watch.h"
 #include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
@@ -42,6 +43,10 @@ const char* const kIntroduction =
 const char* const kMapBuilder =
     "\n## Map builder\n"
     "In `config/map_builder.yaml` and for `map_builder --config`. The map stores those that live images need too.\n\n";
+
+const char* const kRecorder =
+    "\n## Map recorder\n"
+    "In the private namespace of `map_recorder` (`doc/recording.md`).\n\n";
 
 template <class Config>
 std::string tableOf(bool with_run_time) {
@@ -133,10 +138,11 @@ std::string mapBuilderYaml() {
 }
 
 std::string parametersPage() {
-  return kIntroduction + tableOf<NodeParameters>(true) + kMapBuilder + tableOf<MapBuilderConfig>(false);
+  return kIntroduction + tableOf<NodeParameters>(true) + kMapBuilder + tableOf<MapBuilderConfig>(false) + kRecorder +
+         tableOf<RecorderConfig>(false);
 }
 
-std::string mapFileBelow(const std::string& directory, const std::string& path) {
+std::string mapFileBelow(const std::string& directory, const std::string& path, const std::string& parameter) {
   if (directory.empty()) return path;
   const auto refuse = [&path](const std::string& reason) -> std::string {
     throw MapStoreError(oneLine(path) + ": " + oneLine(reason));
@@ -146,9 +152,9 @@ std::string mapFileBelow(const std::string& directory, const std::string& path) 
   try {
     const fs::path top = fs::canonical(directory);
     const fs::path file = fs::weakly_canonical(top / path);
-    return isBelow(top, file) ? file.string() : refuse("is not below ~map_directory '" + directory + "'");
+    return isBelow(top, file) ? file.string() : refuse("is not below ~" + parameter + " '" + directory + "'");
   } catch (const fs::filesystem_error& error) {
-    return refuse("cannot be found below ~map_directory '" + directory + "': " + error.code().message());
+    return refuse("cannot be found below ~" + parameter + " '" + directory + "': " + error.code().message());
   }
 }
 

@@ -49,7 +49,8 @@ std::string mapBuilderYaml();
 
 /// The map file that `path` names when only maps below `directory` may be opened: a relative path begins there, and
 /// symbolic links and ".." are followed. Without a directory, the path as it is. Throws MapStoreError, in one line that
-/// begins with the path, for a file that lies elsewhere.
-std::string mapFileBelow(const std::string& directory, const std::string& path);
+/// begins with the path and names the `parameter` that asks for it, for a file that lies elsewhere.
+std::string mapFileBelow(const std::string& directory, const std::string& path,
+                         const std::string& parameter = "map_directory");
 
 }  // namespace visual_localization

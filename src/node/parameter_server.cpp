@@ -76,13 +76,17 @@ bool belongsToOthers(const std::string& name) {
   return std::any_of(kOthers.begin(), kOthers.end(), [&head](const char* other) { return head == other; });
 }
 
-NodeParameters loadParameters(const ros::NodeHandle& private_node) {
+ParameterValues privateParameters(const ros::NodeHandle& private_node) {
   XmlRpcValue tree;
   XmlRpcValue ours;
   private_node.getParam(private_node.getNamespace(), tree);
   if (tree.getType() == XmlRpcValue::TypeStruct) dropForeign(tree, ours);
+  return flatten(ours);
+}
+
+NodeParameters loadParameters(const ros::NodeHandle& private_node) {
   NodeParameters parameters;
-  assignParameters(parameters, flatten(ours));
+  assignParameters(parameters, privateParameters(private_node));
   return parameters;
 }
 

@@ -22,7 +22,11 @@ bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues&
 /// bond, the nodelet manager, plugins of image_transport.
 bool belongsToOthers(const std::string& name);
 
-/// Reads and checks the whole private namespace. Throws ParameterError at the first unknown or invalid parameter.
+/// Everything in the private namespace of a node but what belongs to others. Throws as flatten() does.
+ParameterValues privateParameters(const ros::NodeHandle& private_node);
+
+/// Reads and checks the whole private namespace of the localizer. Throws ParameterError at the first unknown or invalid
+/// parameter.
 NodeParameters loadParameters(const ros::NodeHandle& private_node);
 
 }  // namespace visual_localization

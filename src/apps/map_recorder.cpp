@@ -1,0 +1,70 @@
+#include "node/map_recorder.h"
+
+#include <exception>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <ros/init.h>
+#include <ros/spinner.h>
+
+#include "apps/app_support.h"
+#include "base/text.h"
+
+namespace {
+
+using visual_localization::MapRecorder;
+using visual_localization::RecordedSession;
+
+constexpr int kFailed = 1;
+constexpr int kBadUsage = 2;
+
+const char* const kHelp =
+    "Usage: map_recorder _folder:=FOLDER [image:=TOPIC] [fix:=TOPIC] [odom:=TOPIC] [_map:=FILE] [_PARAMETER:=VALUE "
+    "...]\n"
+    "Records a session while somebody drives the robot, shows what will be weak in its map, and writes\n"
+    "the map on a call of ~write_map. Needs a roscore.\n\n"
+    "  --help     this text\n"
+    "  --version  the version\n\n"
+    "Topics, services and parameters: doc/recording.md.\n";
+
+int answer(const std::string& argument) {
+  if (argument == "--help" || argument == "-h") {
+    std::cout << kHelp;
+  } else if (argument == "--version") {
+    std::cout << "map_recorder " VISUAL_LOCALIZATION_VERSION "\n";
+  } else {
+    std::cerr << "map_recorder: unknown argument '" << argument << "'; see --help\n";
+    return kBadUsage;
+  }
+  return 0;
+}
+
+void buildMap(const RecordedSession& session) {
+  std::vector<std::string> arguments{"--bag",       session.bag,       "--image-topic", session.image_topic,
+                                     "--fix-topic", session.fix_topic, "--output",      session.output};
+  if (!session.config.empty()) arguments.insert(arguments.end(), {"--config", session.config});
+  if (session.map.empty()) {
+    visual_localization::apps::runProgramBeside("map_builder", arguments);
+    return;
+  }
+  arguments.insert(arguments.begin(), {"add", "--map", session.map});
+  visual_localization::apps::runProgramBeside("map_edit", arguments);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<std::string> arguments;
+  ros::removeROSArgs(argc, argv, arguments);
+  if (arguments.size() > 1) return answer(arguments[1]);
+  ros::init(argc, argv, "map_recorder");
+  try {
+    MapRecorder recorder(ros::NodeHandle(), ros::NodeHandle("~"), buildMap);
+    ros::spin();
+  } catch (const std::exception& error) {
+    std::cerr << "map_recorder: " << visual_localization::oneLine(error.what(), 10000) << std::endl;
+    return kFailed;
+  }
+  return 0;
+}

@@ -1,0 +1,307 @@
+#include "node/map_recorder.h"
+
+#include <chrono>
+#include <ctime>
+#include <filesystem>
+#include <utility>
+
+#include <geometry_msgs/Point.h>
+#include <nav_msgs/Odometry.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <tf2_msgs/TFMessage.h>
+#include <visualization_msgs/Marker.h>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "node/node_config.h"
+#include "node/parameter_server.h"
+#include "ros/camera_info.h"
+#include "ros/fix_message.h"
+#include "visual_localization/map/map_file.h"
+#include "visual_localization/parameters/parameters.h"
+#include "visual_localization/ros/image_conversion.h"
+
+namespace visual_localization {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+constexpr std::uint32_t kSlowQueue = 100;  ///< while the disk is slow
+constexpr std::uint32_t kFastQueue = 1000;
+constexpr double kReportPeriod_s = 1.0;
+constexpr int kLongestSide_px = 640;       ///< larger images are looked at in this size: a weak one shows there too
+constexpr std::size_t kMostSpots = 20000;  ///< of a longer way every k-th is shown
+
+/// Of the computer's clock: the bag's name.
+std::string localTime() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  ::localtime_r(&now, &parts);
+  char text[32];
+  const std::size_t size = std::strftime(text, sizeof(text), "%Y-%m-%d-%H-%M-%S", &parts);
+  return {text, size};
+}
+
+std_msgs::ColorRGBA colourOf(Weakness weakness) {
+  std_msgs::ColorRGBA colour;
+  colour.a = 1.0F;
+  colour.r = weakness == Weakness::kNone ? 0.0F : weakness == Weakness::kNoFix ? 0.84F : 0.90F;
+  colour.g = weakness == Weakness::kNone ? 0.62F : weakness == Weakness::kNoFix ? 0.10F : 0.62F;
+  colour.b = weakness == Weakness::kNone ? 0.45F : 0.0F;
+  return colour;
+}
+
+/// A bag knows no time before the first clock message of a simulation.
+ros::Time now() {
+  const ros::Time time = ros::Time::now();
+  return time.isZero() ? ros::Time(ros::WallTime::now().toSec()) : time;
+}
+
+std::int64_t stampOf(const std_msgs::Header& header) {
+  return static_cast<std::int64_t>((header.stamp.isZero() ? now() : header.stamp).toNSec());
+}
+
+}  // namespace
+
+MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& private_node, BuildMap build_map)
+    : node_(node),
+      private_node_(private_node),
+      build_map_(std::move(build_map)),
+      log_([](ThrottledLog::Severity severity, const std::string& text) {
+        if (severity == ThrottledLog::Severity::kError) {
+          ROS_ERROR_STREAM(text);
+        } else {
+          ROS_WARN_STREAM(text);
+        }
+      }),
+      extractor_(makeSiftExtractor({}, siftBackends().front())),
+      updater_(node, private_node, ros::this_node::getName()) {
+  assignParameters(config_, privateParameters(private_node_));
+  const auto map = config_.map.empty() ? nullptr : loadMap(config_.map);
+  watch_.emplace(config_.watch, map);
+  bag_.emplace((std::filesystem::path(config_.folder) / ("session_" + localTime() + ".bag")).string());
+
+  fix_topic_ = node_.resolveName("fix");
+  image_topic_ = node_.resolveName("image");
+  if (config_.image_transport == "compressed") {
+    recordImages<sensor_msgs::CompressedImage>(image_topic_ + "/compressed");
+  } else {
+    recordImages<sensor_msgs::Image>(image_topic_);
+  }
+  record<sensor_msgs::CameraInfo>(cameraInfoTopic(image_topic_), kSlowQueue);
+  record<sensor_msgs::NavSatFix>("fix", kFastQueue, [this](const sensor_msgs::NavSatFix& fix) {
+    watch_->addFix(toFix(fix, stampOf(fix.header)));
+  });
+  record<nav_msgs::Odometry>("odom", kFastQueue);
+  record<tf2_msgs::TFMessage>("/tf_static", kFastQueue);
+
+  way_ = private_node_.advertise<visualization_msgs::Marker>("way", 1, true);
+  ros::NodeHandle services(private_node_);
+  services.setCallbackQueue(&services_);
+  write_map_ = services.advertiseService("write_map", &MapRecorder::onWriteMap, this);
+  updater_.setHardwareID("none");
+  updater_.add("recording", this, &MapRecorder::reportRecording);
+  updater_.add("session", this, &MapRecorder::reportSession);
+  looker_ = std::thread([this] { lookAtImages(); });
+  timer_ = node_.createWallTimer(ros::WallDuration(kReportPeriod_s), &MapRecorder::onTimer, this);
+  sync_timer_ =
+      node_.createWallTimer(ros::WallDuration(config_.sync_period_s), [this](const ros::WallTimerEvent&) { sync(); });
+  service_spinner_.emplace(1, &services_);
+  service_spinner_->start();
+  ROS_INFO_STREAM("Recording " << image_topic_ << ", " << fix_topic_ << ", odometry and static transforms to "
+                               << bag_->path());
+}
+
+MapRecorder::~MapRecorder() {
+  service_spinner_.reset();
+  timer_.stop();
+  sync_timer_.stop();
+  for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
+  queue_.close();
+  if (looker_.joinable()) looker_.join();
+  sync();
+  ROS_INFO_STREAM("Recorded " << recorded_ << " messages in " << bag_->path());
+}
+
+template <class Message>
+void MapRecorder::record(const std::string& name, std::uint32_t queue, std::function<void(const Message&)> look) {
+  const std::string topic = node_.resolveName(name);
+  const boost::function<void(const boost::shared_ptr<const Message>&)> keep =
+      [this, topic, look](const boost::shared_ptr<const Message>& message) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        bag_->write(topic, now(), *message) ? ++recorded_ : ++lost_;
+        if (look) look(*message);
+      };
+  subscribers_.push_back(
+      node_.subscribe<Message>(topic, queue, keep, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+}
+
+template <class Message>
+void MapRecorder::recordImages(const std::string& name) {
+  const std::string topic = node_.resolveName(name);
+  const boost::function<void(const boost::shared_ptr<const Message>&)> keep =
+      [this, topic](const boost::shared_ptr<const Message>& message) {
+        {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          bag_->write(topic, now(), *message) ? ++recorded_ : ++lost_;
+          images_.add();
+        }
+        queue_.push({stampOf(message->header), [message] { return toGrey(*message); }});
+      };
+  subscribers_.push_back(
+      node_.subscribe<Message>(topic, kSlowQueue, keep, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+}
+
+void MapRecorder::sync() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    bag_->sync();
+    disk_trouble_.clear();
+  } catch (const FileError& error) {
+    disk_trouble_ = oneLine(error.what());
+    log_.error("disk", "Nothing is recorded: " + disk_trouble_);
+  }
+}
+
+/// Only of the newest image: the thread is not to keep the robot busy.
+void MapRecorder::lookAtImages() {
+  while (const auto image = queue_.pop()) {
+    std::string trouble;
+    std::size_t features = 0;
+    try {
+      features = featuresOf(image->decode());
+    } catch (const std::exception& error) {
+      trouble = oneLine(error.what());
+      log_.warn("image", "Unusable image on " + image_topic_ + ": " + trouble);
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    image_trouble_ = trouble;
+    if (trouble.empty()) watch_->addImage(image->stamp_ns, features);
+  }
+}
+
+std::size_t MapRecorder::featuresOf(const cv::Mat& grey) {
+  cv::Mat resized;
+  cv::Mat spread;
+  const double scale = static_cast<double>(kLongestSide_px) / std::max(grey.cols, grey.rows);
+  const cv::Size size = scale < 1.0 ? cv::Size(std::max(16, static_cast<int>(grey.cols * scale)),
+                                               std::max(16, static_cast<int>(grey.rows * scale)))
+                                    : grey.size();
+  const cv::Mat& seen = fitted(grey, size, resized);
+  return extractor_->extract(withUsualContrast(seen, greyLevelsOf(seen), spread)).size();
+}
+
+RecordedSession MapRecorder::sessionFor(const std::string& path) const {
+  RecordedSession session{bag_->path(), image_topic_, fix_topic_, config_.map, config_.builder_config, {}};
+  session.output = path.empty() ? std::filesystem::path(bag_->path()).replace_extension(".map").string()
+                                : mapFileBelow(config_.folder, path, "folder");
+  return session;
+}
+
+bool MapRecorder::onWriteMap(WriteMap::Request& request, WriteMap::Response& response) {
+  const std::lock_guard<std::mutex> one_at_a_time(building_);
+  try {
+    sync();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!disk_trouble_.empty()) throw FileError(disk_trouble_);
+    }
+    const RecordedSession session = sessionFor(request.path);
+    build_map_(session);
+    response.images = static_cast<std::uint32_t>(loadMap(session.output)->size());
+    response.map = session.output;
+    response.success = true;
+    response.message = oneLine("wrote " + session.output);
+    ROS_INFO_STREAM("Map " << oneLine(session.output) << " with " << response.images << " training images");
+  } catch (const std::exception& error) {
+    response.success = false;
+    response.message = oneLine(error.what());
+    ROS_WARN_STREAM("Map not written: " << response.message);
+  }
+  return true;
+}
+
+void MapRecorder::onTimer(const ros::WallTimerEvent&) {
+  publishWay();
+  updater_.force_update();
+}
+
+/// A line along the images, coloured by what is weak there.
+void MapRecorder::publishWay() {
+  visualization_msgs::Marker line;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::vector<RecordingWatch::Spot>& spots = watch_->spots();
+    if (spots.size() == published_ || spots.size() < 2) return;
+    published_ = spots.size();
+    const std::size_t step = 1 + spots.size() / kMostSpots;
+    for (std::size_t i = 0; i < spots.size(); i += step) {
+      geometry_msgs::Point point;
+      point.x = spots[i].position_m.x();
+      point.y = spots[i].position_m.y();
+      line.points.push_back(point);
+      line.colors.push_back(colourOf(spots[i].weakness));
+    }
+  }
+  line.header.frame_id = config_.global_frame_id;
+  line.header.stamp = ros::Time::now();
+  line.ns = "way";
+  line.type = visualization_msgs::Marker::LINE_STRIP;
+  line.action = visualization_msgs::Marker::ADD;
+  line.pose.orientation.w = 1.0;
+  line.scale.x = 0.4;
+  way_.publish(line);
+}
+
+void MapRecorder::reportRecording(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!disk_trouble_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, "Nothing is recorded: " + disk_trouble_);
+  } else if (images_.rate_hz() == 0.0) {
+    status.summary(DiagnosticStatus::ERROR, "No images on " + image_topic_);
+  } else if (!image_trouble_.empty()) {
+    status.summary(DiagnosticStatus::WARN, "Unusable image: " + image_trouble_);
+  } else if (lost_ > 0) {
+    status.summary(DiagnosticStatus::WARN, std::to_string(lost_) + " messages lost: the disk is too slow");
+  } else {
+    status.summary(DiagnosticStatus::OK, "Recording");
+  }
+  status.add("Bag", bag_->path());
+  status.addf("Size (MB)", "%.1f", static_cast<double>(bag_->size()) * 1e-6);
+  std::error_code none;
+  const auto space = std::filesystem::space(config_.folder, none);
+  if (!none) status.addf("Free (MB)", "%.0f", static_cast<double>(space.available) * 1e-6);
+  status.add("Messages", recorded_);
+  status.add("Messages lost", lost_);
+  status.addf("Images (Hz)", "%.2f", images_.rate_hz());
+}
+
+void MapRecorder::reportSession(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const RecordingWatch::Summary seen = watch_->summary();
+  constexpr double kMostlyKnown = 0.5;
+  if (seen.images == 0) {
+    status.summary(DiagnosticStatus::WARN, "No image yet");
+  } else if (seen.now != Weakness::kNone) {
+    status.summary(DiagnosticStatus::WARN, std::string("Weak here: ") + describe(seen.now));
+  } else if (seen.known_way_share > kMostlyKnown) {
+    status.summary(DiagnosticStatus::OK, "The map has this way at this time of day: another hour would add more");
+  } else {
+    status.summary(DiagnosticStatus::OK, "Good");
+  }
+  status.add("Images looked at", seen.images);
+  for (std::size_t i = 1; i < kWeaknesses; ++i) {
+    status.add(std::string("Weak: ") + describe(static_cast<Weakness>(i)), seen.weak[i]);
+  }
+  status.addf("Fixes, usable", "%zu, %zu", seen.fixes, seen.usable_fixes);
+  status.addf("Sigma of the fix (m)", "%.2f", seen.fix_sigma_m);
+  status.addf("Way (m)", "%.0f", seen.way_m);
+  status.addf("Spacing (m)", "%.2f", seen.spacing_m);
+  status.add("Features", seen.features);
+  if (!config_.map.empty()) status.addf("Way that the map has (%)", "%.0f", 100.0 * seen.known_way_share);
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <opencv2/core.hpp>
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
+
+#include "bag/bag_writer.h"
+#include "node/image_worker.h"
+#include "node/localizer_diagnostics.h"
+#include "node/recording_watch.h"
+#include "node/throttled_log.h"
+#include "visual_localization/WriteMap.h"
+#include "visual_localization/features/sift_extractor.h"
+
+namespace visual_localization {
+
+/// What a map is built from.
+struct RecordedSession {
+  std::string bag;
+  std::string image_topic;  ///< without the transport's suffix
+  std::string fix_topic;
+  std::string map;     ///< that is extended; empty: none
+  std::string config;  ///< of the map builder; empty: its defaults
+  std::string output;
+};
+
+/// Records a session while somebody drives the robot: images, camera_info, fixes, odometry and static transforms, into
+/// a bag that is whole at any moment. Says what will be weak, on /diagnostics and in rviz, and writes the map when
+/// asked to.
+class MapRecorder {
+ public:
+  /// Writes the map of a session, as a process of its own so that the recording goes on; throws std::exception in one
+  /// line.
+  using BuildMap = std::function<void(const RecordedSession& session)>;
+
+  /// Begins to record. Throws ParameterError, FileError or MapStoreError.
+  MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& private_node, BuildMap build_map);
+  ~MapRecorder();
+  MapRecorder(const MapRecorder&) = delete;
+  MapRecorder& operator=(const MapRecorder&) = delete;
+
+ private:
+  using Wrapper = diagnostic_updater::DiagnosticStatusWrapper;
+  struct Waiting {
+    std::int64_t stamp_ns = 0;
+    std::function<cv::Mat()> decode;
+  };
+
+  template <class Message>
+  void record(const std::string& name, std::uint32_t queue, std::function<void(const Message&)> look = {});
+  template <class Message>
+  void recordImages(const std::string& name);
+  void sync();
+  void lookAtImages();
+  std::size_t featuresOf(const cv::Mat& grey);
+  bool onWriteMap(WriteMap::Request& request, WriteMap::Response& response);
+  RecordedSession sessionFor(const std::string& path) const;
+  void onTimer(const ros::WallTimerEvent& event);
+  void publishWay();
+  void reportRecording(Wrapper& status);
+  void reportSession(Wrapper& status);
+
+  ros::NodeHandle node_;
+  ros::NodeHandle private_node_;
+  BuildMap build_map_;
+  RecorderConfig config_;
+  ThrottledLog log_;
+  std::mutex mutex_;  ///< of all that follows, until the next comment
+  std::optional<BagWriter> bag_;
+  std::optional<RecordingWatch> watch_;
+  RateMeter images_;
+  std::uint64_t recorded_ = 0;
+  std::uint64_t lost_ = 0;
+  std::string disk_trouble_;
+  std::string image_trouble_;
+  std::size_t published_ = 0;
+  // Each of one thread alone.
+  std::unique_ptr<SiftExtractor> extractor_;
+  std::mutex building_;
+  LatestQueue<Waiting> queue_;
+  std::thread looker_;
+  std::vector<ros::Subscriber> subscribers_;
+  std::string image_topic_;
+  std::string fix_topic_;
+  ros::Publisher way_;
+  ros::CallbackQueue services_;
+  ros::ServiceServer write_map_;
+  diagnostic_updater::Updater updater_;
+  ros::WallTimer timer_;
+  ros::WallTimer sync_timer_;
+  std::optional<ros::AsyncSpinner> service_spinner_;  ///< a map takes minutes, and images must not wait for it
+};
+
+}  // namespace visual_localization
