@@ -14,8 +14,10 @@
 #include <ros/subscriber.h>
 #include <ros/wall_timer.h>
 #include <std_srvs/Empty.h>
+#include <visual_localization/FromLL.h>
 #include <visual_localization/LoadMap.h>
 #include <visual_localization/Relocalize.h>
+#include <visual_localization/ToLL.h>
 
 #include "node/camera_watch.h"
 #include "node/image_source.h"
@@ -47,6 +49,8 @@ class LocalizerNodelet : public nodelet::Nodelet {
   bool onRelocalize(Relocalize::Request& request, Relocalize::Response& response);
   bool onGlobalLocalization(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
   bool onLoadMap(LoadMap::Request& request, LoadMap::Response& response);
+  bool onFromLL(FromLL::Request& request, FromLL::Response& response);
+  bool onToLL(ToLL::Request& request, ToLL::Response& response);
   void configure(const NodeParameters& parameters, const ParameterValues& changed);
   void onTimer(const ros::WallTimerEvent& event);
 

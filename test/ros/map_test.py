@@ -5,12 +5,12 @@ import unittest
 
 import rospy
 import rostest
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
+from geometry_msgs.msg import Point, PoseArray, PoseWithCovarianceStamped
 from sensor_msgs.msg import CompressedImage
 
 import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus
-from visual_localization.srv import LoadMap, Relocalize, RelocalizeRequest
+from visual_localization.srv import FromLL, LoadMap, Relocalize, RelocalizeRequest, ToLL
 
 DEADLINE_S = 30.0
 GUESS_STD_M = 0.5
@@ -27,7 +27,9 @@ class MapTest(unittest.TestCase):
         self.localizer.wait_until_up()
         self.load_map = rospy.ServiceProxy('/localizer/load_map', LoadMap)
         self.relocalize = rospy.ServiceProxy('/localizer/relocalize', Relocalize)
-        for service in (self.load_map, self.relocalize):
+        self.from_ll = rospy.ServiceProxy('/localizer/from_ll', FromLL)
+        self.to_ll = rospy.ServiceProxy('/localizer/to_ll', ToLL)
+        for service in (self.load_map, self.relocalize, self.from_ll, self.to_ll):
             service.wait_for_service(DEADLINE_S)
         for publisher in (self.camera, self.initial_pose):
             fixture.wait_for(publisher.get_num_connections, DEADLINE_S, 'a subscriber')
@@ -37,6 +39,7 @@ class MapTest(unittest.TestCase):
         self.give_initial_pose(x=30.0, y=20.0)
         self.assertGreater(self.load_map(rospy.get_param('~map')).images, 0)
         self.check_starts_near(x=30.0, y=20.0)
+        self.check_geodetic()
 
     def check_no_map(self):
         self.localizer.status.clear()
@@ -46,6 +49,8 @@ class MapTest(unittest.TestCase):
         self.assertFalse(answer.success)
         self.assertIn('map', answer.message)
         self.assertFalse(self.load_map('/does/not/exist.map').success)
+        self.assertEqual(self.from_ll(48.5, 9.0).message, 'no map is loaded')
+        self.assertEqual(self.to_ll(Point(1.0, 2.0, 0.0)).message, 'no map is loaded')
         self.check_images_without_a_map_are_counted()
 
     def check_images_without_a_map_are_counted(self):
@@ -55,6 +60,24 @@ class MapTest(unittest.TestCase):
         fixture.wait_for(counted, DEADLINE_S, 'an image to be counted')
         self.assertEqual(int(self.diagnostics.value('images', 'Received')), 1)
         self.assertEqual(self.localizer.status.last().images_refused, 0)
+
+    def check_geodetic(self):
+        origin = self.to_ll(Point(0.0, 0.0, 0.0))
+        self.assertTrue(origin.success)
+        north = self.to_ll(Point(0.0, 100.0, 0.0))
+        self.assertAlmostEqual(fixture.distance_m(origin, north), 100.0, delta=0.5)
+        self.assertAlmostEqual(north.longitude, origin.longitude, places=9)
+        back = self.from_ll(north.latitude, north.longitude)
+        self.assertTrue(back.success)
+        self.assertAlmostEqual(back.map_point.x, 0.0, places=6)
+        self.assertAlmostEqual(back.map_point.y, 100.0, places=6)
+        for latitude, longitude, reason in ((91.0, 9.0, 'latitude'), (float('nan'), 9.0, 'latitude'),
+                                            (48.0, 200.0, 'longitude'), (-33.0, 151.0, '1000 km')):
+            answer = self.from_ll(latitude, longitude)
+            self.assertFalse(answer.success)
+            self.assertIn(reason, answer.message)
+        for point in (Point(float('inf'), 0.0, 0.0), Point(0.0, float('nan'), 0.0), Point(2e6, 0.0, 0.0)):
+            self.assertFalse(self.to_ll(point).success)
 
     def give_initial_pose(self, x, y):
         pose = PoseWithCovarianceStamped()
