@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+"""Every launch file can be read with its arguments, and build_map.launch builds maps and ends."""
+import os
+import pathlib
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BAG, OTHER_BAG = sys.argv[1:3]
+LAUNCH = pathlib.Path(__file__).resolve().parents[2] / 'launch'
+CONFIGURATIONS = {
+    'atrv_jr.launch': [[], ['mode:=record'], ['rectify:=true', 'image_transport:=compressed', 'rviz:=false']],
+    'build_map.launch': [['bag:=/a.bag', 'output:=/a.map']],
+    'localizer.launch': [[], ['map:=/a.map', 'preset:=paper', 'tracker:=pf_linear'], ['manager:=nodelets']],
+    'map_recorder.launch': [[], ['folder:=/data', 'map:=/a.map', 'rviz:=true']],
+    'replay.launch': [['bag:=/a.bag', 'map:=/a.map'], ['bag:=/a.bag', 'map:=/a.map', 'plot_output:=/a.png']],
+    'robot_template.launch': [[], ['mode:=record']],
+}
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+def roslaunch(*arguments, timeout_s=120):
+    return subprocess.run(['roslaunch', *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          universal_newlines=True, timeout=timeout_s)
+
+
+class LaunchFilesTest(unittest.TestCase):
+    def build(self, folder, *arguments):
+        """What build_map.launch prints with a master of its own."""
+        port = free_port()
+        os.environ['ROS_MASTER_URI'] = 'http://127.0.0.1:%d' % port
+        return roslaunch('-p', str(port), 'visual_localization', 'build_map.launch',
+                         'output:=%s/round.map' % folder, *arguments)
+
+    def test_every_launch_file_is_tried(self):
+        self.assertEqual(sorted(CONFIGURATIONS), sorted(path.name for path in LAUNCH.glob('*.launch')))
+
+    def test_every_launch_file_can_be_read(self):
+        for name, configurations in CONFIGURATIONS.items():
+            for arguments in configurations:
+                with self.subTest(name=name, arguments=arguments):
+                    read = roslaunch('--nodes', 'visual_localization', name, *arguments)
+                    self.assertEqual(read.returncode, 0, read.stdout)
+                    self.assertIn('/', read.stdout)
+
+    def test_several_bags_become_sessions_of_one_map(self):
+        with tempfile.TemporaryDirectory() as folder:
+            run = self.build(folder, 'bag:=%s %s' % (BAG, OTHER_BAG), 'spacing:=3', 'plot:=%s/round.png' % folder)
+            self.assertEqual(run.returncode, 0, run.stdout)
+            self.assertIn('campus_cloudy_1', run.stdout)
+            self.assertIn('campus_sunny_1', run.stdout)
+            self.assertNotIn('has died', run.stdout)
+            self.assertEqual(sorted(os.listdir(folder)), ['round.map', 'round.png'])
+
+    def test_a_failure_is_said(self):
+        with tempfile.TemporaryDirectory() as folder:
+            run = self.build(folder, 'bag:=/absent.bag')
+            self.assertIn('/absent.bag', run.stdout)
+            self.assertEqual(os.listdir(folder), [])
+
+
+if __name__ == '__main__':
+    unittest.main(argv=sys.argv[:1], verbosity=2)
