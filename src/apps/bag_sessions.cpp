@@ -1,6 +1,7 @@
 #include "apps/bag_sessions.h"
 
 #include <filesystem>
+#include <functional>
 #include <set>
 #include <utility>
 
@@ -41,13 +42,15 @@ cv::Mat decode(const BagImage& image, const std::string& where, bool& warned) {
   }
 }
 
-void addImages(MapBuilder& builder, const BagReader& bag, const std::string& topic) {
+/// `wanted`: whether the image of this time is.
+void addImages(MapBuilder& builder, const BagReader& bag, const std::string& topic,
+               const std::function<bool(std::int64_t)>& wanted) {
   const BagImages images = bag.images(topic);
   ProgressBar bar("extracting features");
   bool warned = false;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const BagImage image = images.read(i);
-    if (builder.wants(image.stamp_ns, image.size)) {
+    if (wanted(image.stamp_ns) && builder.wants(image.stamp_ns, image.size)) {
       builder.addImage(image.stamp_ns, decode(image, bag.path() + ": " + images.topic(), warned));
     }
     bar.show(i + 1, images.size());
@@ -74,6 +77,19 @@ SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options, c
   if (!options.mask.empty()) camera.mask = readMask(options.mask);
   camera.image_size = bag.images(options.image_topic).usualSize();
   return camera;
+}
+
+void addTo(MapBuilder& builder, const BagReader& bag, const MapBuilderOptions& options, PlottedSession session,
+           const SessionCamera& camera, std::vector<PlottedSession>& sessions,
+           const std::function<bool(std::int64_t)>& wanted) {
+  try {
+    builder.beginSession(session.name, session.fixes, camera);
+  } catch (const std::exception& error) {
+    throw BagError(bag.path() + ": " + options.fix_topic + ": " + error.what());
+  }
+  session.cleaned = builder.report().sessions.back();
+  sessions.push_back(std::move(session));
+  addImages(builder, bag, options.image_topic, wanted);
 }
 
 }  // namespace
@@ -113,15 +129,19 @@ void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOp
                 const MapBuilderConfig& config, std::vector<PlottedSession>& sessions) {
   const BagReader bag(path);
   PlottedSession session{sessionName(path, sessions), bag.fixes(options.fix_topic), {}};
-  const SessionCamera camera = cameraOf(bag, options, config);
-  try {
-    builder.beginSession(session.name, session.fixes, camera);
-  } catch (const std::exception& error) {
-    throw BagError(path + ": " + options.fix_topic + ": " + error.what());
-  }
-  session.cleaned = builder.report().sessions.back();
-  sessions.push_back(std::move(session));
-  addImages(builder, bag, options.image_topic);
+  addTo(builder, bag, options, std::move(session), cameraOf(bag, options, config), sessions,
+        [](std::int64_t) { return true; });
+}
+
+void addVerifiedSession(MapBuilder& builder, const std::string& path, const VerifiedDrive& drive,
+                        const MapBuilderOptions& options, std::vector<PlottedSession>& sessions) {
+  const BagReader bag(path);
+  std::set<std::int64_t> verified;
+  for (const Fix& pose : drive.poses) verified.insert(pose.stamp_ns);
+  SessionCamera camera = drive.camera;
+  camera.image_size = bag.images(options.image_topic).usualSize();
+  addTo(builder, bag, options, {sessionName(path, sessions), drive.poses, {}}, camera, sessions,
+        [&](std::int64_t stamp_ns) { return verified.count(stamp_ns) != 0; });
 }
 
 }  // namespace visual_localization::apps

@@ -22,4 +22,14 @@ void requireDifferent(const std::string& what, const std::vector<std::string>& f
 void addSession(MapBuilder& builder, const std::string& bag, const MapBuilderOptions& options,
                 const MapBuilderConfig& config, std::vector<PlottedSession>& sessions);
 
+/// The images of a drive whose poses landmarks verified, and these poses as fixes of the robot's origin.
+struct VerifiedDrive {
+  std::vector<Fix> poses;  ///< with the stamps of their images
+  SessionCamera camera;    ///< as the drive was localised, with an antenna in the robot's origin
+};
+
+/// The same as addSession() of a drive, which needs no fixes. Other images than those that were verified are left out.
+void addVerifiedSession(MapBuilder& builder, const std::string& bag, const VerifiedDrive& drive,
+                        const MapBuilderOptions& options, std::vector<PlottedSession>& sessions);
+
 }  // namespace visual_localization::apps

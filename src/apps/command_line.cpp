@@ -186,6 +186,8 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
   declareCamera(app, options, "the camera_info beside the image topic, or the map's");
   app.add_option("--truth-topic", options.truth_topic, "NavSatFix with true positions: prints the error");
   app.add_option("--odom-topic", options.odom_topic, "nav_msgs/Odometry: bridges images that show nothing known");
+  app.add_option("--extend", options.extend,
+                 "Write the map with this drive as a new session, by its verified poses: it needs no fixes");
   app.add_option("--usage", options.usage, "Write which training images and landmarks the poses rest on, CSV");
 }
 

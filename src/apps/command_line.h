@@ -68,6 +68,7 @@ struct LocalizeOptions {
   std::string camera_info;
   std::string mask;
   std::string usage;
+  std::string extend;
   std::string odom_topic;
   std::optional<std::int64_t> particles;
   std::optional<std::int64_t> seed;

@@ -1,6 +1,7 @@
 // Localises a recorded drive against a map: what the robot does, without a robot.
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <optional>
@@ -9,6 +10,7 @@
 
 #include "apps/app_support.h"
 #include "apps/command_line.h"
+#include "apps/map_growth.h"
 #include "base/files.h"
 #include "editing/map_usage.h"
 #include "evaluation/drive_order.h"
@@ -209,6 +211,42 @@ class OdometryFeed {
   std::size_t next_ = 0;
 };
 
+/// A metric pose of the robot, as a fix: it is as good as pose and map together.
+Fix toFix(const Estimate& estimate) {
+  Fix fix{estimate.stamp_ns, estimate.pose.geodetic, true};
+  fix.sigma_m = std::sqrt(0.5 * estimate.pose.covariance_m2.trace());
+  return fix;
+}
+
+/// Refuses what could only fail after the work.
+void requireExtension(const LocalizeOptions& options, const std::vector<std::string>& inputs) {
+  if (options.extend.empty()) return;
+  if (options.kidnap_at || options.start_index > 0) {
+    throw UsageError("--extend needs the drive as it was recorded, without --start-index and --kidnap-at");
+  }
+  requireNoInput("--extend", options.extend, inputs);
+  const PartialFile attempt(options.extend);
+}
+
+/// The map with the drive in it.
+void extend(const LocalizeOptions& options, const Localizer& localizer, std::vector<Fix> poses, const MapUsage& usage) {
+  if (poses.empty()) throw std::runtime_error("--extend: no verified pose, so nothing to add to " + options.map);
+  const OutputLock lock(options.extend);
+  VerifiedDrive drive;
+  drive.poses = std::move(poses);
+  drive.camera.model = localizer.camera();
+  drive.camera.mask = localizer.mask();
+  drive.camera.mount = localizer.mount();
+  drive.camera.mount->antenna_m.setZero();
+  MapBuilderOptions build;
+  build.bags = {options.bag};
+  build.image_topic = options.image_topic;
+  build.fix_topic = "verified poses";
+  build.output = options.extend;
+  addDrive({options.map, openMap(options.map, 2)}, drive, build, usage, options.extend,
+           provenance("localize", "extension", {options.map, options.bag}));
+}
+
 OdometryFeed odometryOf(const LocalizeOptions& options, const NodeConfig& config, const BagReader& bag) {
   if (options.odom_topic.empty()) return OdometryFeed({});
   return OdometryFeed(bag.odometry(options.odom_topic, config.base_frame_id, config.global_frame_id));
@@ -220,6 +258,7 @@ void run(const LocalizeOptions& options) {
   requireNoInput("--output", options.output, inputs);
   inputs.push_back(options.output);
   if (!options.usage.empty()) requireNoInput("--usage", options.usage, inputs);
+  requireExtension(options, inputs);
   PartialFile output(options.output);  // fails now, not after the run
   std::optional<PartialFile> usage_file;
   if (!options.usage.empty()) usage_file.emplace(options.usage);
@@ -237,6 +276,7 @@ void run(const LocalizeOptions& options) {
   std::string first_refusal;
   Totals totals;
   MapUsage usage;
+  std::vector<Fix> verified;
   OdometryFeed odometry = odometryOf(options, config.node, bag);
   ProgressBar progress("localize");
   for (std::size_t step = 0; step < order.size(); ++step) {
@@ -252,6 +292,7 @@ void run(const LocalizeOptions& options) {
     track += trackCsvRow(*estimate);
     totals.add(*estimate);
     if (estimate->source == PoseSource::kMetric) usage.add(localizer.map(), localizer.lastLandmarks());
+    if (estimate->evidence.verified.value_or(false)) verified.push_back(toFix(*estimate));
     const auto true_point = truth ? truth->at(estimate->stamp_ns) : std::nullopt;
     if (true_point) errors_m.push_back((estimate->pose.position_m - true_point->position_m).norm());
   }
@@ -266,6 +307,7 @@ void run(const LocalizeOptions& options) {
   if (!totals.camera_trouble.empty()) warn("localize: camera: " + totals.camera_trouble);
   print(totals);
   if (truth) print(summarise(std::move(errors_m)));
+  if (!options.extend.empty()) extend(options, localizer, std::move(verified), usage);
 }
 
 }  // namespace

@@ -95,7 +95,9 @@ class KnownSessions {
 /// Puts images of several maps into one file.
 class Merger {
  public:
-  Merger(const std::string& path, MapHeader header) : writer_(path), header_(std::move(header)) {
+  /// `target`: the path of a map, or a file that stays the caller's.
+  template <class Target>
+  Merger(const Target& target, MapHeader header) : writer_(target), header_(std::move(header)) {
     header_.sessions.clear();
     header_.history.clear();
   }
@@ -172,15 +174,18 @@ std::vector<NamedMap> inOrderOfTime(std::vector<NamedMap> maps) {
   return ordered;
 }
 
-std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const std::string& path,
-                                 std::size_t threads, const Progress& progress) {
+namespace {
+
+template <class Target>
+std::vector<MergedMap> mergeTo(const Target& target, const std::vector<NamedMap>& maps, const std::string& edit,
+                               std::size_t threads, const Progress& progress) {
   KnownSessions known;
   for (const NamedMap& map : maps) {
     requireAlike(maps.front(), map);
     known.add(map);
   }
   const LocalFrame frame = maps.front().map->frame();
-  Merger merger(path, maps.front().map->header());
+  Merger merger(target, maps.front().map->header());
   std::vector<PlacedMap> placed;
   std::vector<MergedMap> merged;
   for (const NamedMap& of : maps) {
@@ -192,6 +197,18 @@ std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::s
   }
   merger.finish(edit);
   return merged;
+}
+
+}  // namespace
+
+std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const std::string& path,
+                                 std::size_t threads, const Progress& progress) {
+  return mergeTo(path, maps, edit, threads, progress);
+}
+
+std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const PartialFile& file,
+                                 std::size_t threads, const Progress& progress) {
+  return mergeTo(file, maps, edit, threads, progress);
 }
 
 }  // namespace visual_localization

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/files.h"
 #include "visual_localization/base/progress.h"
 #include "visual_localization/map/training_map.h"
 
@@ -41,6 +42,9 @@ std::vector<NamedMap> inOrderOfTime(std::vector<NamedMap> maps);
 /// Throws MergeError when images or features of two maps are of another kind, when they are too far apart, or when a
 /// session is in both; MapStoreError.
 std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const std::string& path,
+                                 std::size_t threads, const Progress& progress = {});
+/// The same into a file that stays the caller's: nothing is put in place.
+std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const PartialFile& file,
                                  std::size_t threads, const Progress& progress = {});
 
 }  // namespace visual_localization

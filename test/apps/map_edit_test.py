@@ -147,6 +147,44 @@ class MapEditTest(ProgramTest):
         self.refuse(1, 'summarise', '--map', self.both, '--usage', self.folder / 'track.csv',
                     words=('track.csv: line 1: must be',))
 
+    def test_a_drive_extends_the_map_without_fixes(self):
+        track = self.folder / 'track.csv'
+        result = run('localize', '--map', MAP, '--bag', CLOUDY, '--output', track, '--extend', self.output)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(run('map_info', '--check', self.output).returncode, 0)
+        rows = self.images(self.output)
+        self.assertEqual({row['session'] for row in rows}, {'campus_sunny_1', 'campus_cloudy_1'})
+        with open(track, newline='', encoding='utf-8') as file:
+            verified = {row['stamp'] for row in csv.DictReader(file) if row['source'] == 'METRIC'}
+        added = [row for row in rows if row['session'] == 'campus_cloudy_1']
+        self.assertGreater(len(added), 50)
+        self.assertLessEqual({row['stamp'] for row in added}, verified)
+        self.assertIn('edited:      extension of campus_sunny_1.map, campus_cloudy_1.bag by localize',
+                      run('map_info', self.output).stdout)
+
+        command = [sys.executable, MAP_ERROR, '--map', self.output, '--bag', SUNNY, '--bag', CLOUDY, '--programs',
+                   PROGRAMS]
+        errors = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=True).stdout
+        of_sunny, of_cloudy = (float(value) for value in re.findall(r'images, error mean ([\d.]+)', errors))
+        self.assertLess(of_cloudy, of_sunny + .05, errors)
+        self.assertLess(float(re.search(r'apart mean ([\d.]+)', errors).group(1)), .1, errors)
+
+    def test_an_extension_that_makes_no_sense_is_refused(self):
+        places = self.folder / 'places.map'
+        options = self.folder / 'places.yaml'
+        options.write_text('geometry: {enabled: false}\n', encoding='utf-8')
+        self.assertEqual(run('map_builder', '--bag', SUNNY, '--config', options, '--output', places).returncode, 0)
+        for code, map_file, arguments, words in (
+                (2, MAP, ['--start-index', 5, '--extend', self.output], ('--extend', '--start-index')),
+                (2, MAP, ['--extend', MAP], ('--extend', str(MAP))),
+                (1, MAP, ['--extend', '/absent/new.map'], ('/absent/new.map',)),
+                (1, places, ['--extend', self.output], ('no verified pose',))):
+            with self.subTest(arguments=arguments):
+                result = run('localize', '--map', map_file, '--bag', CLOUDY, '--output', self.folder / 'track.csv',
+                             *arguments)
+                self.assert_refused(result, code, 'localize: ', *words)
+                self.assertFalse(self.output.exists())
+
     def test_bad_usage_is_refused(self):
         self.refuse(2, words=('subcommand',))
         self.refuse(2, 'shrink', words=())

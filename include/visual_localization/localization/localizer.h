@@ -57,9 +57,11 @@ class Localizer {
   /// Where the robot carries the camera, from the next image on: metric poses are those of the robot. Until then as in
   /// the map's first session. Throws MountError, and then nothing has changed.
   void setMount(const SensorMount& mount);
+  const SensorMount& mount() const { return mount_; }
   /// Features under it are not used, from the next image on. Until then that of the map's first session. Throws
   /// CameraError when nothing is left of it at the map's size.
   void setMask(const Mask& mask);
+  const Mask& mask() const { return mask_; }
 
   /// The position is unknown: anywhere in the map.
   void relocalize();
