@@ -196,9 +196,9 @@ def make_pose(drive: Round, index: int) -> PoseStamped:
 
 
 def image_events(folder: Path, drive: Round, quality: int, camera_info: Optional[CameraInfo],
-                 full: bool) -> Iterator[Event]:
-    """Every image, its calibration if there is one, and its exact position and pose, at the same stamp."""
-    for index, stamp in enumerate(drive.stamps):
+                 full: bool, every: int) -> Iterator[Event]:
+    """Every image, or every so many, its calibration if there is one, and its exact position and pose, at its stamp."""
+    for index, stamp in list(enumerate(drive.stamps))[::every]:
         image = make_image(folder / f'frame_{index:04d}.png', index, quality)
         yield stamp, '/stereo/left/image_raw/compressed', image
         if camera_info is not None:
@@ -239,6 +239,8 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--camera-info', type=Path, help='calibration of the camera, YAML')
     parser.add_argument('--full', action='store_true', help='calibration, heights, exact poses and odometry, also for '
                         'a round on level ground (others always have them)')
+    parser.add_argument('--every', type=int, default=1, choices=range(1, 1001), metavar='N',
+                        help='one frame of N, as of `render_world.py --every N` (default: %(default)s)')
     parser.add_argument('--perfect', action='store_true', help='a DGPS without faults')
     return parser.parse_args()
 
@@ -255,14 +257,14 @@ def main() -> None:
     if calibration is not None and not calibration.is_file():
         raise SystemExit(f'make_round_bag: {calibration} does not exist; another calibration: --camera-info FILE')
     camera_info = read_camera_info(calibration) if calibration else None
-    events = list(image_events(args.round, drive, args.quality, camera_info, full))
+    events = list(image_events(args.round, drive, args.quality, camera_info, full, args.every))
     if full:
         extra = np.random.default_rng([args.seed, 1])  # of its own: the faults stay those of their seed
         add_heights(track, drive, extra)
         events += odometry_events(drive.stamps, np.stack([drive.east, drive.north, drive.up], 1), extra)
     events += gps_events(track)
     write_bag(args.out, events, args.start)
-    print(f'{args.out}: {len(drive.stamps)} images, {os.path.getsize(args.out) / 1e6:.1f} MB')
+    print(f'{args.out}: {len(drive.stamps[::args.every])} images, {os.path.getsize(args.out) / 1e6:.1f} MB')
     for fault in faults:
         print(f'  {fault}')
 
