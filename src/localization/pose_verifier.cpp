@@ -61,6 +61,11 @@ void PoseVerifier::configure(const MetricConfig& config) {
   focal_.configure(config.max_focal_error);
 }
 
+void PoseVerifier::reset() {
+  last_.reset();
+  elsewhere_ = 0;
+}
+
 void PoseVerifier::useOdometry(const OdometryTrack& track, const OdometryConfig& config) {
   odometry_ = &track;
   odometry_config_ = config;
@@ -273,10 +278,22 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
   return counts;
 }
 
+/// Odometry that is believed leads elsewhere: the robot was carried, the wheels have slipped while nothing was seen, or
+/// this is the twin of the place. The first two stay, and a few more poses along the motion tell.
+bool PoseVerifier::isElsewhere(const MetricPose& pose) {
+  const bool predicted = isPredicted(pose);
+  if (byOdometry() && !predicted) {
+    elsewhere_ = kImagesOfDistrust;
+  } else if (elsewhere_ > 0 && predicted) {
+    --elsewhere_;
+  }
+  return elsewhere_ > 0;
+}
+
 MetricPose PoseVerifier::accepted(MetricPose pose) {
+  const bool clear = pose.inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isPredicted(pose);
+  pose.confirmed = !isElsewhere(pose) && focal_.confirms() && clear;
   judgeOdometry(pose);
-  pose.confirmed =
-      focal_.confirms() && (pose.inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isPredicted(pose));
   Known known{stamp_ns_, pose, {}};
   if (last_) {
     const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);

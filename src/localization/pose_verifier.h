@@ -41,7 +41,7 @@ class PoseVerifier {
   /// must outlive it.
   void useOdometry(const OdometryTrack& track, const OdometryConfig& config);
   /// Forgets the motion.
-  void reset() { last_.reset(); }
+  void reset();
   /// Another camera, or another calibration of it.
   void resetCamera() { focal_.reset(); }
   /// The next image. Its features, not pruned, must live until the one after it.
@@ -95,6 +95,7 @@ class PoseVerifier {
   std::optional<MetricPose> near(const std::optional<Prediction>& prediction);
   bool isPredicted(const MetricPose& pose) const;
   void judgeOdometry(const MetricPose& pose);
+  bool isElsewhere(const MetricPose& pose);
   MetricPose accepted(MetricPose pose);
 
   const TrainingMap& map_;
@@ -104,7 +105,8 @@ class PoseVerifier {
   FocalCheck focal_;
   const OdometryTrack* odometry_ = nullptr;
   OdometryConfig odometry_config_;
-  std::size_t distrust_ = 0;  ///< verified poses that odometry must agree with before it is believed again
+  std::size_t distrust_ = 0;   ///< verified poses that odometry must agree with before it is believed again
+  std::size_t elsewhere_ = 0;  ///< verified poses that must follow before one that odometry contradicts is confirmed
   std::size_t images_since_ = 0;
   std::int64_t stamp_ns_ = 0;
   const SiftFeatures* features_ = nullptr;

@@ -40,8 +40,9 @@ class DriveWithOdometry : public testing::Test {
     localizer_ = std::make_unique<Localizer>(map, config, image_);
   }
 
-  /// Readings up to image `i`; the wheels turn `slip` times as far as the robot goes.
-  void odometryTo(std::size_t i, double slip = 1.0) {
+  /// Readings up to image `i`, which comes `early_s` before its usual time; the wheels turn `slip` times as far as the
+  /// robot goes.
+  void odometryTo(std::size_t i, double slip = 1.0, std::size_t early_s = 0) {
     const CameraPose here = street_.mappedNear(i, Eigen::Vector3d::Zero());
     const CameraPose before = street_.mappedNear(i - 1, Eigen::Vector3d::Zero());
     const Eigen::Vector2d step_m = (here.position_m - before.position_m).head<2>();
@@ -49,7 +50,7 @@ class DriveWithOdometry : public testing::Test {
       driven_m_ += slip * 0.1 * step_m;
       const Eigen::Vector2d turned_m = Eigen::Rotation2Dd(1.0) * driven_m_;
       const double yaw_rad = here.yaw_rad() + 1.0;
-      localizer_->addOdometry({(static_cast<std::int64_t>(i) - 1) * kSecond_ns + k * kSecond_ns / 10,
+      localizer_->addOdometry({static_cast<std::int64_t>(i - early_s - 1) * kSecond_ns + k * kSecond_ns / 10,
                                turned_m + Eigen::Vector2d(100.0, -50.0), yaw_rad});
     }
   }
@@ -104,6 +105,7 @@ TEST_F(DriveWithOdometry, WheelsThatSlipDoNoHarm) {
     const Estimate estimate = see(i);
     EXPECT_EQ(estimate.source, PoseSource::kMetric) << i;
     EXPECT_LT(error_m(estimate, i), 0.3) << i;
+    EXPECT_TRUE(i < 5 || estimate.metric->confirmed) << i;
   }
 }
 
@@ -135,6 +137,35 @@ TEST_F(DriveWithOdometry, ARobotThatWasCarriedElsewhereIsFound) {
   const Estimate estimate = localizer_->process(11 * kSecond_ns, cv::Mat());
   EXPECT_EQ(estimate.source, PoseSource::kMetric);
   EXPECT_LT(error_m(estimate, 35), 0.3);
+}
+
+TEST_F(DriveWithOdometry, APoseThatOdometryContradictsIsConfirmedLate) {
+  for (std::size_t i = 2; i <= 10; ++i) {
+    odometryTo(i);
+    see(i);
+  }
+  std::size_t confirmed_after = 0;
+  for (std::size_t i = 25; i < 50 && confirmed_after == 0; ++i) {  // 14 m farther on than a second ago
+    i == 25 ? odometryTo(11) : odometryTo(i, 1.0, 14);
+    image_->features = street_.seenFrom(street_.trueNear(i, Eigen::Vector3d::Zero()));
+    const Estimate estimate = localizer_->process(static_cast<std::int64_t>(i - 14) * kSecond_ns, cv::Mat());
+    ASSERT_EQ(estimate.source, PoseSource::kMetric) << i;
+    EXPECT_LT(error_m(estimate, i), 0.3) << i;
+    if (estimate.metric->confirmed) confirmed_after = i - 25;
+  }
+  EXPECT_GE(confirmed_after, 10U);
+  EXPECT_LE(confirmed_after, 15U);
+}
+
+TEST_F(DriveWithOdometry, WhoIsToldThatItWasCarriedIsConfirmedAtOnce) {
+  for (std::size_t i = 2; i <= 10; ++i) {
+    odometryTo(i);
+    see(i);
+  }
+  odometryTo(11);
+  localizer_->relocalize();
+  image_->features = street_.seenFrom(street_.trueNear(35, Eigen::Vector3d::Zero()));
+  EXPECT_TRUE(localizer_->process(11 * kSecond_ns, cv::Mat()).metric->confirmed);
 }
 
 TEST_F(DriveWithOdometry, NoReadingsNoDifference) {
