@@ -36,7 +36,7 @@ class LaunchFilesTest(unittest.TestCase):
         """What build_map.launch prints with a master of its own."""
         port = free_port()
         os.environ['ROS_MASTER_URI'] = 'http://127.0.0.1:%d' % port
-        return roslaunch('-p', str(port), 'visual_localization', 'build_map.launch',
+        return roslaunch('-p', str(port), str(LAUNCH / 'build_map.launch'),
                          'output:=%s/round.map' % folder, *arguments)
 
     def test_every_launch_file_is_tried(self):
@@ -46,7 +46,7 @@ class LaunchFilesTest(unittest.TestCase):
         for name, configurations in CONFIGURATIONS.items():
             for arguments in configurations:
                 with self.subTest(name=name, arguments=arguments):
-                    read = roslaunch('--nodes', 'visual_localization', name, *arguments)
+                    read = roslaunch('--nodes', str(LAUNCH / name), *arguments)
                     self.assertEqual(read.returncode, 0, read.stdout)
                     self.assertIn('/', read.stdout)
 
