@@ -43,6 +43,10 @@ class BagWriter {
 
   /// Bytes of the bag so far.
   std::uint64_t size() const { return end_; }
+  /// Bytes of the messages since the last sync().
+  std::uint64_t waiting() const { return chunk_.size(); }
+  /// Bytes that the next sync() takes for its index: it grows with each.
+  std::uint64_t indexSize() const { return connection_records_.size() + chunk_infos_.size(); }
   const std::string& path() const { return path_; }
 
  private:

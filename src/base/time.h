@@ -27,7 +27,7 @@ inline std::string secondsText(std::int64_t stamp_ns) {
 /// How far apart the times of day of two stamps are, at most half a day.
 inline std::int64_t apartInDay_ns(std::int64_t a_ns, std::int64_t b_ns) {
   constexpr std::int64_t kDay_ns = 86'400'000'000'000;
-  const std::int64_t apart = std::abs(a_ns % kDay_ns - b_ns % kDay_ns);
+  const std::int64_t apart = std::abs(a_ns % kDay_ns - b_ns % kDay_ns) % kDay_ns;
   return std::min(apart, kDay_ns - apart);
 }
 

@@ -29,6 +29,8 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
+constexpr std::uint64_t kMostWaiting_bytes = 16U << 20U;  ///< raw images of a fast camera do not wait for the period
+constexpr std::uint64_t kSmallIndex_bytes = 64U << 10U;
 constexpr std::uint32_t kSlowQueue = 100;  ///< while the disk is slow
 constexpr std::uint32_t kFastQueue = 1000;
 constexpr double kReportPeriod_s = 1.0;
@@ -107,8 +109,8 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
   updater_.add("session", this, &MapRecorder::reportSession);
   looker_ = std::thread([this] { lookAtImages(); });
   timer_ = node_.createWallTimer(ros::WallDuration(kReportPeriod_s), &MapRecorder::onTimer, this);
-  sync_timer_ =
-      node_.createWallTimer(ros::WallDuration(config_.sync_period_s), [this](const ros::WallTimerEvent&) { sync(); });
+  sync_timer_ = node_.createWallTimer(ros::WallDuration(config_.sync_period_s),
+                                      [this](const ros::WallTimerEvent&) { sync(false); });
   service_spinner_.emplace(1, &services_);
   service_spinner_->start();
   ROS_INFO_STREAM("Recording " << image_topic_ << ", " << fix_topic_ << ", odometry and static transforms to "
@@ -122,7 +124,7 @@ MapRecorder::~MapRecorder() {
   for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
   queue_.close();
   if (looker_.joinable()) looker_.join();
-  sync();
+  sync(true);
   ROS_INFO_STREAM("Recorded " << recorded_ << " messages in " << bag_->path());
 }
 
@@ -132,7 +134,7 @@ void MapRecorder::record(const std::string& name, std::uint32_t queue, std::func
   const boost::function<void(const boost::shared_ptr<const Message>&)> keep =
       [this, topic, look](const boost::shared_ptr<const Message>& message) {
         const std::lock_guard<std::mutex> lock(mutex_);
-        bag_->write(topic, now(), *message) ? ++recorded_ : ++lost_;
+        write(topic, *message);
         if (look) look(*message);
       };
   subscribers_.push_back(
@@ -146,7 +148,7 @@ void MapRecorder::recordImages(const std::string& name) {
       [this, topic](const boost::shared_ptr<const Message>& message) {
         {
           const std::lock_guard<std::mutex> lock(mutex_);
-          bag_->write(topic, now(), *message) ? ++recorded_ : ++lost_;
+          write(topic, *message);
           images_.add();
         }
         queue_.push({stampOf(message->header), [message] { return toGrey(*message); }});
@@ -155,8 +157,21 @@ void MapRecorder::recordImages(const std::string& name) {
       node_.subscribe<Message>(topic, kSlowQueue, keep, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
-void MapRecorder::sync() {
+/// The caller holds the mutex.
+template <class Message>
+void MapRecorder::write(const std::string& topic, const Message& message) {
+  bag_->write(topic, now(), message) ? ++recorded_ : ++lost_;
+  if (bag_->waiting() >= kMostWaiting_bytes && disk_trouble_.empty()) syncBag();
+}
+
+/// Each sync writes the whole index again. After hours of small messages it is worth that only when as much waits:
+/// otherwise the bag would be mostly indices.
+void MapRecorder::sync(bool at_once) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (at_once || bag_->waiting() + kSmallIndex_bytes >= bag_->indexSize()) syncBag();
+}
+
+void MapRecorder::syncBag() {
   try {
     bag_->sync();
     disk_trouble_.clear();
@@ -204,7 +219,7 @@ RecordedSession MapRecorder::sessionFor(const std::string& path) const {
 bool MapRecorder::onWriteMap(WriteMap::Request& request, WriteMap::Response& response) {
   const std::lock_guard<std::mutex> one_at_a_time(building_);
   try {
-    sync();
+    sync(true);
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (!disk_trouble_.empty()) throw FileError(disk_trouble_);

@@ -61,7 +61,10 @@ class MapRecorder {
   void record(const std::string& name, std::uint32_t queue, std::function<void(const Message&)> look = {});
   template <class Message>
   void recordImages(const std::string& name);
-  void sync();
+  void sync(bool at_once);
+  void syncBag();
+  template <class Message>
+  void write(const std::string& topic, const Message& message);
   void lookAtImages();
   std::size_t featuresOf(const cv::Mat& grey);
   bool onWriteMap(WriteMap::Request& request, WriteMap::Response& response);

@@ -61,7 +61,7 @@ RecordingWatch::RecordingWatch(const WatchConfig& config, std::shared_ptr<const 
 void RecordingWatch::addFix(const Fix& fix) {
   ++summary_.fixes;
   if (!hasPosition(fix)) return;
-  if (!frame_) frame_.emplace(fix.position);
+  if (!frame_) frame_.emplace(GeodeticPoint{fix.position.latitude_deg, fix.position.longitude_deg, 0.0});
   ++summary_.usable_fixes;
   summary_.fix_sigma_m = fix.sigma_m;
   last_fix_ = fix;

@@ -108,6 +108,21 @@ TEST_F(BagWriterTest, IsWholeWhereverTheNextPartIsCutOff) {
   }
 }
 
+TEST_F(BagWriterTest, SaysWhatASyncCosts) {
+  BagWriter bag(path_);
+  EXPECT_EQ(bag.waiting(), 0U);
+  writeFixes(bag, 0, 4);
+  EXPECT_GT(bag.waiting(), 4 * sizeof(double) * 12);
+  bag.sync();
+  EXPECT_EQ(bag.waiting(), 0U);
+  const std::uint64_t index = bag.indexSize();
+  writeFixes(bag, 4, 8);
+  const std::uint64_t before = bag.size();
+  bag.sync();
+  EXPECT_GT(bag.indexSize(), index);
+  EXPECT_GT(bag.size() - before, bag.indexSize());
+}
+
 TEST_F(BagWriterTest, AnEmptyOneIsABag) {
   { BagWriter bag(path_); }
   EXPECT_FALSE(BagReader(path_).hasFixes("/gps/fix"));

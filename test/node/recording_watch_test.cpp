@@ -1,5 +1,7 @@
 #include "node/recording_watch.h"
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
@@ -81,6 +83,16 @@ TEST_F(RecordingWatchTest, AReceiverWithoutAFixDoesNotCount) {
   EXPECT_EQ(watch_.summary().fixes, 2U);
   EXPECT_EQ(watch_.summary().usable_fixes, 0U);
   EXPECT_FALSE(watch_.frame());
+}
+
+TEST_F(RecordingWatchTest, AReceiverNeedNotKnowItsAltitude) {
+  Fix flat = fixAt(0.0, 0.0);
+  flat.position.altitude_m = std::numeric_limits<double>::quiet_NaN();
+  watch_.addFix(flat);
+  watch_.addImage(0, kMany);
+  EXPECT_EQ(watch_.summary().now, Weakness::kNone);
+  ASSERT_EQ(watch_.spots().size(), 1U);
+  EXPECT_TRUE(watch_.spots().front().position_m.allFinite());
 }
 
 TEST_F(RecordingWatchTest, NoticesWhatTheMapHasAlready) {
