@@ -72,7 +72,7 @@ std::uint32_t BagWriter::connectionOf(const Kind& kind) {
     const std::string record =
         recordHeader(Op::kConnection, fieldOf("conn", bytesOf(entry->second)) + fieldOf("topic", kind.topic)) +
         withLength(fieldOf("topic", kind.topic) + fieldOf("type", kind.type) + fieldOf("md5sum", kind.md5sum) +
-                   fieldOf("message_definition", kind.definition));
+                   fieldOf("message_definition", kind.definition) + (kind.latched ? fieldOf("latching", "1") : ""));
     chunk_ += record;
     connection_records_ += record;
   }

@@ -26,10 +26,11 @@ class BagWriter {
   BagWriter& operator=(const BagWriter&) = delete;
 
   /// Keeps a message for the next sync(). False, and the message is lost, when more than 64 MiB wait already.
+  /// `latched`: who plays the bag is to latch the topic.
   template <class Message>
-  bool write(const std::string& topic, const ros::Time& received, const Message& message) {
+  bool write(const std::string& topic, const ros::Time& received, const Message& message, bool latched = false) {
     namespace traits = ros::message_traits;
-    const Kind kind{topic, traits::datatype(message), traits::md5sum(message), traits::definition(message)};
+    const Kind kind{topic, traits::datatype(message), traits::md5sum(message), traits::definition(message), latched};
     std::string bytes(ros::serialization::serializationLength(message), '\0');
     ros::serialization::OStream out(reinterpret_cast<std::uint8_t*>(bytes.data()),
                                     static_cast<std::uint32_t>(bytes.size()));
@@ -56,6 +57,7 @@ class BagWriter {
     std::string type;
     std::string md5sum;
     std::string definition;
+    bool latched = false;
   };
   struct Entry {
     ros::Time received;

@@ -34,7 +34,7 @@ void writeSelection(const TrainingMap& map, const std::vector<bool>& keep, const
                     const std::function<void(TrainingImage&)>& change) {
   if (std::find(keep.begin(), keep.end(), true) == keep.end()) throw MapEditError("no image would be left");
   auto [header, numbers] = remaining(map, keep);
-  header.history.push_back(edit);
+  if (!edit.empty()) header.history.push_back(edit);
   MapWriter writer(path);
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (keep[i]) {

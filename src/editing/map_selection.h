@@ -17,7 +17,7 @@ class MapEditError : public std::runtime_error {
 };
 
 /// Those images of `map`, opened with strictLoading(), that `keep` has, as a map file; sessions without images go.
-/// `edit`: for MapHeader::history. `change`: what else becomes of an image. Throws MapStoreError, and
+/// `edit`: for MapHeader::history; empty: nothing. `change`: what else becomes of an image. Throws MapStoreError, and
 /// MapEditError when no image is left.
 void writeSelection(const TrainingMap& map, const std::vector<bool>& keep, const std::string& edit,
                     const std::string& path, const Progress& progress = {},

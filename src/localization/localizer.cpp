@@ -65,7 +65,8 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   sweep_.startImage();
   const TrackerEstimate tracked = track(stamp_ns, metric);
   if (!metric) metric = poseNearProposal(tracked);
-  if (!metric) learnSession(tracked);
+  sessions_->sawSomething(metric || tracked.best.recognised);
+  if (!metric && tracked.best.recognised) learnSession(tracked);
   const Evidence evidence = verify(tracked, metric);
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
@@ -200,10 +201,8 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
 /// Without landmarks the most similar training image is compared with one of another session beside it.
 void Localizer::learnSession(const TrackerEstimate& tracked) {
   const std::size_t best = tracked.best_image;
-  sessions_->sawSomething(tracked.best.recognised);
-  const auto trial = tracked.best.recognised ? sessions_->trial(map_->position_m(best), map_->yaw_rad(best))
-                                             : std::optional<std::size_t>();
-  if (trial) sessions_->learn(best, tracked.best.matches, *trial, scores_[*trial].matches);
+  const auto trial = sessions_->trial(map_->position_m(best), map_->yaw_rad(best));
+  if (trial) sessions_->learn(best, tracked.best.weight, *trial, scores_[*trial].weight);
 }
 
 /// To a pose that landmarks verify: the next image is searched around it.

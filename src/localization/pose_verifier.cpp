@@ -165,15 +165,20 @@ bool PoseVerifier::isPredicted(const MetricPose& pose) const {
   return agrees(byOdometry()) || agrees(byVelocity());
 }
 
-/// Wheels that slip or a robot that was carried: what odometry says is worth nothing until it agrees again for a while.
-void PoseVerifier::judgeOdometry(const MetricPose& pose) {
-  if (!last_ || odometry_ == nullptr) return;
+/// Whether odometry since the last verified pose leads to this one; nothing when it does not know.
+std::optional<bool> PoseVerifier::odometryAgrees(const MetricPose& pose) const {
+  if (!last_ || odometry_ == nullptr) return std::nullopt;
   const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
-  if (!way) return;
+  if (!way) return std::nullopt;
   const Prediction expected = predictedBy(last_->pose, *way, odometry_config_);
   const double off_m = (pose.base.translation().head<2>() - expected.position_m).norm();
   const double turned_rad = std::abs(angleDifference(expected.yaw_rad, yawOf(pose.base)));
-  if (off_m > kSlipped_m + 3.0 * largerSigma(expected.covariance_m2) || turned_rad > kSlipped_rad) {
+  return off_m <= kSlipped_m + 3.0 * largerSigma(expected.covariance_m2) && turned_rad <= kSlipped_rad;
+}
+
+/// Wheels that slip or a robot that was carried: what odometry says is worth nothing until it agrees again for a while.
+void PoseVerifier::judgeOdometry(bool agrees) {
+  if (!agrees) {
     distrust_ = kImagesOfDistrust;
   } else if (distrust_ > 0) {
     --distrust_;
@@ -212,7 +217,9 @@ std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& im
   std::vector<Pair> inliers;
   for (const std::size_t i : solved->inliers) inliers.push_back(seen[i]);
   const std::vector<std::size_t> agreeing = keepMatched(images, std::move(inliers));
-  if (trial) sessions_.learn(images.front(), agreeing.front(), *trial, agreeing.back());
+  if (trial)
+    sessions_.learn(images.front(), static_cast<double>(agreeing.front()), *trial,
+                    static_cast<double>(agreeing.back()));
   MetricPose pose;
   pose.camera = solved->camera;
   pose.base = mount_.baseInMap(pose.camera);
@@ -280,11 +287,13 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
 
 /// Odometry that is believed leads elsewhere: the robot was carried, the wheels have slipped while nothing was seen, or
 /// this is the twin of the place. The first two stay, and a few more poses along the motion tell.
-bool PoseVerifier::isElsewhere(const MetricPose& pose) {
+bool PoseVerifier::isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees) {
   const bool predicted = isPredicted(pose);
-  if (byOdometry() && !predicted) {
+  if (byOdometry() && !odometry_agrees.value_or(true) && !predicted) {
     elsewhere_ = kImagesOfDistrust;
-  } else if (elsewhere_ > 0 && predicted) {
+  } else if (!odometry_agrees && !byVelocity()) {
+    elsewhere_ = 0;  // nobody knows any more how it came here
+  } else if (elsewhere_ > 0 && (predicted || odometry_agrees.value_or(false))) {
     --elsewhere_;
   }
   return elsewhere_ > 0;
@@ -292,8 +301,9 @@ bool PoseVerifier::isElsewhere(const MetricPose& pose) {
 
 MetricPose PoseVerifier::accepted(MetricPose pose) {
   const bool clear = pose.inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isPredicted(pose);
-  pose.confirmed = !isElsewhere(pose) && focal_.confirms() && clear;
-  judgeOdometry(pose);
+  const std::optional<bool> odometry_agrees = odometryAgrees(pose);
+  pose.confirmed = !isElsewhere(pose, odometry_agrees) && focal_.confirms() && clear;
+  if (odometry_agrees) judgeOdometry(*odometry_agrees);
   Known known{stamp_ns_, pose, {}};
   if (last_) {
     const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);

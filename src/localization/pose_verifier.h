@@ -94,8 +94,9 @@ class PoseVerifier {
   std::optional<Prediction> byVelocity() const;
   std::optional<MetricPose> near(const std::optional<Prediction>& prediction);
   bool isPredicted(const MetricPose& pose) const;
-  void judgeOdometry(const MetricPose& pose);
-  bool isElsewhere(const MetricPose& pose);
+  std::optional<bool> odometryAgrees(const MetricPose& pose) const;
+  void judgeOdometry(bool agrees);
+  bool isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees);
   MetricPose accepted(MetricPose pose);
 
   const TrainingMap& map_;

@@ -17,6 +17,7 @@ constexpr std::size_t kTrialEvery = 4;   ///< images
 constexpr std::size_t kPatience = 3;     ///< images that show nothing
 constexpr double kMemory = 0.7;          ///< share of what was known of a session before its last trial
 constexpr double kBetter = 1.1;          ///< another session must match so much better
+constexpr double kLeastMatch = 0.01;     ///< added to both: of what hardly matches no ratio is known
 constexpr double kLargestRatio = 10.0;   ///< of two matches: one image alone must not decide
 constexpr std::size_t kNeighbours = 32;  ///< looked at for those that face alike
 
@@ -32,14 +33,15 @@ SessionChoice::~SessionChoice() = default;
 void SessionChoice::startImage(std::int64_t stamp_ns) {
   tried_.reset();
   ++images_seen_;
-  if (std::exchange(started_, true) || !isOn()) return;
-  std::pair<std::int64_t, std::int64_t> least{std::numeric_limits<std::int64_t>::max(),
-                                              0};  // apart in the day, then age
+  if (!isOn() || std::exchange(started_, true)) return;
+  std::int64_t least_ns = std::numeric_limits<std::int64_t>::max();
+  std::int64_t latest_ns = std::numeric_limits<std::int64_t>::min();
   for (std::size_t i = 0; i < map_.size(); ++i) {
     const std::int64_t taken_ns = map_.pose(i).stamp_ns;
-    const std::pair<std::int64_t, std::int64_t> apart{apartInDay_ns(taken_ns, stamp_ns), -taken_ns};
-    if (!(apart < least)) continue;
-    least = apart;
+    const std::int64_t apart_ns = apartInDay_ns(taken_ns, stamp_ns);
+    if (apart_ns > least_ns || (apart_ns == least_ns && taken_ns <= latest_ns)) continue;
+    least_ns = apart_ns;
+    latest_ns = taken_ns;
     chosen_ = sessionOf(i);
   }
 }
@@ -97,12 +99,11 @@ std::optional<std::size_t> SessionChoice::trial(const Eigen::Vector2d& position_
   return found.empty() ? std::nullopt : std::optional(found.front().image);
 }
 
-void SessionChoice::learn(std::size_t training_image, std::size_t matches, std::size_t other_image,
-                          std::size_t other_matches) {
+void SessionChoice::learn(std::size_t training_image, double match, std::size_t other_image, double other_match) {
   const std::size_t session = sessionOf(training_image);
   const std::size_t other = sessionOf(other_image);
   if (!isOn() || session == other) return;
-  const double measured = static_cast<double>(other_matches + 1) / static_cast<double>(matches + 1);
+  const double measured = (other_match + kLeastMatch) / (match + kLeastMatch);
   const double ratio = std::clamp(measured, 1.0 / kLargestRatio, kLargestRatio);
   const double known = std::clamp(ratio * matches_[session], 1e-3, 1e3);
   matches_[other] = kMemory * matches_[other] + (1.0 - kMemory) * known;
@@ -111,19 +112,21 @@ void SessionChoice::learn(std::size_t training_image, std::size_t matches, std::
 
 void SessionChoice::choose(std::size_t training_image) {
   if (!isOn()) return;
-  const double largest = matches_[best()];
   chosen_ = sessionOf(training_image);
-  matches_[chosen_] = largest;
+  matches_[chosen_] = *std::max_element(matches_.begin(), matches_.end());
 }
 
 void SessionChoice::sawSomething(bool anything) {
   nothing_seen_ = anything ? 0 : nothing_seen_ + 1;
   if (!isOn() || nothing_seen_ < kPatience) return;
-  chosen_ = nothing_seen_ % 2 == 0 ? best() : nextInTurn();
+  if (nothing_seen_ == kPatience) chosen_before_ = chosen_;
+  chosen_ = nothing_seen_ % 2 == 0 ? bestOr(chosen_before_) : nextInTurn();
 }
 
-std::size_t SessionChoice::best() const {
-  return static_cast<std::size_t>(std::max_element(matches_.begin(), matches_.end()) - matches_.begin());
+/// The session that matched best, or this one if none was better.
+std::size_t SessionChoice::bestOr(std::size_t session) const {
+  const auto best = std::max_element(matches_.begin(), matches_.end());
+  return matches_[session] >= *best ? session : static_cast<std::size_t>(best - matches_.begin());
 }
 
 /// Another session than the chosen one.

@@ -46,13 +46,13 @@ class SessionChoice {
   /// A training image of another session there, when one is to be tried in this image: the same until the next one.
   std::optional<std::size_t> trial(const Eigen::Vector2d& position_m, double yaw_rad);
 
-  /// How well the current image matches two training images of one position: matched features or inliers.
-  /// The session of the better one may be chosen.
-  void learn(std::size_t training_image, std::size_t matches, std::size_t other_image, std::size_t other_matches);
+  /// How well the current image matches two training images of one position: weights of their scores, or inliers. The
+  /// session of the better one may be chosen.
+  void learn(std::size_t training_image, double match, std::size_t other_image, double other_match);
   /// The session of this training image is the right one: its landmarks verified a pose that was not expected.
   void choose(std::size_t training_image);
-  /// Whether the image showed anything known. After a few that did not, every second image is compared with the next
-  /// session.
+  /// Whether the image showed anything known, by any session. After a few that did not, every second image is compared
+  /// with the next session.
   void sawSomething(bool anything);
 
  private:
@@ -61,14 +61,15 @@ class SessionChoice {
   bool isOn() const { return on_ && matches_.size() > 1; }
   std::size_t sessionOf(std::size_t training_image) const;
   std::size_t nextInTurn();
-  std::size_t best() const;
+  std::size_t bestOr(std::size_t session) const;
 
   const TrainingMap& map_;
   bool on_;
   std::unique_ptr<const SessionIndex> images_;  ///< in a map of several sessions
   bool started_ = false;
   std::size_t chosen_ = 0;
-  std::vector<double> matches_;  ///< of each session lately, on a scale of their own
+  std::size_t chosen_before_ = 0;  ///< before images showed nothing
+  std::vector<double> matches_;    ///< of each session lately, on a scale of their own
   std::size_t images_seen_ = 0;
   std::size_t nothing_seen_ = 0;  ///< images in a row
   std::size_t trials_ = 0;

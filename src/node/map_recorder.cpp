@@ -20,6 +20,7 @@
 #include "node/parameter_server.h"
 #include "ros/camera_info.h"
 #include "ros/fix_message.h"
+#include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/image_conversion.h"
@@ -29,6 +30,7 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
+const char* const kStaticTransforms = "/tf_static";
 constexpr std::uint64_t kMostWaiting_bytes = 16U << 20U;  ///< raw images of a fast camera do not wait for the period
 constexpr std::uint64_t kSmallIndex_bytes = 64U << 10U;
 constexpr std::uint32_t kSlowQueue = 100;  ///< while the disk is slow
@@ -82,12 +84,16 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
       extractor_(makeSiftExtractor({}, siftBackends().front())),
       updater_(node, private_node, ros::this_node::getName()) {
   assignParameters(config_, privateParameters(private_node_));
+  if (!config_.builder_config.empty()) {  // a wrong one would be found after the round
+    MapBuilderConfig attempt;
+    assignParameters(attempt, parameters::readYaml(config_.builder_config));
+  }
   const auto map = config_.map.empty() ? nullptr : loadMap(config_.map);
   watch_.emplace(config_.watch, map);
-  bag_.emplace((std::filesystem::path(config_.folder) / ("session_" + localTime() + ".bag")).string());
-
   fix_topic_ = node_.resolveName("fix");
   image_topic_ = node_.resolveName("image");
+  bag_.emplace((std::filesystem::path(config_.folder) / ("session_" + localTime() + ".bag")).string());
+
   if (config_.image_transport == "compressed") {
     recordImages<sensor_msgs::CompressedImage>(image_topic_ + "/compressed");
   } else {
@@ -98,7 +104,7 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
     watch_->addFix(toFix(fix, stampOf(fix.header)));
   });
   record<nav_msgs::Odometry>("odom", kFastQueue);
-  record<tf2_msgs::TFMessage>("/tf_static", kFastQueue);
+  record<tf2_msgs::TFMessage>(kStaticTransforms, kFastQueue);
 
   way_ = private_node_.advertise<visualization_msgs::Marker>("way", 1, true);
   ros::NodeHandle services(private_node_);
@@ -107,24 +113,24 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
   updater_.setHardwareID("none");
   updater_.add("recording", this, &MapRecorder::reportRecording);
   updater_.add("session", this, &MapRecorder::reportSession);
-  looker_ = std::thread([this] { lookAtImages(); });
   timer_ = node_.createWallTimer(ros::WallDuration(kReportPeriod_s), &MapRecorder::onTimer, this);
   sync_timer_ = node_.createWallTimer(ros::WallDuration(config_.sync_period_s),
                                       [this](const ros::WallTimerEvent&) { sync(false); });
   service_spinner_.emplace(1, &services_);
   service_spinner_->start();
+  looker_ = std::thread([this] { lookAtImages(); });
   ROS_INFO_STREAM("Recording " << image_topic_ << ", " << fix_topic_ << ", odometry and static transforms to "
                                << bag_->path());
 }
 
 MapRecorder::~MapRecorder() {
+  sync(true);  // first: a map that is being written takes minutes, and roslaunch does not wait for it
   service_spinner_.reset();
   timer_.stop();
   sync_timer_.stop();
   for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
   queue_.close();
   if (looker_.joinable()) looker_.join();
-  sync(true);
   ROS_INFO_STREAM("Recorded " << recorded_ << " messages in " << bag_->path());
 }
 
@@ -150,6 +156,7 @@ void MapRecorder::recordImages(const std::string& name) {
           const std::lock_guard<std::mutex> lock(mutex_);
           write(topic, *message);
           images_.add();
+          watch_->addImage(stampOf(message->header));
         }
         queue_.push({stampOf(message->header), [message] { return toGrey(*message); }});
       };
@@ -160,7 +167,8 @@ void MapRecorder::recordImages(const std::string& name) {
 /// The caller holds the mutex.
 template <class Message>
 void MapRecorder::write(const std::string& topic, const Message& message) {
-  bag_->write(topic, now(), message) ? ++recorded_ : ++lost_;
+  const bool latched = topic == kStaticTransforms;
+  bag_->write(topic, now(), message, latched) ? ++recorded_ : ++lost_;
   if (bag_->waiting() >= kMostWaiting_bytes && disk_trouble_.empty()) syncBag();
 }
 
@@ -194,7 +202,7 @@ void MapRecorder::lookAtImages() {
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     image_trouble_ = trouble;
-    if (trouble.empty()) watch_->addImage(image->stamp_ns, features);
+    if (trouble.empty()) watch_->addLook(image->stamp_ns, features);
   }
 }
 
@@ -213,11 +221,13 @@ RecordedSession MapRecorder::sessionFor(const std::string& path) const {
   RecordedSession session{bag_->path(), image_topic_, fix_topic_, config_.map, config_.builder_config, {}};
   session.output = path.empty() ? std::filesystem::path(bag_->path()).replace_extension(".map").string()
                                 : mapFileBelow(config_.folder, path, "folder");
+  if (std::filesystem::path(session.output).extension() != ".map") {
+    throw MapStoreError(oneLine(path) + ": a map file must end in .map");
+  }
   return session;
 }
 
 bool MapRecorder::onWriteMap(WriteMap::Request& request, WriteMap::Response& response) {
-  const std::lock_guard<std::mutex> one_at_a_time(building_);
   try {
     sync(true);
     {
@@ -226,7 +236,7 @@ bool MapRecorder::onWriteMap(WriteMap::Request& request, WriteMap::Response& res
     }
     const RecordedSession session = sessionFor(request.path);
     build_map_(session);
-    response.images = static_cast<std::uint32_t>(loadMap(session.output)->size());
+    response.images = static_cast<std::uint32_t>(loadMap(session.output, {0, {}})->size());
     response.map = session.output;
     response.success = true;
     response.message = oneLine("wrote " + session.output);
@@ -280,7 +290,8 @@ void MapRecorder::reportRecording(Wrapper& status) {
   } else if (!image_trouble_.empty()) {
     status.summary(DiagnosticStatus::WARN, "Unusable image: " + image_trouble_);
   } else if (lost_ > 0) {
-    status.summary(DiagnosticStatus::WARN, std::to_string(lost_) + " messages lost: the disk is too slow");
+    status.summary(DiagnosticStatus::WARN,
+                   std::to_string(lost_) + " messages lost so far: more came than could be kept");
   } else {
     status.summary(DiagnosticStatus::OK, "Recording");
   }

@@ -88,9 +88,8 @@ class MapRecorder {
   std::string disk_trouble_;
   std::string image_trouble_;
   std::size_t published_ = 0;
-  // Each of one thread alone.
+  // What has its own lock, or does not change.
   std::unique_ptr<SiftExtractor> extractor_;
-  std::mutex building_;
   LatestQueue<Waiting> queue_;
   std::thread looker_;
   std::vector<ros::Subscriber> subscribers_;

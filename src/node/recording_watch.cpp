@@ -9,7 +9,7 @@
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kImagesOfSpacing = 6;  ///< noise of single fixes must not look like speed
+constexpr std::size_t kImagesOfSpacing = 10;  ///< noise of fixes, or their low rate, must not look like speed
 constexpr double kSameLine_m = 2.0;
 constexpr std::size_t kNeighbours = 32;  ///< one of each session should be among them
 
@@ -31,7 +31,7 @@ void RecorderConfig::declare(ParameterVisitor& visitor) {
                  {"raw", "compressed"});
   visitor.text({"builder_config", "", "YAML file of the map builder's parameters; empty: its defaults"},
                builder_config);
-  visitor.real({"sync_period", "s", "what is older than this survives a loss of power"}, sync_period_s, 0.5, 60.0);
+  visitor.real({"sync_period", "s", "how often the recording is put on the disk; less often where its index is larger than what waits"}, sync_period_s, 0.5, 60.0);
   visitor.text({"global_frame_id", "", "frame of the way in rviz"}, global_frame_id);
   watch.declare(visitor);
   visitor.require(!folder.empty() && folder.front() == '/', "folder", "'" + folder + "'", "an absolute path");
@@ -68,23 +68,29 @@ void RecordingWatch::addFix(const Fix& fix) {
   position_m_ = frame_->toEastNorth(fix.position);
 }
 
-void RecordingWatch::addImage(std::int64_t stamp_ns, std::size_t features) {
-  const bool has_position =
-      last_fix_ && std::abs(secondsBetween(last_fix_->stamp_ns, stamp_ns)) <= config_.max_fix_age_s;
-  if (has_position) {
-    last_images_.push_back(position_m_);
-    if (last_images_.size() > kImagesOfSpacing) last_images_.pop_front();
-    const auto steps = static_cast<double>(last_images_.size() - 1);
-    summary_.spacing_m = steps > 0.0 ? (last_images_.back() - last_images_.front()).norm() / steps : 0.0;
-    addWay();
-  } else {
+bool RecordingWatch::hasPositionAt(std::int64_t stamp_ns) const {
+  return last_fix_ && std::abs(secondsBetween(last_fix_->stamp_ns, stamp_ns)) <= config_.max_fix_age_s;
+}
+
+void RecordingWatch::addImage(std::int64_t stamp_ns) {
+  if (!hasPositionAt(stamp_ns)) {
     last_images_.clear();
+    return;
   }
+  last_images_.push_back(position_m_);
+  if (last_images_.size() > kImagesOfSpacing) last_images_.pop_front();
+  const auto steps = static_cast<double>(last_images_.size() - 1);
+  summary_.spacing_m = steps > 0.0 ? (last_images_.back() - last_images_.front()).norm() / steps : 0.0;
+  addWay();
+}
+
+void RecordingWatch::addLook(std::int64_t stamp_ns, std::size_t features) {
   const Weakness weakness = weaknessOf(stamp_ns, features);
-  if (has_position) {
-    spots_.push_back({position_m_, weakness});
+  if (last_fix_) spots_.push_back({position_m_, weakness});
+  if (hasPositionAt(stamp_ns)) {
+    ++placed_;
     known_ += isKnown(stamp_ns) ? 1 : 0;
-    summary_.known_way_share = static_cast<double>(known_) / static_cast<double>(spots_.size());
+    summary_.known_way_share = static_cast<double>(known_) / static_cast<double>(placed_);
   }
   ++summary_.images;
   ++summary_.weak[static_cast<std::size_t>(weakness)];
@@ -103,9 +109,7 @@ void RecordingWatch::addWay() {
 }
 
 Weakness RecordingWatch::weaknessOf(std::int64_t stamp_ns, std::size_t features) const {
-  if (!last_fix_ || std::abs(secondsBetween(last_fix_->stamp_ns, stamp_ns)) > config_.max_fix_age_s) {
-    return Weakness::kNoFix;
-  }
+  if (!hasPositionAt(stamp_ns)) return Weakness::kNoFix;
   if (last_fix_->sigma_m > config_.max_fix_sigma_m) return Weakness::kPoorFix;
   if (features < static_cast<std::size_t>(config_.few_features)) return Weakness::kFewFeatures;
   return summary_.spacing_m > config_.max_spacing_m ? Weakness::kFarApart : Weakness::kNone;

@@ -57,14 +57,14 @@ const char* describe(Weakness weakness);
 /// Looks at a session while it is recorded and says what will be weak in its map, as long as the robot is still there.
 class RecordingWatch {
  public:
-  /// An image where the robot was.
+  /// An image that was looked at, where the last usable fix was.
   struct Spot {
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< in frame()
     Weakness weakness = Weakness::kNone;
   };
   /// What is known so far.
   struct Summary {
-    std::size_t images = 0;
+    std::size_t images = 0;                          ///< that were looked at
     std::array<std::size_t, kWeaknesses> weak = {};  ///< images by weakness
     Weakness now = Weakness::kNone;                  ///< of the last image
     std::size_t fixes = 0;
@@ -81,27 +81,30 @@ class RecordingWatch {
   RecordingWatch(const WatchConfig& config, std::shared_ptr<const TrainingMap> map);
 
   void addFix(const Fix& fix);
-  void addImage(std::int64_t stamp_ns, std::size_t features);
+  /// An image that was recorded.
+  void addImage(std::int64_t stamp_ns);
+  /// One of these that was looked at: a slow computer does not look at all of them.
+  void addLook(std::int64_t stamp_ns, std::size_t features);
 
   Summary summary() const { return summary_; }
-  /// Images that have a position, in their order.
+  /// Images that were looked at since the first usable fix, in their order.
   const std::vector<Spot>& spots() const { return spots_; }
-  /// That of the map, or else around the first usable fix; nothing before that.
-  const std::optional<LocalFrame>& frame() const { return frame_; }
 
  private:
+  bool hasPositionAt(std::int64_t stamp_ns) const;
   Weakness weaknessOf(std::int64_t stamp_ns, std::size_t features) const;
   bool isKnown(std::int64_t stamp_ns) const;
   void addWay();
 
   WatchConfig config_;
   std::shared_ptr<const TrainingMap> map_;
-  std::optional<LocalFrame> frame_;
-  std::optional<Fix> last_fix_;  ///< usable
+  std::optional<LocalFrame> frame_;  ///< that of the map, or else around the first usable fix
+  std::optional<Fix> last_fix_;      ///< usable
   Eigen::Vector2d position_m_ = Eigen::Vector2d::Zero();
   std::deque<Eigen::Vector2d> last_images_;
   std::optional<Eigen::Vector2d> way_from_m_;
-  std::size_t known_ = 0;
+  std::size_t placed_ = 0;  ///< images that were looked at and have a position
+  std::size_t known_ = 0;   ///< of these
   std::vector<Spot> spots_;
   Summary summary_;
 };

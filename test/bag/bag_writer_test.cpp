@@ -55,7 +55,7 @@ TEST_F(BagWriterTest, RosbagReadsIt) {
     BagWriter bag(path_);
     writeFixes(bag, 0, 7);
     bag.sync();
-    ASSERT_TRUE(bag.write("/odom", ros::Time(1010, 0), nav_msgs::Odometry()));
+    ASSERT_TRUE(bag.write("/odom", ros::Time(1010, 0), nav_msgs::Odometry(), true));
     writeFixes(bag, 7, 9);
     bag.sync();
   }
@@ -68,6 +68,9 @@ TEST_F(BagWriterTest, RosbagReadsIt) {
     EXPECT_EQ(fix->header.stamp, fixAt(fixes).header.stamp);
     EXPECT_EQ(fix->longitude, fixAt(fixes).longitude);
     ++fixes;
+  }
+  for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+    EXPECT_EQ(connection->header->count("latching"), connection->topic == "/odom" ? 1U : 0U);
   }
   EXPECT_EQ(fixes, 9);
   EXPECT_EQ(view.size(), 10U);

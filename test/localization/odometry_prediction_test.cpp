@@ -89,7 +89,9 @@ TEST_F(DriveWithOdometry, LeadsOverAStretchOfNothing) {
     sigma_before_m = sigma_m;
   }
   odometryTo(37);
-  EXPECT_EQ(see(37).source, PoseSource::kMetric);
+  const Estimate seen = see(37);
+  ASSERT_EQ(seen.source, PoseSource::kMetric);
+  EXPECT_TRUE(seen.metric->confirmed) << "odometry agrees";
 }
 
 TEST_F(DriveWithOdometry, WithoutOdometryTheWayIsUnknown) {

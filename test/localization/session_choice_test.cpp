@@ -148,6 +148,35 @@ TEST_F(SessionChoiceTest, TriesTheOthersWhenNothingIsSeen) {
   EXPECT_EQ(asked, std::vector<bool>(3, true));
 }
 
+TEST_F(SessionChoiceTest, ReturnsToTheSessionOfTheHourWhileNothingIsSeen) {
+  sessions_.startImage(18 * kHour_ns);
+  ASSERT_EQ(sessions_.chosen(), 2U);
+  int of_the_hour = 0;
+  for (int i = 0; i < 12; ++i) {
+    sessions_.sawSomething(false);
+    of_the_hour += sessions_.chosen() == 2U ? 1 : 0;
+  }
+  EXPECT_GE(of_the_hour, 6);
+}
+
+TEST_F(SessionChoiceTest, ImagesThatShowNothingCountInARow) {
+  sessions_.startImage(18 * kHour_ns);
+  for (int i = 0; i < 20; ++i) {
+    sessions_.sawSomething(false);
+    sessions_.sawSomething(false);
+    sessions_.sawSomething(true);
+  }
+  EXPECT_EQ(sessions_.chosen(), 2U);
+}
+
+TEST_F(SessionChoiceTest, LooksAtTheHourWhenItIsSwitchedOn) {
+  sessions_.configure(false);
+  sessions_.startImage(18 * kHour_ns);
+  sessions_.configure(true);
+  sessions_.startImage(18 * kHour_ns);
+  EXPECT_EQ(sessions_.chosen(), 2U);
+}
+
 TEST_F(SessionChoiceTest, StaysWithTheSessionOfAVerifiedPose) {
   sessions_.startImage(8 * kHour_ns);
   for (int i = 0; i < 4; ++i) sessions_.learn(40, 20, nextTrial(), 19);
@@ -205,7 +234,7 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
       sessions.sawSomething(estimate.best.recognised);
       const auto trial = sessions.trial(map.position_m(estimate.best_image), map.yaw_rad(estimate.best_image));
       if (trial) {
-        sessions.learn(estimate.best_image, estimate.best.matches, *trial, scores[*trial].matches);
+        sessions.learn(estimate.best_image, estimate.best.weight, *trial, scores[*trial].weight);
       }
       if (i >= 50) sum += static_cast<double>(scores.comparisons());
     }

@@ -27,7 +27,8 @@ class RecordingWatchTest : public testing::Test {
   void drive(RecordingWatch& watch, double speed_mps, int seconds, std::size_t features = kMany, double sigma_m = 0.5) {
     for (int i = 0; i < seconds; ++i, ++second_) {
       watch.addFix(fixAt(speed_mps * second_, second_, sigma_m));
-      watch.addImage(second_ * kSecond_ns, features);
+      watch.addImage(second_ * kSecond_ns);
+      watch.addLook(second_ * kSecond_ns, features);
     }
   }
   static std::size_t weak(const RecordingWatch& watch, Weakness weakness) {
@@ -52,6 +53,17 @@ TEST_F(RecordingWatchTest, SaysThatTheRobotIsTooFast) {
   EXPECT_EQ(watch_.summary().now, Weakness::kFarApart);
 }
 
+TEST_F(RecordingWatchTest, ASlowComputerIsNoFastRobot) {
+  for (int i = 0; i < 60; ++i) {  // 0.2 m apart, looked at every tenth
+    watch_.addFix(fixAt(0.2 * i, 0.1 * i));
+    watch_.addImage(i * kSecond_ns / 10);
+    if (i % 10 == 0) watch_.addLook(i * kSecond_ns / 10, kMany);
+  }
+  EXPECT_EQ(watch_.summary().now, Weakness::kNone);
+  EXPECT_NEAR(watch_.summary().spacing_m, 0.2, 0.01);
+  EXPECT_EQ(watch_.summary().images, 6U);
+}
+
 TEST_F(RecordingWatchTest, SaysThatThereIsLittleToSee) {
   drive(watch_, 0.65, 5);
   drive(watch_, 0.65, 3, 49);
@@ -68,9 +80,11 @@ TEST_F(RecordingWatchTest, SaysThatTheReceiverDoubts) {
 
 TEST_F(RecordingWatchTest, AnImageLongAfterTheLastFixHasNoPosition) {
   drive(watch_, 0.65, 5);
-  watch_.addImage(7 * kSecond_ns, kMany);
+  watch_.addLook(7 * kSecond_ns, kMany);
   EXPECT_EQ(watch_.summary().now, Weakness::kNoFix);
-  EXPECT_EQ(watch_.spots().size(), 5U);
+  ASSERT_EQ(watch_.spots().size(), 6U);
+  EXPECT_EQ(watch_.spots().back().weakness, Weakness::kNoFix);
+  EXPECT_EQ(watch_.spots().back().position_m, watch_.spots()[4].position_m);
 }
 
 TEST_F(RecordingWatchTest, AReceiverWithoutAFixDoesNotCount) {
@@ -78,18 +92,18 @@ TEST_F(RecordingWatchTest, AReceiverWithoutAFixDoesNotCount) {
   none.has_fix = false;
   watch_.addFix(none);
   watch_.addFix(Fix{0, {0.0, 0.0, 0.0}, true});
-  watch_.addImage(0, kMany);
+  watch_.addLook(0, kMany);
   EXPECT_EQ(watch_.summary().now, Weakness::kNoFix);
   EXPECT_EQ(watch_.summary().fixes, 2U);
   EXPECT_EQ(watch_.summary().usable_fixes, 0U);
-  EXPECT_FALSE(watch_.frame());
+  EXPECT_TRUE(watch_.spots().empty());
 }
 
 TEST_F(RecordingWatchTest, AReceiverNeedNotKnowItsAltitude) {
   Fix flat = fixAt(0.0, 0.0);
   flat.position.altitude_m = std::numeric_limits<double>::quiet_NaN();
   watch_.addFix(flat);
-  watch_.addImage(0, kMany);
+  watch_.addLook(0, kMany);
   EXPECT_EQ(watch_.summary().now, Weakness::kNone);
   ASSERT_EQ(watch_.spots().size(), 1U);
   EXPECT_TRUE(watch_.spots().front().position_m.allFinite());
@@ -104,7 +118,7 @@ TEST_F(RecordingWatchTest, NoticesWhatTheMapHasAlready) {
   second_ = 0;
   for (int i = 0; i < 20; ++i) {
     later.addFix(fixAt(0.65 * i, 3 * 3600 + i));
-    later.addImage((3 * 3600 + i) * kSecond_ns, kMany);
+    later.addLook((3 * 3600 + i) * kSecond_ns, kMany);
   }
   EXPECT_EQ(later.summary().known_way_share, 0.0) << "three hours later the light is another";
 }

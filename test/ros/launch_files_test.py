@@ -11,12 +11,12 @@ import unittest
 BAG, OTHER_BAG = sys.argv[1:3]
 LAUNCH = pathlib.Path(__file__).resolve().parents[2] / 'launch'
 CONFIGURATIONS = {
-    'atrv_jr.launch': [[], ['mode:=record'], ['rectify:=true', 'image_transport:=compressed', 'rviz:=false']],
+    'atrv_jr.launch': [[], ['mode:=record'], ['rectify:=true', 'rviz:=false']],
     'build_map.launch': [['bag:=/a.bag', 'output:=/a.map']],
-    'localizer.launch': [[], ['map:=/a.map', 'preset:=paper', 'tracker:=pf_linear'], ['manager:=nodelets']],
+    'localizer.launch': [[], ['map:=/a.map', 'preset:=paper', 'tracker:=pf_linear', 'odom:=/wheels'], ['manager:=nodelets']],
     'map_recorder.launch': [[], ['folder:=/data', 'map:=/a.map', 'rviz:=true']],
     'replay.launch': [['bag:=/a.bag', 'map:=/a.map'], ['bag:=/a.bag', 'map:=/a.map', 'plot_output:=/a.png']],
-    'robot_template.launch': [[], ['mode:=record']],
+    'robot_template.launch': [[], ['mode:=record'], ['odom:=/odom']],
 }
 
 
@@ -49,6 +49,12 @@ class LaunchFilesTest(unittest.TestCase):
                     read = roslaunch('--nodes', str(LAUNCH / name), *arguments)
                     self.assertEqual(read.returncode, 0, read.stdout)
                     self.assertIn('/', read.stdout)
+
+    def test_an_unknown_mode_is_refused(self):
+        for name in ('atrv_jr.launch', 'robot_template.launch'):
+            read = roslaunch('--nodes', str(LAUNCH / name), 'mode:=locate')
+            self.assertNotEqual(read.returncode, 0)
+            self.assertIn('locate', read.stdout)
 
     def test_several_bags_become_sessions_of_one_map(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -1,11 +1,9 @@
 #!/usr/bin/env python3
 """A session is recorded while it is driven: killed at any moment its bag is whole, and a call writes its map."""
-import os
 import pathlib
 import signal
 import subprocess
 import tempfile
-import time
 import unittest
 
 import rosbag
@@ -50,6 +48,11 @@ class RecorderTest(unittest.TestCase):
     def recorded(self):
         return sorted(self.folder.glob('session_*.bag'))
 
+    @staticmethod
+    def images_in(path):
+        with rosbag.Bag(str(path)) as bag:
+            return bag.get_message_count('/stereo/left/image_raw/compressed')
+
     def wait_for_images(self, count):
         fixture.wait_for(lambda: int(self.diagnostics.value('session', 'Images looked at')) >= count
                          if self.diagnostics.last_of('session') else False, DEADLINE_S, '%d images' % count)
@@ -57,7 +60,7 @@ class RecorderTest(unittest.TestCase):
     def test_a_killed_recording_is_whole(self):
         recorder = self.start()
         self.play(30)
-        time.sleep(1.5)  # longer than sync_period
+        fixture.wait_for(lambda: self.images_in(self.recorded()[0]) > 20, DEADLINE_S, 'images on the disk')
         recorder.send_signal(signal.SIGKILL)
         recorder.wait()
         with rosbag.Bag(str(self.recorded()[0])) as bag:
@@ -67,7 +70,7 @@ class RecorderTest(unittest.TestCase):
         self.assertGreater(topics['/stereo/left/camera_info'].message_count, 20)
 
     def test_a_map_is_written_while_it_records(self):
-        self.start()
+        recorder = self.start()
         early = self.write_map('')
         self.assertFalse(early.success)
         self.assertNotIn('\n', early.message)
@@ -75,6 +78,7 @@ class RecorderTest(unittest.TestCase):
         self.wait_for_images(50)
         self.assertEqual(self.diagnostics.last_of('recording').level, fixture.Diagnostics.OK)
         fixture.wait_for(lambda: self.way.last() and len(self.way.last().points) > 50, DEADLINE_S, 'the way')
+        self.assertIn('must end in .map', self.write_map(self.recorded()[0].name).message)
         for outside in ('/etc/campus.map', '../campus.map'):
             answer = self.write_map(outside)
             self.assertFalse(answer.success)
@@ -89,12 +93,13 @@ class RecorderTest(unittest.TestCase):
         self.play(10)
         fixture.wait_for(lambda: int(self.diagnostics.value('recording', 'Messages')) > before, DEADLINE_S,
                          'more messages')
+        recorder.send_signal(signal.SIGINT)
+        recorder.wait()
         self.extend(answer.map)
 
     def extend(self, map_file):
         """A second session is added to the map that the first one made."""
-        rospy.sleep(1.1)  # the next recording has another name
-        os.system('rosnode kill /map_recorder > /dev/null')
+        self.diagnostics.clear()
         self.start('_map:=' + map_file)
         self.play(100, self.bag.replace('cloudy', 'sunny'))
         self.wait_for_images(30)
@@ -108,7 +113,8 @@ class RecorderTest(unittest.TestCase):
         for arguments, expected in ((['_folder:='], "'folder'"), (['_folder:=/absent'], '/absent'),
                                     (['_folder:=/tmp', '_image_transport:=theora'], 'raw, compressed'),
                                     (['_folder:=/tmp', '_typo:=1'], "'typo'"),
-                                    (['_folder:=/tmp', '_map:=/absent.map'], '/absent.map')):
+                                    (['_folder:=/tmp', '_map:=/absent.map'], '/absent.map'),
+                                    (['_folder:=/tmp', '_builder_config:=/absent.yaml'], '/absent.yaml')):
             rospy.delete_param('/map_recorder') if rospy.has_param('/map_recorder') else None
             run = subprocess.run([RECORDER, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                  universal_newlines=True, timeout=DEADLINE_S)
