@@ -31,7 +31,9 @@ void RecorderConfig::declare(ParameterVisitor& visitor) {
                  {"raw", "compressed"});
   visitor.text({"builder_config", "", "YAML file of the map builder's parameters; empty: its defaults"},
                builder_config);
-  visitor.real({"sync_period", "s", "how often the recording is put on the disk; less often where its index is larger than what waits"}, sync_period_s, 0.5, 60.0);
+  visitor.real({"sync_period", "s",
+                "how often the recording is put on the disk; less often where its index is larger than what waits"},
+               sync_period_s, 0.5, 60.0);
   visitor.text({"global_frame_id", "", "frame of the way in rviz"}, global_frame_id);
   watch.declare(visitor);
   visitor.require(!folder.empty() && folder.front() == '/', "folder", "'" + folder + "'", "an absolute path");
