@@ -12,7 +12,6 @@
 
 #include "apps/app_support.h"
 #include "apps/build_report.h"
-#include "base/angles.h"
 #include "base/files.h"
 #include "base/text.h"
 #include "editing/map_selection.h"
@@ -81,21 +80,6 @@ void saveSessions(MapBuilder& builder, const MapBuilderOptions& options, const M
   printReport(options, builder.report(), config.geometry, sessions);
 }
 
-/// A summary of the places that the drive used; elsewhere it says nothing about which images are of use.
-std::vector<bool> summaryWhereUsed(const TrainingMap& map, const MapUsage& usage) {
-  constexpr std::size_t kNeighbours = 64;
-  std::vector<bool> keep = summary(map, usage, {});
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    if (keep[i]) continue;
-    const std::vector<Neighbour> neighbours = map.nearest(map.position_m(i), kNeighbours);
-    keep[i] = std::none_of(neighbours.begin(), neighbours.end(), [&](const Neighbour& neighbour) {
-      return neighbour.distance_m <= kPlace_m && faceAlike(map.yaw_rad(i), map.yaw_rad(neighbour.image)) &&
-             usage.find(map.pose(neighbour.image).stamp_ns) != nullptr;
-    });
-  }
-  return keep;
-}
-
 }  // namespace
 
 std::string provenance(const std::string& program, const std::string& command, const std::vector<std::string>& from) {
@@ -137,7 +121,9 @@ void addDrive(const NamedMap& map, const VerifiedDrive& drive, const MapBuilderO
   const PartialFile merged(output);
   mergeAndPrint(merged, {map, {options.bags.front(), openMap(added.path(), 2)}}, edit, options.threads);
   const auto grown = openMap(merged.path());
-  const std::vector<bool> keep = summaryWhereUsed(*grown, usage);
+  SummaryConfig where_driven;
+  where_driven.unused_places = false;
+  const std::vector<bool> keep = summary(*grown, usage, where_driven);
   std::cout << "left out where the drive was: " << std::count(keep.begin(), keep.end(), false) << " images\n";
   writeSelection(*grown, keep, "", output);
 }

@@ -117,6 +117,10 @@ std::vector<bool> summary(const TrainingMap& map, const MapUsage& usage, const S
   for (auto& [place, images] : places) {
     std::stable_sort(images.begin(), images.end(),
                      [&](std::size_t a, std::size_t b) { return posesOf(a) > posesOf(b); });
+    if (!config.unused_places && posesOf(images.front()) == 0) {
+      for (const std::size_t image : images) keep[image] = true;
+      continue;
+    }
     std::set<int> sessions;
     std::size_t kept = 0;
     for (const std::size_t image : images) {  // the best of each session

@@ -48,6 +48,7 @@ class MapUsage {
 struct SummaryConfig {
   std::size_t images_per_place = 4;      ///< those that were used most; but one of each session at least
   std::size_t landmarks_per_image = 40;  ///< at least, used or not
+  bool unused_places = true;             ///< false: a place of which no image was used keeps all
 };
 constexpr double kPlace_m = 5.0;
 

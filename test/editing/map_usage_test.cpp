@@ -92,6 +92,26 @@ TEST(MapSummary, KeepsWhatWasUsedMostButOneImageOfEachSession) {
             (std::vector<bool>{false, true, false, false, true, false, false, false, false, false}));
 }
 
+TEST(MapSummary, APlaceThatWasNotUsedKeepsAllIfAskedTo) {
+  auto images = test::exampleImages(12);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    images[i].position_m = {i < 6 ? 1.0 : 101.0, 1.0};
+    images[i].yaw_rad = 0.0;
+    images[i].session = 0;
+  }
+  const TrainingMap map(test::exampleHeader(), images);
+  MapUsage usage;
+  usage.add(map, matched(2, {1}));
+  SummaryConfig config;
+  config.images_per_place = 1;
+  std::vector<bool> used_alone(12, false);
+  used_alone[2] = used_alone[6] = true;
+  EXPECT_EQ(summary(map, usage, config), used_alone);
+  config.unused_places = false;
+  std::fill(used_alone.begin() + 6, used_alone.end(), true);
+  EXPECT_EQ(summary(map, usage, config), used_alone);
+}
+
 TEST(MapSummary, PlacesThatLookAnotherWayAreOthers) {
   auto images = test::exampleImages(8);
   for (std::size_t i = 0; i < images.size(); ++i) {
