@@ -56,8 +56,8 @@ int start(std::vector<std::string> command, int error_output, pid_t& process) {
 }
 
 /// What a program writes to its standard error until it ends. Throws std::runtime_error with the reason when it cannot
-/// be started or fails.
-std::string errorOutputOf(const std::vector<std::string>& command) {
+/// be started, to which `hint` adds what may be missing, or fails.
+std::string errorOutputOf(const std::vector<std::string>& command, const std::string& hint) {
   std::array<int, 2> pipe{};
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::strerror(errno));
   pid_t process = 0;
@@ -65,12 +65,26 @@ std::string errorOutputOf(const std::vector<std::string>& command) {
   ::close(pipe[1]);
   const std::string output = readAll(pipe[0]);
   ::close(pipe[0]);
-  if (error != 0) throw std::runtime_error(std::string("cannot be started: ") + std::strerror(error));
+  if (error != 0) throw std::runtime_error("cannot be started: " + hint + std::strerror(error));
   int status = 0;
   while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
   }
   if (status != 0) throw std::runtime_error("failed: " + (output.empty() ? "without a message" : lastLine(output)));
   return output;
+}
+
+/// A program that is installed beside this one. `hint`: see errorOutputOf.
+void runBeside(const std::string& name, const std::vector<std::string>& arguments, const std::string& hint) {
+  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / name;
+  std::vector<std::string> command{program.string()};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  std::fflush(stdout);
+  try {
+    if (!fs::exists(program)) throw std::runtime_error("is missing");
+    std::cerr << errorOutputOf(command, hint);  // warnings
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(program.string() + ": " + error.what());
+  }
 }
 
 }  // namespace
@@ -131,29 +145,14 @@ std::string humanSize(double bytes) {
 }
 
 void runProgramBeside(const std::string& name, const std::vector<std::string>& arguments) {
-  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / name;
-  std::vector<std::string> command{program.string()};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  std::fflush(stdout);
-  try {
-    if (!fs::exists(program)) throw std::runtime_error("is missing");
-    std::cerr << errorOutputOf(command);  // warnings
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(program.string() + ": " + error.what());
-  }
+  runBeside(name, arguments, "");
 }
 
 void runScript(const std::string& name, const std::vector<std::string>& arguments) {
   std::vector<std::string> words{"--"};
   words.insert(words.end(), arguments.begin(), arguments.end());
-  try {
-    runProgramBeside(name, words);
-  } catch (const std::runtime_error& error) {
-    const std::string text = error.what();
-    // The file exists: what is missing is the interpreter that its first line names.
-    throw std::runtime_error(text.find("cannot be started") == std::string::npos ? text
-                                                                                 : text + ": is Python 3 installed?");
-  }
+  // The file exists: what is missing is the interpreter that its first line names.
+  runBeside(name, words, "is Python 3 installed? ");
 }
 
 ProgressBar::ProgressBar(std::string label)
