@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <utility>
 
-#include <geometry_msgs/Point.h>
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
@@ -28,16 +27,13 @@
 namespace visual_localization {
 namespace {
 
-using diagnostic_msgs::DiagnosticStatus;
-
 const char* const kStaticTransforms = "/tf_static";
 constexpr std::uint64_t kMostWaiting_bytes = 16U << 20U;  ///< raw images of a fast camera do not wait for the period
 constexpr std::uint64_t kSmallIndex_bytes = 64U << 10U;
 constexpr std::uint32_t kSlowQueue = 100;  ///< while the disk is slow
 constexpr std::uint32_t kFastQueue = 1000;
 constexpr double kReportPeriod_s = 1.0;
-constexpr int kLongestSide_px = 640;       ///< larger images are looked at in this size: a weak one shows there too
-constexpr std::size_t kMostSpots = 20000;  ///< of a longer way every k-th is shown
+constexpr int kLongestSide_px = 640;  ///< larger images are looked at in this size: a weak one shows there too
 
 /// Of the computer's clock: the bag's name.
 std::string localTime() {
@@ -47,15 +43,6 @@ std::string localTime() {
   char text[32];
   const std::size_t size = std::strftime(text, sizeof(text), "%Y-%m-%d-%H-%M-%S", &parts);
   return {text, size};
-}
-
-std_msgs::ColorRGBA colourOf(Weakness weakness) {
-  std_msgs::ColorRGBA colour;
-  colour.a = 1.0F;
-  colour.r = weakness == Weakness::kNone ? 0.0F : weakness == Weakness::kNoFix ? 0.84F : 0.90F;
-  colour.g = weakness == Weakness::kNone ? 0.62F : weakness == Weakness::kNoFix ? 0.10F : 0.62F;
-  colour.b = weakness == Weakness::kNone ? 0.45F : 0.0F;
-  return colour;
 }
 
 /// A bag knows no time before the first clock message of a simulation.
@@ -100,8 +87,8 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
     recordImages<sensor_msgs::Image>(image_topic_);
   }
   record<sensor_msgs::CameraInfo>(cameraInfoTopic(image_topic_), kSlowQueue);
-  record<sensor_msgs::NavSatFix>("fix", kFastQueue, [this](const sensor_msgs::NavSatFix& fix) {
-    watch_->addFix(toFix(fix, stampOf(fix.header)));
+  record<sensor_msgs::NavSatFix>("fix", kFastQueue, [this](const sensor_msgs::NavSatFixConstPtr& fix) {
+    watch_->addFix(toFix(*fix, stampOf(fix->header)));
   });
   record<nav_msgs::Odometry>("odom", kFastQueue);
   record<tf2_msgs::TFMessage>(kStaticTransforms, kFastQueue);
@@ -134,34 +121,27 @@ MapRecorder::~MapRecorder() {
   ROS_INFO_STREAM("Recorded " << recorded_ << " messages in " << bag_->path());
 }
 
+/// `look` is called for each message, with the mutex held.
 template <class Message>
-void MapRecorder::record(const std::string& name, std::uint32_t queue, std::function<void(const Message&)> look) {
+void MapRecorder::record(const std::string& name, std::uint32_t queue, Look<Message> look) {
   const std::string topic = node_.resolveName(name);
   const boost::function<void(const boost::shared_ptr<const Message>&)> keep =
       [this, topic, look](const boost::shared_ptr<const Message>& message) {
         const std::lock_guard<std::mutex> lock(mutex_);
         write(topic, *message);
-        if (look) look(*message);
+        if (look) look(message);
       };
   subscribers_.push_back(
       node_.subscribe<Message>(topic, queue, keep, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
 template <class Message>
-void MapRecorder::recordImages(const std::string& name) {
-  const std::string topic = node_.resolveName(name);
-  const boost::function<void(const boost::shared_ptr<const Message>&)> keep =
-      [this, topic](const boost::shared_ptr<const Message>& message) {
-        {
-          const std::lock_guard<std::mutex> lock(mutex_);
-          write(topic, *message);
-          images_.add();
-          watch_->addImage(stampOf(message->header));
-        }
-        queue_.push({stampOf(message->header), [message] { return toGrey(*message); }});
-      };
-  subscribers_.push_back(
-      node_.subscribe<Message>(topic, kSlowQueue, keep, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+void MapRecorder::recordImages(const std::string& topic) {
+  record<Message>(topic, kSlowQueue, [this](const boost::shared_ptr<const Message>& message) {
+    images_.add();
+    watch_->addImage(stampOf(message->header));
+    queue_.push({message->header, [message] { return toGrey(*message); }});
+  });
 }
 
 /// The caller holds the mutex.
@@ -202,7 +182,7 @@ void MapRecorder::lookAtImages() {
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     image_trouble_ = trouble;
-    if (trouble.empty()) watch_->addLook(image->stamp_ns, features);
+    if (trouble.empty()) watch_->addLook(stampOf(image->header), features);
   }
 }
 
@@ -252,82 +232,6 @@ bool MapRecorder::onWriteMap(WriteMap::Request& request, WriteMap::Response& res
 void MapRecorder::onTimer(const ros::WallTimerEvent&) {
   publishWay();
   updater_.force_update();
-}
-
-/// A line along the images, coloured by what is weak there.
-void MapRecorder::publishWay() {
-  visualization_msgs::Marker line;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    const std::vector<RecordingWatch::Spot>& spots = watch_->spots();
-    if (spots.size() == published_ || spots.size() < 2) return;
-    published_ = spots.size();
-    const std::size_t step = 1 + spots.size() / kMostSpots;
-    for (std::size_t i = 0; i < spots.size(); i += step) {
-      geometry_msgs::Point point;
-      point.x = spots[i].position_m.x();
-      point.y = spots[i].position_m.y();
-      line.points.push_back(point);
-      line.colors.push_back(colourOf(spots[i].weakness));
-    }
-  }
-  line.header.frame_id = config_.global_frame_id;
-  line.header.stamp = ros::Time::now();
-  line.ns = "way";
-  line.type = visualization_msgs::Marker::LINE_STRIP;
-  line.action = visualization_msgs::Marker::ADD;
-  line.pose.orientation.w = 1.0;
-  line.scale.x = 0.4;
-  way_.publish(line);
-}
-
-void MapRecorder::reportRecording(Wrapper& status) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (!disk_trouble_.empty()) {
-    status.summary(DiagnosticStatus::ERROR, "Nothing is recorded: " + disk_trouble_);
-  } else if (images_.rate_hz() == 0.0) {
-    status.summary(DiagnosticStatus::ERROR, "No images on " + image_topic_);
-  } else if (!image_trouble_.empty()) {
-    status.summary(DiagnosticStatus::WARN, "Unusable image: " + image_trouble_);
-  } else if (lost_ > 0) {
-    status.summary(DiagnosticStatus::WARN,
-                   std::to_string(lost_) + " messages lost so far: more came than could be kept");
-  } else {
-    status.summary(DiagnosticStatus::OK, "Recording");
-  }
-  status.add("Bag", bag_->path());
-  status.addf("Size (MB)", "%.1f", static_cast<double>(bag_->size()) * 1e-6);
-  std::error_code none;
-  const auto space = std::filesystem::space(config_.folder, none);
-  if (!none) status.addf("Free (MB)", "%.0f", static_cast<double>(space.available) * 1e-6);
-  status.add("Messages", recorded_);
-  status.add("Messages lost", lost_);
-  status.addf("Images (Hz)", "%.2f", images_.rate_hz());
-}
-
-void MapRecorder::reportSession(Wrapper& status) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const RecordingWatch::Summary seen = watch_->summary();
-  constexpr double kMostlyKnown = 0.5;
-  if (seen.images == 0) {
-    status.summary(DiagnosticStatus::WARN, "No image yet");
-  } else if (seen.now != Weakness::kNone) {
-    status.summary(DiagnosticStatus::WARN, std::string("Weak here: ") + describe(seen.now));
-  } else if (seen.known_way_share > kMostlyKnown) {
-    status.summary(DiagnosticStatus::OK, "The map has this way at this time of day: another hour would add more");
-  } else {
-    status.summary(DiagnosticStatus::OK, "Good");
-  }
-  status.add("Images looked at", seen.images);
-  for (std::size_t i = 1; i < kWeaknesses; ++i) {
-    status.add(std::string("Weak: ") + describe(static_cast<Weakness>(i)), seen.weak[i]);
-  }
-  status.addf("Fixes, usable", "%zu, %zu", seen.fixes, seen.usable_fixes);
-  status.addf("Sigma of the fix (m)", "%.2f", seen.fix_sigma_m);
-  status.addf("Way (m)", "%.0f", seen.way_m);
-  status.addf("Spacing (m)", "%.2f", seen.spacing_m);
-  status.add("Features", seen.features);
-  if (!config_.map.empty()) status.addf("Way that the map has (%)", "%.0f", 100.0 * seen.known_way_share);
 }
 
 }  // namespace visual_localization

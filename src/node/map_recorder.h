@@ -16,6 +16,7 @@
 #include <ros/spinner.h>
 
 #include "bag/bag_writer.h"
+#include "node/image_source.h"
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
 #include "node/recording_watch.h"
@@ -52,15 +53,13 @@ class MapRecorder {
 
  private:
   using Wrapper = diagnostic_updater::DiagnosticStatusWrapper;
-  struct Waiting {
-    std::int64_t stamp_ns = 0;
-    std::function<cv::Mat()> decode;
-  };
+  template <class Message>
+  using Look = std::function<void(const boost::shared_ptr<const Message>& message)>;
 
   template <class Message>
-  void record(const std::string& name, std::uint32_t queue, std::function<void(const Message&)> look = {});
+  void record(const std::string& name, std::uint32_t queue, Look<Message> look = {});
   template <class Message>
-  void recordImages(const std::string& name);
+  void recordImages(const std::string& topic);
   void sync(bool at_once);
   void syncBag();
   template <class Message>
@@ -90,7 +89,7 @@ class MapRecorder {
   std::size_t published_ = 0;
   // What has its own lock, or does not change.
   std::unique_ptr<SiftExtractor> extractor_;
-  LatestQueue<Waiting> queue_;
+  LatestQueue<ReceivedImage> queue_;
   std::thread looker_;
   std::vector<ros::Subscriber> subscribers_;
   std::string image_topic_;

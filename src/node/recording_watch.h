@@ -59,7 +59,8 @@ class RecordingWatch {
  public:
   /// An image that was looked at, where the last usable fix was.
   struct Spot {
-    Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< in frame()
+    Eigen::Vector2d position_m =
+        Eigen::Vector2d::Zero();  ///< east, north in the map's frame, or about the first usable fix
     Weakness weakness = Weakness::kNone;
   };
   /// What is known so far.
@@ -70,7 +71,7 @@ class RecordingWatch {
     std::size_t fixes = 0;
     std::size_t usable_fixes = 0;
     double fix_sigma_m = 0.0;      ///< of the last usable one; 0: the receiver does not say
-    double way_m = 0.0;            ///< driven, to 3 m
+    double way_m = 0.0;            ///< driven, in steps of 3 m
     double spacing_m = 0.0;        ///< of the last images
     std::size_t features = 0;      ///< of the last image
     double known_way_share = 0.0;  ///< of the images: within 2 m of a session of the map that was recorded within 2 h
@@ -98,7 +99,7 @@ class RecordingWatch {
 
   WatchConfig config_;
   std::shared_ptr<const TrainingMap> map_;
-  std::optional<LocalFrame> frame_;  ///< that of the map, or else around the first usable fix
+  std::optional<LocalFrame> frame_;  ///< of the spots
   std::optional<Fix> last_fix_;      ///< usable
   Eigen::Vector2d position_m_ = Eigen::Vector2d::Zero();
   std::deque<Eigen::Vector2d> last_images_;
