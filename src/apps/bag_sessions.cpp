@@ -7,7 +7,7 @@
 
 #include "apps/app_support.h"
 #include "base/text.h"
-#include "map/session_names.h"
+#include "map/sessions.h"
 #include "ros/camera_info.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/parameters/parameters.h"

@@ -1,5 +1,3 @@
-#include "apps/build_report.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <iostream>
 
 #include "apps/app_support.h"
+#include "apps/bag_sessions.h"
 #include "base/text.h"
 #include "ros/camera_info.h"
 #include "visual_localization/features/front_end.h"

@@ -1,5 +1,3 @@
-#include "apps/colmap_model.h"
-
 #include <algorithm>
 #include <numeric>
 #include <sstream>
@@ -8,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "apps/map_export.h"
 #include "base/text.h"
 #include "base/time.h"
 

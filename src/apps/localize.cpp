@@ -17,7 +17,7 @@
 #include "evaluation/drive_order.h"
 #include "evaluation/metrics.h"
 #include "evaluation/round_recorder.h"
-#include "evaluation/track_csv.h"
+#include "evaluation/track_files.h"
 #include "localization/presets.h"
 #include "node/node_config.h"
 #include "ros/camera_info.h"

@@ -8,7 +8,6 @@
 
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
-#include "apps/build_report.h"
 #include "apps/map_plot.h"
 #include "base/files.h"
 #include "visual_localization/map/map_file.h"

@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/app_support.h"
-#include "apps/colmap_model.h"
 #include "base/text.h"
 #include "base/time.h"
 

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "apps/app_support.h"
-#include "apps/build_report.h"
+#include "apps/bag_sessions.h"
 #include "base/files.h"
 #include "base/text.h"
 #include "editing/map_selection.h"

@@ -8,7 +8,7 @@
 
 #include "apps/app_support.h"
 #include "base/files.h"
-#include "survey/landmark_points.h"
+#include "survey/landmark_survey.h"
 
 namespace visual_localization::apps {
 namespace {

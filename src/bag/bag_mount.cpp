@@ -4,7 +4,7 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include "bag/bag_messages.h"
-#include "ros/static_transforms.h"
+#include "ros/message_readers.h"
 
 namespace visual_localization {
 namespace {

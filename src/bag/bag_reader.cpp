@@ -14,8 +14,7 @@
 #include "base/text.h"
 #include "base/time.h"
 #include "ros/camera_info.h"
-#include "ros/fix_message.h"
-#include "ros/odometry_message.h"
+#include "ros/message_readers.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {

@@ -14,6 +14,20 @@
 
 namespace visual_localization {
 
+/// From the frame of one map to that of another. Both are flat, so that it is not the same everywhere.
+class FrameChange {
+ public:
+  FrameChange(const LocalFrame& from, const LocalFrame& to);
+
+  /// Of what is at this position, east and north in the first frame.
+  PoseCorrection at(const Eigen::Vector2d& position_m) const;
+
+ private:
+  LocalFrame from_;
+  LocalFrame to_;
+  bool same_;
+};
+
 /// A map whose images lie in the frame of the new map already.
 struct PlacedMap {
   std::shared_ptr<const TrainingMap> map;

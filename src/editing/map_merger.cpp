@@ -9,12 +9,10 @@
 #include <unordered_map>
 #include <utility>
 
-#include "editing/frame_change.h"
 #include "editing/map_alignment.h"
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
-#include "map/session_frame.h"
-#include "map/session_names.h"
+#include "map/sessions.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "base/text.h"
+#include "map/map_geometry.h"
 #include "map/map_writer.h"
-#include "map/spacing_filter.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -109,5 +110,66 @@ const std::vector<std::string>& placeRecogniserNames();
 /// std::invalid_argument for another name, naming those allowed, and for a configuration with violations.
 std::unique_ptr<PlaceRecogniser> makePlaceRecogniser(const std::string& name, const PlaceRecogniserConfig& config,
                                                      bool closed);
+
+/// Recognises short sequences instead of single images, in the manner of SeqSLAM (Milford and Wyeth, "SeqSLAM:
+/// Visual Route-Based Navigation for Sunny Summer Days and Stormy Winter Nights", ICRA 2012), but online: the answer is
+/// where the best straight line through the last images ends.
+///
+/// Ours besides: what leaves an open route, and an image that says nothing, counts as average difference; chance
+/// similarities among zeros are kept from looking like perfect contrast (min_contrast).
+/// The confidence is 1 - best / rival: mean differences of the best line and of the best one that ends elsewhere, both
+/// counted from the least that local contrast can be. It lies in [0, 1]; 0 when the map is too small for a rival.
+class SequenceMatcher final : public PlaceRecogniser {
+ public:
+  /// `config` must be without violations. `closed`: the first training image follows the last.
+  SequenceMatcher(const SequenceConfig& config, bool closed);
+
+  Recognition update(const std::vector<double>& similarities) override;
+
+ private:
+  void remember(const std::vector<double>& similarities);
+  void addLines(const std::vector<std::ptrdiff_t>& line, std::vector<double>& sums) const;
+  void scoreLines();
+  double confidence(std::size_t best) const;
+
+  SequenceConfig config_;
+  bool closed_;
+  std::vector<std::vector<std::ptrdiff_t>> lines_;  ///< per speed: training images back from the end, newest first
+  Route route_;                                     ///< empty until the first image tells how long it is
+  std::deque<std::vector<double>> columns_;         ///< locally normalised differences of the last images
+  std::vector<double> sums_;                        ///< along the lines of one speed ending at each training image
+  std::vector<double> scores_;                      ///< of the best line ending at each training image
+};
+
+/// A discrete Bayes filter whose states are the training images, in the manner of the topological filter of Xu,
+/// Suenderhauf and Milford ("Probabilistic Visual Place Recognition for Hierarchical Localization", RA-L 2021).
+///
+/// Moves between images are uniform in [min_step, max_step]; the likelihood is exp(-lambda d) with d = 1 - similarity.
+/// As there, the first image calibrates lambda = ln(delta) / (q_97.5 - q_2.5), quantiles of its differences d. Ours
+/// are the reset, so that kidnapping is survived; calibration by the first image that tells places apart, with the
+/// whole range of d where the quantiles coincide; and the answer: the most probable state of the window with the most
+/// posterior mass. The confidence is the mass of the window around that state. An image that is alike to all training
+/// images, as a dark one is, leaves the prediction as it is.
+class TopologicalBayesFilter final : public PlaceRecogniser {
+ public:
+  /// `config` must be without violations. `closed`: the first training image follows the last.
+  TopologicalBayesFilter(const TopologicalBayesConfig& config, bool closed);
+
+  Recognition update(const std::vector<double>& similarities) override;
+
+ private:
+  void predict();
+  void calibrate(const std::vector<double>& similarities);
+  void weigh(const std::vector<double>& similarities);
+  double massAround(std::size_t image) const;
+  Recognition mostProbablePlace() const;
+
+  TopologicalBayesConfig config_;
+  bool closed_;
+  Route route_;                    ///< empty until the first image tells how long it is
+  double lambda_ = 0.0;            ///< 0 until calibrated
+  std::vector<double> posterior_;  ///< sums to one; empty before the first image
+  std::vector<double> buffer_;     ///< scratch; kept to save the allocation
+};
 
 }  // namespace visual_localization

@@ -8,7 +8,7 @@
 #include "base/statistics.h"
 #include "base/text.h"
 #include "evaluation/result_folder.h"
-#include "evaluation/trajectory_files.h"
+#include "evaluation/track_files.h"
 
 namespace visual_localization {
 namespace {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "evaluation/metrics.h"
-#include "evaluation/pose_figures.h"
 #include "evaluation/run.h"
 
 namespace visual_localization {

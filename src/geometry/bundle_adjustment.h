@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "visual_localization/geometry/camera_pose.h"
+#include "visual_localization/geometry/image_geometry.h"
 
 namespace visual_localization {
 
@@ -86,5 +87,11 @@ double adjust(BundleProblem& problem, const BundleConfig& config);
 
 /// Distance of where a landmark is seen from where it projects to, normalised coordinates; infinite behind the camera.
 double reprojectionError(const CameraPose& camera, const Eigen::Vector3d& landmark_m, const Eigen::Vector2d& seen);
+
+/// Of a landmark's position (m2, map frame) among cameras that stand still.
+Eigen::Matrix3d covarianceOf(const Landmark& landmark, const std::vector<CameraPose>& cameras);
+/// Appends the landmark to an image that shows it; not one whose covariance is none.
+void addSighting(const Landmark& landmark, const Eigen::Matrix3d& covariance, std::uint32_t feature, std::uint32_t id,
+                 ImageGeometry& image);
 
 }  // namespace visual_localization

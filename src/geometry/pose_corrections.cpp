@@ -13,7 +13,7 @@
 
 #include "base/statistics.h"
 #include "geometry/quiet_ceres.h"
-#include "geometry/rotation_vector.h"
+#include "geometry/vectors.h"
 
 namespace visual_localization {
 namespace {

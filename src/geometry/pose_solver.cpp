@@ -11,7 +11,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "base/statistics.h"
-#include "geometry/rotation_vector.h"
+#include "geometry/vectors.h"
 
 namespace visual_localization {
 namespace {

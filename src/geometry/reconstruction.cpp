@@ -5,11 +5,9 @@
 #include <utility>
 
 #include "base/statistics.h"
-#include "geometry/fix_positions.h"
-#include "geometry/path_heights.h"
-#include "geometry/rotation_vector.h"
-#include "geometry/triangulation.h"
-#include "geometry/vector_median.h"
+#include "geometry/path_evidence.h"
+#include "geometry/rays.h"
+#include "geometry/vectors.h"
 
 namespace visual_localization {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
-#include "geometry/keypoint_rays.h"
+#include "geometry/rays.h"
 #include "geometry/rotation_averaging.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geometry/geometry_config.h"

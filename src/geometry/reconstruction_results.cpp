@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "base/statistics.h"
-#include "geometry/landmark_covariance.h"
+#include "geometry/bundle_adjustment.h"
 #include "geometry/reconstruction.h"
 
 namespace visual_localization {

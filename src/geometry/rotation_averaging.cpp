@@ -7,8 +7,8 @@
 #include <ceres/solver.h>
 
 #include "base/angles.h"
-#include "geometry/mounting_residual.h"
-#include "geometry/rotation_vector.h"
+#include "geometry/bundle_residuals.h"
+#include "geometry/vectors.h"
 #include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {

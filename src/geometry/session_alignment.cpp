@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "base/statistics.h"
-#include "geometry/vector_median.h"
+#include "geometry/vectors.h"
 
 namespace visual_localization {
 namespace {

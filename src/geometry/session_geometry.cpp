@@ -8,12 +8,11 @@
 
 #include "base/parallel.h"
 #include "geometry/feature_tracks.h"
-#include "geometry/keypoint_rays.h"
+#include "geometry/image_pairs.h"
+#include "geometry/rays.h"
 #include "geometry/reconstruction.h"
-#include "geometry/revisits.h"
 #include "geometry/rotation_averaging.h"
 #include "geometry/session_alignment.h"
-#include "geometry/two_view.h"
 
 namespace visual_localization {
 namespace {

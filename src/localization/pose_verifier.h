@@ -1,13 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "geometry/keypoint_rays.h"
 #include "geometry/pose_solver.h"
-#include "localization/focal_check.h"
+#include "geometry/rays.h"
 #include "localization/session_choice.h"
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geometry/sensor_mount.h"
@@ -17,6 +17,37 @@
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
+
+/// Whether the calibration of a live camera is right: each image whose pose is solved from landmarks also says which
+/// focal length it would rather have. A wrong one bends poses by decimetres before it prevents them.
+class FocalCheck {
+ public:
+  /// `max_error`: of the focal length, as a share of the calibration's.
+  explicit FocalCheck(double max_error) : max_error_(max_error) {}
+
+  void configure(double max_error) { max_error_ = max_error; }
+  void reset() { images_.clear(); }
+  /// What an image says: the focal length as a share of the calibration's, and its standard deviation.
+  void add(double scale, double sigma);
+
+  /// The last images agree with the calibration, and are sure of it.
+  bool confirms() const;
+  /// They do not agree with it.
+  bool contradicts() const;
+  /// Mean of the last images, weighted; 1 without any.
+  double scale() const;
+
+ private:
+  struct Image {
+    double scale;
+    double weight;
+  };
+
+  double sigma() const;
+
+  double max_error_;
+  std::vector<Image> images_;  ///< the last ones
+};
 
 /// Solves the camera's pose from the landmarks of training images: of those near the pose that the motion so far
 /// predicts, or else of those that look most alike. The solved pose is judged, not the image that it came from.

@@ -7,7 +7,7 @@
 
 #include "base/angles.h"
 #include "base/time.h"
-#include "map/session_index.h"
+#include "map/sessions.h"
 
 namespace visual_localization {
 namespace {

@@ -2,15 +2,73 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "base/files.h"
+#include "map/map_writer.h"
+#include "map/sessions.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
+
+/// Where images wait until all are known, because only then their neighbours are: in memory, or in a temporary file.
+class ImageSpool {
+ public:
+  /// `beside`: the temporary file is made beside this one; empty: in memory. Throws FileError or MapStoreError.
+  explicit ImageSpool(const std::string& beside) {
+    if (beside.empty()) return;
+    file_ = std::make_unique<PartialFile>(beside);
+    writer_ = std::make_unique<MapWriter>(*file_);
+  }
+
+  /// Throws MapStoreError, for instance when the disk is full.
+  void append(const TrainingImage& image) {
+    if (writer_) {
+      writer_->append(image);
+    } else {
+      in_memory_.push_back(image);
+    }
+  }
+
+  /// All images, in their order, for as long as the spool lives. Ends it. There must be one; throws MapStoreError.
+  std::shared_ptr<const TrainingMap> finish(const MapHeader& header) {
+    if (!writer_) return std::make_shared<const TrainingMap>(header, std::move(in_memory_));
+    writer_->finish(header);
+    writer_.reset();
+    return loadMap(file_->path(), strictLoading(kSpoolCache_bytes));
+  }
+
+ private:
+  /// Neighbours are mostly images that were recorded shortly before and after.
+  static constexpr std::size_t kSpoolCache_bytes = std::size_t{64} << 20U;
+
+  std::vector<TrainingImage> in_memory_;
+  std::unique_ptr<PartialFile> file_;
+  std::unique_ptr<MapWriter> writer_;
+};
+
+/// Which images of an unpruned map decide what is noise in an image: the nearest ones (Weiss et al., section III) of
+/// those that should show the same. That leaves out other sessions, whose light, and images that face another way,
+/// whose view is another one: they would drop nearly all features. So a session is pruned as if it were alone.
+class PruningNeighbours {
+ public:
+  /// `map` must outlive it.
+  explicit PruningNeighbours(const TrainingMap& map);
+
+  /// At most two, closest first; none when no other image shows the same.
+  std::vector<std::size_t> of(std::size_t image) const;
+
+ private:
+  const TrainingMap& map_;
+  SessionIndex sessions_;
+};
 
 /// An image that has its pose, but no features yet.
 struct RawImage {

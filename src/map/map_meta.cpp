@@ -1,5 +1,3 @@
-#include "map/map_meta.h"
-
 #include <optional>
 #include <stdexcept>
 #include <string>

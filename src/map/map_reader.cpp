@@ -8,7 +8,6 @@
 
 #include "base/text.h"
 #include "map/feature_store.h"
-#include "map/map_meta.h"
 #include "map/map_rows.h"
 #include "map/map_schema.h"
 #include "map/packed_geometry.h"

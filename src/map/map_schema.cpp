@@ -11,7 +11,6 @@
 
 #include <zlib.h>
 
-#include "map/little_endian.h"
 #include "map/packed_geometry.h"
 
 namespace visual_localization::map_schema {

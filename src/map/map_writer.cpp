@@ -8,7 +8,6 @@
 
 #include "base/files.h"
 #include "features/image_size.h"
-#include "map/map_meta.h"
 #include "map/map_schema.h"
 #include "map/packed_geometry.h"
 #include "map/sqlite.h"

@@ -6,8 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "map/geometry_check.h"
-#include "map/little_endian.h"
+#include "map/map_geometry.h"
 
 namespace visual_localization::map_schema {
 namespace {

@@ -2,12 +2,52 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "map/sqlite.h"
 #include "visual_localization/geometry/image_geometry.h"
 
+/// Geometry as bytes, in one order on every machine.
 namespace visual_localization::map_schema {
+
+template <class Unsigned>
+void putLittleEndian(Unsigned value, std::uint8_t* to) {
+  for (std::size_t i = 0; i < sizeof(value); ++i) to[i] = static_cast<std::uint8_t>(value >> (8 * i));
+}
+
+template <class Unsigned>
+Unsigned getLittleEndian(const std::uint8_t* from) {
+  Unsigned value = 0;
+  for (std::size_t i = 0; i < sizeof(value); ++i) value = static_cast<Unsigned>(value | Unsigned{from[i]} << (8 * i));
+  return value;
+}
+
+inline void putFloat(float value, std::uint8_t* to) {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(bits));
+  putLittleEndian(bits, to);
+}
+
+inline float getFloat(const std::uint8_t* from) {
+  const auto bits = getLittleEndian<std::uint32_t>(from);
+  float value = 0.0F;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
+
+inline void putDouble(double value, std::uint8_t* to) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(bits));
+  putLittleEndian(bits, to);
+}
+
+inline double getDouble(const std::uint8_t* from) {
+  const auto bits = getLittleEndian<std::uint64_t>(from);
+  double value = 0.0;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
 
 /// Position (3 doubles), rotation (w, x, y, z; 4 doubles), upper triangle of the covariance row by row (21 floats).
 constexpr std::size_t kPoseBytes = 3 * 8 + 4 * 8 + 21 * 4;

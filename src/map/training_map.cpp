@@ -8,7 +8,7 @@
 
 #include "base/angles.h"
 #include "map/feature_store.h"
-#include "map/geometry_check.h"
+#include "map/map_geometry.h"
 #include "map/position_index.h"
 
 namespace visual_localization {

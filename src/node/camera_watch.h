@@ -12,7 +12,7 @@
 #include "node/localizer_diagnostics.h"
 #include "node/node_config.h"
 #include "node/shared_localizer.h"
-#include "ros/static_transforms.h"
+#include "ros/message_readers.h"
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geometry/sensor_mount.h"
 #include "visual_localization/map/training_map.h"

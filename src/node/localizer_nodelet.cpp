@@ -10,8 +10,8 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include "base/text.h"
-#include "node/parameter_server.h"
-#include "ros/odometry_message.h"
+#include "node/node_config.h"
+#include "ros/message_readers.h"
 #include "visual_localization/geo/local_frame.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"

@@ -20,7 +20,6 @@
 #include <visual_localization/ToLL.h>
 
 #include "node/camera_watch.h"
-#include "node/image_source.h"
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
 #include "node/localizer_publisher.h"

@@ -16,7 +16,6 @@
 #include <ros/spinner.h>
 
 #include "bag/bag_writer.h"
-#include "node/image_source.h"
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
 #include "node/recording_watch.h"

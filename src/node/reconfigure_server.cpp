@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/text.h"
-#include "node/parameter_server.h"
+#include "node/node_config.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {

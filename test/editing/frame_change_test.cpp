@@ -1,10 +1,9 @@
-#include "editing/frame_change.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "editing/map_alignment.h"
 
 namespace visual_localization {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "evaluation/metrics.h"
-#include "evaluation/track_csv.h"
+#include "evaluation/track_files.h"
 
 namespace visual_localization {
 namespace {

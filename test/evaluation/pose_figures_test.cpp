@@ -1,9 +1,8 @@
-#include "evaluation/pose_figures.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "evaluation/metrics.h"
 #include "evaluation/unit_result.h"
 
 namespace visual_localization {

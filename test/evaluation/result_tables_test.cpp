@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "evaluation/result_folder.h"
-#include "evaluation/trajectory_files.h"
+#include "evaluation/track_files.h"
 #include "test/evaluation/small_experiment.h"
 
 namespace visual_localization {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "evaluation/sequence_matcher.h"
+#include "evaluation/place_recogniser.h"
 #include "test/evaluation/place_rows.h"
 
 namespace visual_localization {

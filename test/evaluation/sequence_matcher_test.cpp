@@ -1,5 +1,3 @@
-#include "evaluation/sequence_matcher.h"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>

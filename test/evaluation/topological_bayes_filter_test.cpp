@@ -1,10 +1,9 @@
-#include "evaluation/topological_bayes_filter.h"
-
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
+#include "evaluation/place_recogniser.h"
 #include "test/evaluation/place_rows.h"
 
 namespace visual_localization {

@@ -1,10 +1,10 @@
-#include "evaluation/velocity_filter.h"
-
 #include <cmath>
 #include <random>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
+
+#include "evaluation/pose_judge.h"
 
 namespace visual_localization {
 namespace {

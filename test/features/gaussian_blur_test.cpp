@@ -1,9 +1,9 @@
-#include "features/sift/gaussian_blur.h"
-
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
+
+#include "features/sift/scale_space.h"
 
 namespace visual_localization {
 namespace {

@@ -1,6 +1,6 @@
-#include "geometry/fix_positions.h"
-
 #include <gtest/gtest.h>
+
+#include "geometry/path_evidence.h"
 
 namespace visual_localization {
 namespace {

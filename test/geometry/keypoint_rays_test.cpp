@@ -1,9 +1,8 @@
-#include "geometry/keypoint_rays.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "geometry/rays.h"
 #include "test/support/landmark_world.h"
 
 namespace visual_localization {

@@ -1,5 +1,3 @@
-#include "geometry/path_heights.h"
-
 #include <cmath>
 #include <limits>
 #include <random>
@@ -7,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "geometry/path_evidence.h"
 
 namespace visual_localization {
 namespace {

@@ -1,10 +1,9 @@
-#include "geometry/revisits.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "geometry/image_pairs.h"
 
 namespace visual_localization {
 namespace {

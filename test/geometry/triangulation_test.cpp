@@ -1,8 +1,8 @@
-#include "geometry/triangulation.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "geometry/rays.h"
 
 namespace visual_localization {
 namespace {

@@ -1,11 +1,10 @@
-#include "geometry/two_view.h"
-
 #include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "geometry/image_pairs.h"
 #include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {

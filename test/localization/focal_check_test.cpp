@@ -1,8 +1,8 @@
-#include "localization/focal_check.h"
-
 #include <limits>
 
 #include <gtest/gtest.h>
+
+#include "localization/pose_verifier.h"
 
 namespace visual_localization {
 namespace {

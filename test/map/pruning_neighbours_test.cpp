@@ -1,9 +1,8 @@
-#include "map/pruning_neighbours.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "map/extraction_pool.h"
 
 namespace visual_localization {
 namespace {

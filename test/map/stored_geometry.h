@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "map/little_endian.h"
 #include "map/map_schema.h"
 #include "map/packed_geometry.h"
 #include "test/support/example_map.h"

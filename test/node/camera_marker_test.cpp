@@ -1,9 +1,8 @@
-#include "node/camera_marker.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "node/rviz_messages.h"
 #include "test/node/map_header.h"
 #include "test/support/example_map.h"
 

@@ -1,7 +1,6 @@
-#include "node/driven_path.h"
-
 #include <gtest/gtest.h>
 
+#include "node/rviz_messages.h"
 #include "test/node/map_header.h"
 
 namespace visual_localization {

@@ -1,5 +1,3 @@
-#include "node/map_messages.h"
-
 #include <cmath>
 #include <cstdint>
 #include <utility>
@@ -7,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "node/rviz_messages.h"
 #include "test/node/small_map.h"
 
 namespace visual_localization {

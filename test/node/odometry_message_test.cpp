@@ -1,5 +1,3 @@
-#include "ros/odometry_message.h"
-
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -8,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "ros/message_readers.h"
 
 namespace visual_localization {
 namespace {

@@ -1,9 +1,9 @@
-#include "node/parameter_server.h"
-
 #include <cstdint>
 #include <string>
 
 #include <gtest/gtest.h>
+
+#include "node/node_config.h"
 
 namespace visual_localization {
 namespace {

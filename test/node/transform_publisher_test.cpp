@@ -1,8 +1,8 @@
-#include "node/transform_publisher.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "node/localizer_publisher.h"
 
 namespace visual_localization {
 namespace {

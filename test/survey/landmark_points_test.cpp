@@ -1,10 +1,9 @@
-#include "survey/landmark_points.h"
-
 #include <cstdint>
 #include <utility>
 
 #include <gtest/gtest.h>
 
+#include "survey/landmark_survey.h"
 #include "test/support/example_map.h"
 
 namespace visual_localization {

@@ -1,5 +1,3 @@
-#include "survey/sight_grid.h"
-
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -8,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "survey/map_survey.h"
 
 namespace visual_localization {
 namespace {

@@ -5,7 +5,6 @@
 
 #include "features/sift/descriptor.h"
 #include "features/sift/extrema.h"
-#include "features/sift/orientation.h"
 #include "features/sift/scale_space.h"
 #include "visual_localization/features/sift_extractor.h"
 

@@ -1,13 +1,12 @@
 // Compiled once for each kind of CPU, see highway.h.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "features/sift/orientation.cpp"
-#include "features/sift/orientation.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 #include "features/highway.h"
+#include "features/sift/descriptor.h"
 #include "features/sift/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
