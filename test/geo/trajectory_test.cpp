@@ -56,6 +56,32 @@ TEST(LocalFrame, RefusesADatumThatIsNoPlace) {
   }
 }
 
+TEST(LocalFrame, TheBordersOfTheEarthArePlaces) {
+  for (const GeodeticPoint& border : {GeodeticPoint{90.0, 180.0, 0.0}, GeodeticPoint{-90.0, -180.0, 0.0}}) {
+    EXPECT_TRUE(isValid(border));
+  }
+  for (const GeodeticPoint& beyond :
+       {GeodeticPoint{90.001, 0.0, 0.0}, GeodeticPoint{-90.001, 0.0, 0.0}, GeodeticPoint{0.0, 180.001, 0.0},
+        GeodeticPoint{0.0, -180.001, 0.0}, GeodeticPoint{kNan, 0.0, 0.0}, GeodeticPoint{0.0, kNan, 0.0}}) {
+    EXPECT_FALSE(isValid(beyond));
+  }
+}
+
+TEST(Fix, HasAPositionUnlessItIsTheOriginOfAReceiverThatKnowsNone) {
+  Fix fix;
+  fix.has_fix = true;
+  EXPECT_FALSE(hasPosition(fix));
+  fix.position = {0.0, 0.5, 0.0};
+  EXPECT_TRUE(hasPosition(fix)) << "on the equator";
+  fix.position = {0.5, 0.0, 0.0};
+  EXPECT_TRUE(hasPosition(fix)) << "in Greenwich's longitude";
+  fix.position = {95.0, 0.5, 0.0};
+  EXPECT_FALSE(hasPosition(fix));
+  fix.position = {0.5, 0.5, 0.0};
+  fix.has_fix = false;
+  EXPECT_FALSE(hasPosition(fix));
+}
+
 TEST(Trajectory, InterpolatesPositionAndHeading) {
   const Trajectory trajectory({point(0, 0.0, 0.0, 0.0), point(2 * kSecond, 4.0, 2.0, 1.0)});
   const auto middle = trajectory.at(kSecond / 2);

@@ -7,27 +7,14 @@
 
 #include "localization/pose_verifier.h"
 #include "test/localization/street_map.h"
-#include "test/support/fake_image.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
 namespace {
 
+using test::GivenImage;
+
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-
-/// Shows whatever features it is given.
-class GivenImage final : public test::FakeImage {
- public:
-  explicit GivenImage(const TrainingMap& map) : map_(map) {}
-  Score compare(FeatureKind, std::size_t i) override { return SiftSimilarity({}, {}).compare(features, *map_.sift(i)); }
-  std::size_t siftFeatures() override { return features.size(); }
-  const SiftFeatures* unprunedSift() override { return &features; }
-
-  SiftFeatures features;
-
- private:
-  const TrainingMap& map_;
-};
 
 /// A robot on the street, one image a second and a metre, whose odometry begins somewhere else.
 class DriveWithOdometry : public testing::Test {

@@ -1,6 +1,7 @@
 #include "localization/pose_verifier.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <random>
@@ -8,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/angles.h"
 #include "test/localization/street_map.h"
 #include "test/support/fake_image.h"
 #include "visual_localization/features/sift_matcher.h"
@@ -146,6 +148,144 @@ TEST_F(PoseVerifierTest, PredictsWithAGrowingCovariance) {
   EXPECT_GT(soon->covariance_m2(0, 0), pose->covariance(0, 0) + pose->map_covariance(0, 0));
   EXPECT_GT(later->covariance_m2(0, 0), soon->covariance_m2(0, 0));
   EXPECT_GT(later->yaw_variance_rad2, soon->yaw_variance_rad2);
+}
+
+/// The covariance of position and heading that a pose has of itself and of the map.
+MetricPose::Covariance allOf(const MetricPose& pose) { return pose.covariance + pose.map_covariance; }
+
+TEST_F(PoseVerifierTest, TheVelocityLeadsStraightOnAndIsTheLessSureTheFarther) {
+  const auto first = verifyNear(0.0, 10);
+  const auto second = verifyNear(0.5, 11);
+  ASSERT_TRUE(first && second);
+  verify(2.0, SiftFeatures(), {});
+  const auto prediction = verifier_.predicted();
+  ASSERT_TRUE(prediction);
+  const Eigen::Vector2d step_m = (second->base.translation() - first->base.translation()).head<2>();
+  const Eigen::Vector2d way_m = 3.0 * step_m;  // in three times the time
+  EXPECT_LT((prediction->position_m - second->base.translation().head<2>() - way_m).norm(), 1e-9);
+  EXPECT_NEAR(prediction->yaw_rad, yawOf(second->base), 1e-12);
+  EXPECT_NEAR(prediction->sigma_m, 0.5 * way_m.norm(), 1e-9);
+  EXPECT_FALSE(prediction->by_odometry);
+  const MetricPose::Covariance start = allOf(*second);
+  const Eigen::Matrix2d expected_m2 =
+      start.topLeftCorner<2, 2>() + std::pow(prediction->sigma_m, 2) * Eigen::Matrix2d::Identity();
+  EXPECT_LT((prediction->covariance_m2 - expected_m2).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_NEAR(prediction->yaw_variance_rad2, start(5, 5) + std::pow(0.1 * way_m.norm(), 2), 1e-9);
+}
+
+TEST_F(PoseVerifierTest, OdometryLeadsWhereItWentAndAWrongHeadingLeadsAside) {
+  OdometryConfig config;
+  config.distance_sigma = 0.1;
+  config.turn_sigma_rad_m = 0.05;
+  OdometryTrack track(config);
+  verifier_.useOdometry(track, config);
+  const auto pose = verifyNear(0.0, 10);
+  ASSERT_TRUE(pose);
+  // 4 m ahead in a straight line, then 3 m to the left: 7 m of way, turned to the left.
+  for (int i = 0; i <= 20; ++i) {
+    const double ahead_m = 4.0 * std::min(1.0, i / 10.0);
+    const double left_m = 3.0 * std::max(0.0, i / 10.0 - 1.0);
+    track.add({i * kSecond_ns / 10, {ahead_m, left_m}, i > 10 ? 0.5 : 0.0});
+  }
+  verify(2.0, SiftFeatures(), {});
+  const auto prediction = verifier_.predicted();
+  ASSERT_TRUE(prediction);
+  EXPECT_TRUE(prediction->by_odometry);
+  const Eigen::Vector2d way_m = Eigen::Rotation2Dd(yawOf(pose->base)) * Eigen::Vector2d(4.0, 3.0);
+  EXPECT_LT((prediction->position_m - pose->base.translation().head<2>() - way_m).norm(), 1e-6);
+  EXPECT_NEAR(std::remainder(prediction->yaw_rad - yawOf(pose->base) - 0.5, 2.0 * kPi), 0.0, 1e-9);
+  EXPECT_NEAR(prediction->sigma_m, 0.1 * 7.0, 1e-6);
+  const double turn_rad = 0.05 * 7.0;
+  const MetricPose::Covariance start = allOf(*pose);
+  EXPECT_NEAR(prediction->yaw_variance_rad2, start(5, 5) + turn_rad * turn_rad, 1e-6);
+  const Eigen::Vector2d aside_m(-way_m.y(), way_m.x());
+  const Eigen::Matrix2d expected_m2 = start.topLeftCorner<2, 2>() + 0.49 * Eigen::Matrix2d::Identity() +
+                                      (start(5, 5) + 0.25 * turn_rad * turn_rad) * aside_m * aside_m.transpose();
+  EXPECT_LT((prediction->covariance_m2 - expected_m2).cwiseAbs().maxCoeff(), 1e-5);
+}
+
+// A robot that stands, whose wheels slip once.
+TEST_F(PoseVerifierTest, OdometryIsBelievedAgainAfterTenPosesThatItAgreesWith) {
+  const OdometryConfig config;
+  OdometryTrack track(config);
+  verifier_.useOdometry(track, config);
+  double x_m = 0.0;
+  track.add({0, {x_m, 0.0}, 0.0});
+  ASSERT_TRUE(verifyNear(0.0, 10));
+  /// Whether odometry leads to the image of this second, whose pose is solved then.
+  const auto leads = [&](std::int64_t second, double slip_m) {
+    for (int k = 1; k <= 5; ++k) {
+      track.add({(second - 1) * kSecond_ns + k * kSecond_ns / 5, {x_m += 0.2 * slip_m, 0.0}, 0.0});
+    }
+    const SiftFeatures nothing;
+    verifier_.startImage(second * kSecond_ns, nothing, street_.camera());
+    const auto prediction = verifier_.predicted();
+    EXPECT_TRUE(verifyNear(static_cast<double>(second), 10)) << second;
+    return prediction && prediction->by_odometry;
+  };
+  for (int second = 1; second <= 3; ++second) EXPECT_TRUE(leads(second, 0.0)) << second;
+  EXPECT_TRUE(leads(4, 4.0)) << "nobody knows yet that this is wrong";
+  for (int second = 5; second <= 14; ++second) EXPECT_FALSE(leads(second, 0.0)) << second;
+  EXPECT_TRUE(leads(15, 0.0));
+}
+
+TEST_F(PoseVerifierTest, TheCovarianceIsScaledAndThatOfTheRobotNotOfTheCamera) {
+  MetricConfig config;
+  config.sigma_factor = 1.0;
+  verifier_.configure(config);
+  const SiftFeatures features = street_.seenFrom(street_.trueNear(14, kBeside_m));
+  const auto plain = verify(0.0, features, {14});
+  config.sigma_factor = 3.0;
+  verifier_.configure(config);
+  verifier_.reset();
+  const auto scaled = verify(100.0, features, {14});
+  ASSERT_TRUE(plain && scaled);
+  EXPECT_LT((scaled->covariance - 9.0 * plain->covariance).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_EQ(scaled->map_covariance, plain->map_covariance);
+
+  SensorMount mount;
+  mount.camera.position_m = {2.0, 0.0, 0.0};  // two metres ahead of the robot's origin
+  verifier_.reset();
+  features_ = features;
+  verifier_.startImage(200 * kSecond_ns, features_, street_.camera(), mount);
+  const auto robot = verifier_.nearOneOf({14});
+  ASSERT_TRUE(robot);
+  EXPECT_LT((robot->camera.position_m - plain->camera.position_m).norm(), 1e-9);
+  EXPECT_NEAR((robot->base.translation() - robot->camera.position_m).norm(), 2.0, 1e-9);
+  const Eigen::Vector3d lever_m = robot->base.translation() - robot->camera.position_m;
+  // A turn of the camera by w moves the robot by w x lever.
+  Eigen::Matrix3d lever;
+  lever << 0.0, lever_m.z(), -lever_m.y(), -lever_m.z(), 0.0, lever_m.x(), lever_m.y(), -lever_m.x(), 0.0;
+  MetricPose::Covariance by_camera = MetricPose::Covariance::Identity();
+  by_camera.topRightCorner<3, 3>() = lever;
+  const MetricPose::Covariance expected = 9.0 * by_camera * (plain->covariance) * by_camera.transpose();
+  EXPECT_LT((robot->covariance - expected).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_GT(robot->map_covariance(0, 0) + robot->map_covariance(1, 1),
+            plain->map_covariance(0, 0) + plain->map_covariance(1, 1));
+}
+
+TEST_F(PoseVerifierTest, AsManyInliersAsAreAskedForAreEnough) {
+  const auto all = verifyNear(0.0, 14);
+  ASSERT_TRUE(all);
+  MetricConfig config;
+  for (const int asked : {static_cast<int>(all->inliers), static_cast<int>(all->inliers) + 1}) {
+    config.min_inliers = asked;
+    config.min_inliers_predicted = asked;
+    verifier_.configure(config);
+    verifier_.reset();
+    const auto again = verify(100.0, SiftFeatures(features_), {13, 14, 15});
+    EXPECT_EQ(again.has_value(), asked == static_cast<int>(all->inliers)) << asked;
+  }
+}
+
+TEST_F(PoseVerifierTest, TriesTwoPlacesThatAreApart) {
+  const SiftFeatures features = street_.seenFrom(street_.trueNear(40, kBeside_m));
+  features_ = features;
+  verifier_.startImage(0, features_, street_.camera());
+  EXPECT_TRUE(verifier_.nearOneOf({3, 4, 5, 40})) << "3, 4 and 5 are one place";
+  verifier_.reset();
+  verifier_.startImage(100 * kSecond_ns, features_, street_.camera());
+  EXPECT_FALSE(verifier_.nearOneOf({3, 12, 40})) << "the third is not tried";
 }
 
 TEST_F(PoseVerifierTest, FindsNothingWhereNothingMatches) {

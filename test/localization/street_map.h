@@ -5,7 +5,9 @@
 #include <random>
 #include <vector>
 
+#include "test/support/fake_image.h"
 #include "test/support/landmark_world.h"
+#include "visual_localization/localization/scores.h"
 
 namespace visual_localization::test {
 
@@ -49,6 +51,20 @@ class StreetMap {
   std::vector<DrivenPose> poses_ = drive({});
   std::vector<WorldPoint> world_ = pointsAlong(poses_, 6.0, random_);
   std::shared_ptr<const TrainingMap> map_ = mapOf(record(poses_, world_, 0.1, random_));
+};
+
+/// Shows whatever features it is given.
+class GivenImage final : public FakeImage {
+ public:
+  explicit GivenImage(const TrainingMap& map) : map_(map) {}
+  Score compare(FeatureKind, std::size_t i) override { return SiftSimilarity({}, {}).compare(features, *map_.sift(i)); }
+  std::size_t siftFeatures() override { return features.size(); }
+  const SiftFeatures* unprunedSift() override { return &features; }
+
+  SiftFeatures features;
+
+ private:
+  const TrainingMap& map_;
 };
 
 }  // namespace visual_localization::test

@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
-"""A robot that is carried elsewhere and told so by ~relocalize finds its new position."""
+"""A robot that is carried elsewhere finds its new position, told so by ~relocalize or not."""
 import sys
 import unittest
 
+import cv2
+import numpy as np
 import rospy
 import rostest
+from sensor_msgs.msg import CompressedImage
 from std_srvs.srv import Empty
 
 import localizer_fixture as fixture
@@ -42,6 +45,12 @@ class KidnapTest(unittest.TestCase):
         finally:
             player.stop()
 
+    def show_black(self):
+        """The status of an image that moves no particle anywhere, taken after those of the bag."""
+        black = CompressedImage(format='png', data=cv2.imencode('.png', np.zeros((240, 320), np.uint8))[1].tobytes())
+        black.header.stamp = self.localizer.status.last().header.stamp + rospy.Duration(1.0)
+        return fixture.Camera(self.localizer).show(black)
+
     def test_relocalize_after_a_jump(self):
         self.drive(BEFORE_S)
         self.localizer.fix.clear()
@@ -49,9 +58,24 @@ class KidnapTest(unittest.TestCase):
         self.assertTrue(self.relocalize(RelocalizeRequest(use_centre=False)).success)
         self.drive(AFTER_S)
 
+    def test_a_jump_that_nobody_announces(self):
+        self.drive(BEFORE_S)
+        self.localizer.fix.clear()
+        self.localizer.status.clear()
+        self.drive(AFTER_S)
+        claims = {status.header.stamp for status in self.localizer.status.messages()
+                  if status.state == LocalizationStatus.TRACKING}
+        fixes = [fix for fix in self.localizer.fix.messages() if fix.header.stamp in claims]
+        self.assertLess(max(fixture.errors_m(fixes, self.truth)), NEAR_M, 'no claim of the old position')
+
     def test_searching_can_be_asked_for_by_the_name_amcl_uses(self):
+        self.drive(BEFORE_S)
+        before = self.show_black()
         rospy.wait_for_service('/global_localization', 10.0)
         rospy.ServiceProxy('/global_localization', Empty)()
+        after = self.show_black()
+        self.assertIn(before.state, (LocalizationStatus.TRACKING, LocalizationStatus.UNCERTAIN))
+        self.assertEqual(after.state, LocalizationStatus.INITIALIZING)
 
     def test_a_disc_that_is_none_is_refused_with_a_reason(self):
         for radius in (0.0, -1.0, float('nan')):

@@ -1,0 +1,166 @@
+// What an estimate says of itself where landmarks verify the pose.
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "test/localization/street_map.h"
+#include "visual_localization/localization/localizer.h"
+
+namespace visual_localization {
+namespace {
+
+using test::GivenImage;
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+const Eigen::Vector3d kHere_m = Eigen::Vector3d::Zero();
+
+/// A robot on the street, one image a second and a metre.
+class MetricEstimate : public testing::Test {
+ protected:
+  MetricEstimate() { make({}); }
+
+  void make(const LocalizerConfig& config) {
+    const std::shared_ptr<const TrainingMap> map(std::shared_ptr<void>(), &street_.map());
+    image_ = std::make_shared<GivenImage>(street_.map());
+    localizer_ = std::make_unique<Localizer>(map, config, image_);
+  }
+  /// The next image, taken at training image `i`.
+  Estimate see(std::size_t i) { return show(street_.seenFrom(street_.trueNear(i, kHere_m))); }
+  Estimate seeFew(std::size_t i) { return show(street_.fewSeenFrom(street_.trueNear(i, kHere_m), i)); }
+  Estimate seeNothing() { return show({}); }
+  Estimate show(SiftFeatures features) {
+    image_->features = std::move(features);
+    return localizer_->process(++images_ * kSecond_ns, cv::Mat());
+  }
+  Eigen::Vector2d positionOf(std::size_t i) const { return street_.mappedNear(i, kHere_m).position_m.head<2>(); }
+
+  test::StreetMap street_;
+  std::shared_ptr<GivenImage> image_;
+  std::unique_ptr<Localizer> localizer_;
+  std::int64_t images_ = 0;
+};
+
+TEST_F(MetricEstimate, SaysWhatItRestsOn) {
+  for (std::size_t i = 10; i < 20; ++i) {
+    const Estimate estimate = see(i);
+    ASSERT_TRUE(estimate.metric) << i;
+    EXPECT_EQ(estimate.source, PoseSource::kMetric);
+    EXPECT_EQ(estimate.images_since_metric, 0U);
+    EXPECT_EQ(estimate.pose.position_m, estimate.metric->base.translation().head<2>().eval());
+    const MetricPose::Covariance covariance = estimate.metric->covariance + estimate.metric->map_covariance;
+    EXPECT_EQ(estimate.pose.covariance_m2, (covariance.topLeftCorner<2, 2>().eval()));
+    EXPECT_EQ(estimate.pose.yaw_variance_rad2, covariance(5, 5));
+    EXPECT_GT(estimate.metric->reprojection_px, 0.05);
+    EXPECT_LT(estimate.metric->reprojection_px, 1.0);
+    EXPECT_NEAR(estimate.focal_scale, 1.0, 0.01);
+    if (i == 10) continue;
+    EXPECT_EQ(estimate.comparisons, 5U) << "the training images around the prediction, and no other";
+    EXPECT_LE(std::abs(static_cast<int>(estimate.tracked.best_image) - static_cast<int>(i)), 2);
+    EXPECT_GT(estimate.tracked.best.similarity, 0.0);
+    const double distance_m = (street_.map().position_m(estimate.tracked.best_image) - estimate.pose.position_m).norm();
+    EXPECT_NEAR(estimate.tracked.best_distance_m, distance_m, 1e-9);
+    EXPECT_TRUE(estimate.evidence.verified.value_or(false));
+    EXPECT_FALSE(estimate.evidence.blind);
+  }
+  for (std::size_t since = 1; since <= 3; ++since) {
+    const Estimate estimate = seeNothing();
+    EXPECT_EQ(estimate.images_since_metric, since);
+    EXPECT_TRUE(estimate.evidence.blind);
+    EXPECT_FALSE(estimate.evidence.verified.value_or(true));
+  }
+}
+
+TEST_F(MetricEstimate, AVerifiedPoseBringsTheParticles) {
+  LocalizerConfig config;
+  config.state.max_step_m = 2.0;
+  make(config);
+  for (std::size_t i = 3; i < 8; ++i) see(i);
+  const Estimate estimate = see(40);
+  ASSERT_TRUE(estimate.metric);
+  ASSERT_TRUE(estimate.metric->confirmed);
+  for (const Particle& particle : localizer_->particles()) {
+    EXPECT_LT((particle.position_m - positionOf(40)).norm(), 6.0);
+  }
+}
+
+TEST_F(MetricEstimate, AMountHoldsFromTheNextImageAndForgetsTheMotion) {
+  for (std::size_t i = 10; i < 14; ++i) see(i);
+  const Estimate before = seeFew(14);
+  ASSERT_EQ(before.source, PoseSource::kMetric) << "few landmarks are enough near the prediction";
+  SensorMount mount;
+  mount.camera.position_m = {2.0, 0.0, 0.0};
+  localizer_->setMount(mount);
+  EXPECT_NE(seeFew(14).source, PoseSource::kMetric) << "what is predicted was another point of the robot";
+  const Estimate after = see(14);
+  ASSERT_EQ(after.source, PoseSource::kMetric);
+  EXPECT_NEAR((after.metric->base.translation() - after.metric->camera.position_m).norm(), 2.0, 1e-9);
+  EXPECT_NEAR((after.pose.position_m - before.pose.position_m).norm(), 2.0, 0.2);
+}
+
+TEST_F(MetricEstimate, RelocalizingForgetsTheMotion) {
+  for (std::size_t i = 10; i < 14; ++i) see(i);
+  ASSERT_EQ(seeFew(14).source, PoseSource::kMetric);
+  localizer_->relocalize();
+  EXPECT_NE(seeFew(15).source, PoseSource::kMetric);
+  double farthest_m = 0.0;
+  for (const Particle& particle : localizer_->particles()) {
+    farthest_m = std::max(farthest_m, (particle.position_m - positionOf(15)).norm());
+  }
+  EXPECT_GT(farthest_m, 15.0) << "the particles are all over the street";
+}
+
+TEST_F(MetricEstimate, DoubtForgetsTheMotion) {
+  for (std::size_t i = 10; i < 14; ++i) see(i);
+  localizer_->doubt();
+  EXPECT_NE(seeFew(14).source, PoseSource::kMetric);
+}
+
+TEST_F(MetricEstimate, OdometryIsJudgedByThePresentParameters) {
+  const auto driveTo = [this](double x_m) {
+    for (int k = 0; k < 10; ++k)
+      localizer_->addOdometry({(images_ * 10 + k) * kSecond_ns / 10, {x_m + 0.1 * k, 0.0}, 0.0});
+  };
+  for (const double max_speed_mps : {10.0, 0.5}) {
+    make({});
+    LocalizerConfig config;
+    config.odometry.max_speed_mps = max_speed_mps;
+    localizer_->configure(config);
+    for (std::size_t i = 2; i < 6; ++i) {
+      driveTo(static_cast<double>(i));
+      see(i);
+    }
+    for (std::size_t i = 6; i < 14; ++i) {
+      driveTo(static_cast<double>(i));
+      seeNothing();
+    }
+    driveTo(14.0);
+    const Estimate estimate = seeNothing();
+    const double error_m = (estimate.pose.position_m - positionOf(14)).norm();
+    EXPECT_EQ(error_m<2.0, max_speed_mps> 1.0) << error_m << " m; each reading is a jump at most";
+  }
+}
+
+TEST_F(MetricEstimate, APlaceIsNeverSurerThanItsFloor) {
+  LocalizerConfig config;
+  config.metric.pose_source = "place";
+  config.min_position_std_m = 3.0;
+  config.min_yaw_std_rad = 0.4;
+  make(config);
+  Estimate estimate;
+  for (std::size_t i = 5; i < 30; ++i) estimate = see(i);
+  EXPECT_EQ(estimate.source, PoseSource::kPlace);
+  EXPECT_FALSE(estimate.metric);
+  EXPECT_FALSE(estimate.evidence.verified);
+  EXPECT_GE(estimate.pose.covariance_m2(0, 0), 9.0);
+  EXPECT_GE(estimate.pose.covariance_m2(1, 1), 9.0);
+  EXPECT_LT(estimate.pose.covariance_m2(0, 0), 40.0);
+  EXPECT_GE(estimate.pose.yaw_variance_rad2, 0.16);
+  EXPECT_LT(estimate.pose.yaw_variance_rad2, 0.2);
+  EXPECT_GT(estimate.motion_residual_m, 0.0);
+}
+
+}  // namespace
+}  // namespace visual_localization
