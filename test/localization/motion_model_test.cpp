@@ -165,5 +165,44 @@ TEST(MotionModel, OdometryReachesTheParticlesOfAFilter) {
   }
 }
 
+TEST(MotionModel, OfAFilterFollowsOdometryWithAShareOfItsParticles) {
+  const auto map = test::mapAt({{0.0, 0.0}, {0.0, 10.0}, {0.0, 20.0}});  // drives north
+  ParticleFilterConfig config;
+  config.pull = 0.0;
+  config.gaussian_std_m = 0.0;
+  OdometryConfig odometry;
+  odometry.share = 0.5;
+  odometry.distance_sigma = 0.1;
+  const auto motion = makeMotionModel("pf_gaussian", config, *map, odometry);
+  Travel travel;
+  travel.odometry = OdometryIncrement{{8.0, 1.0}, 0.0, 10.0};
+  Random random(9);
+  std::vector<Particle> moved;
+  constexpr int kParticles = 4000;
+  for (int i = 0; i < kParticles; ++i) {
+    Particle particle = particleAt(0.0, 5.0);
+    motion->move(particle, travel, random);
+    if (particle.position_m != Eigen::Vector2d(0.0, 5.0)) moved.push_back(particle);
+  }
+  EXPECT_NEAR(static_cast<double>(moved.size()) / kParticles, 0.5, 0.03);
+  for (Particle& particle : moved) particle.weight = 1.0;
+  const CloudMoments moments = momentsOf(moved);
+  EXPECT_LT((moments.mean_m - Eigen::Vector2d(-1.0, 13.0)).norm(), 0.1) << "8 m ahead and 1 m to the left";
+  EXPECT_NEAR(moments.spread().x(), 0.2 + 0.1 * 10.0, 0.05);
+  EXPECT_NEAR(moments.spread().y(), 0.2 + 0.1 * 10.0, 0.05);
+}
+
+TEST(MotionModel, ParticlesStartInAllDirections) {
+  const LinearMotion motion(0.0, 0.0, 2.0);
+  Random random(10);
+  int quadrants[4] = {};
+  for (int i = 0; i < 4000; ++i) {
+    Particle particle;
+    motion.start(particle, random);
+    ++quadrants[(particle.velocity_m.x() > 0.0 ? 1 : 0) + (particle.velocity_m.y() > 0.0 ? 2 : 0)];
+  }
+  for (const int count : quadrants) EXPECT_NEAR(count, 1000, 150);
+}
+
 }  // namespace
 }  // namespace visual_localization

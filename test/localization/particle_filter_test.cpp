@@ -1,6 +1,8 @@
 #include "localization/particle_filter.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -94,6 +96,113 @@ TEST(ParticleFilter, AParticleIsPulledToItsTrainingImage) {
   EXPECT_DOUBLE_EQ(filter.particles()[0].position_m.x(), 10.0);
   filter.update(world.from({0.0, 0.0}));
   EXPECT_DOUBLE_EQ(filter.particles()[0].position_m.x(), 8.0);
+}
+
+TEST(ParticleFilter, WhatIsInjectedHasAMeanWeightAndTheFirstSpeedInAnyDirection) {
+  World world = roundWorld();
+  ParticleFilterConfig config;
+  config.particles = 200;
+  config.random_share = 0.25;
+  config.acceleration_std = 0.1;  // so that the others have another speed
+  config.pull = 0.0;
+  ParticleFilter filter = makeFilter(world, "pf_linear", 7, config);
+  for (int image = 0; image < 10; ++image) filter.update(world.from(onCircle(0.0)));
+  std::vector<Particle> injected;
+  double least_of_others = 1.0;
+  for (const Particle& particle : filter.particles()) {
+    if (std::abs(particle.velocity_m.norm() - config.initial_speed_m) < 1e-12) {
+      injected.push_back(particle);
+    } else {
+      least_of_others = std::min(least_of_others, particle.weight);
+    }
+  }
+  ASSERT_EQ(injected.size(), 50U) << "a quarter";
+  Eigen::Vector2d mean_direction = Eigen::Vector2d::Zero();
+  for (const Particle& particle : injected) {
+    EXPECT_EQ(particle.weight, injected.front().weight);
+    mean_direction += particle.velocity_m.normalized() / 50.0;
+  }
+  EXPECT_LT(mean_direction.norm(), 0.35) << "any direction";
+  // 1/200 each beside weights that summed to one before the worst were taken away.
+  double others = 1.0 - 50.0 * injected.front().weight;
+  EXPECT_NEAR(injected.front().weight / others, 0.005 / 1.0, 0.0005);
+  EXPECT_LT(least_of_others, injected.front().weight) << "the worst were replaced, not the best";
+}
+
+TEST(ParticleFilter, BeforeTheFirstImageAllWeighAlikeAndNothingMoves) {
+  World world = roundWorld();
+  ParticleFilterConfig config;
+  config.random_share = 0.0;
+  ParticleFilter filter = makeFilter(world, "pf_gaussian", 7, config);
+  const std::vector<Particle> before = filter.particles();
+  for (const Particle& particle : before) EXPECT_DOUBLE_EQ(particle.weight, 1.0 / 300.0);
+  filter.update(world.from(onCircle(0.0)));
+  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(filter.particles()[i].position_m, before[i].position_m);
+}
+
+TEST(ParticleFilter, TheEstimateNamesItsTrainingImages) {
+  World world = roundWorld();
+  ParticleFilter filter = makeFilter(world, "pf_linear", 7);
+  for (int image = 0; image < 30; ++image) {
+    const bool dark = image % 10 == 9;
+    const TrackerInput input = dark ? world.inTheDark() : world.from(onCircle(0.6 * image));
+    const TrackerEstimate estimate = filter.update(input);
+    EXPECT_EQ(estimate.training_image, world.map().nearest(estimate.position_m).image);
+    const std::size_t best =
+        estimate.best.similarity > 0.0 ? input.scores.mostSimilar().front() : estimate.training_image;
+    EXPECT_EQ(estimate.best_image, best);
+    EXPECT_NEAR(estimate.best_distance_m, (world.map().position_m(best) - estimate.position_m).norm(), 1e-12);
+  }
+}
+
+TEST(ParticleFilter, AVerifiedPositionWeighsTheParticles) {
+  World world = roundWorld();
+  ParticleFilterConfig config;
+  config.random_share = 0.0;
+  ParticleFilter filter = makeFilter(world, "pf_gaussian", 7, config);
+  TrackerInput input = world.from(onCircle(100.0));
+  input.verified_m = onCircle(10.0);
+  filter.update(input);
+  EXPECT_EQ(input.scores.comparisons(), 0U);
+  double sum = 0.0;
+  for (const Particle& particle : filter.particles()) sum += fitnessAbout(onCircle(10.0), particle.position_m);
+  for (const Particle& particle : filter.particles()) {
+    EXPECT_NEAR(particle.weight, fitnessAbout(onCircle(10.0), particle.position_m) / sum, 1e-12);
+  }
+  const std::vector<Particle> before = filter.particles();
+  filter.attract(onCircle(12.0));
+  double total = 0.0;
+  for (const Particle& particle : before) total += particle.weight * fitnessAbout(onCircle(12.0), particle.position_m);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const double expected = before[i].weight * fitnessAbout(onCircle(12.0), before[i].position_m) / total;
+    EXPECT_NEAR(filter.particles()[i].weight, expected, 1e-12) << "one more likelihood";
+  }
+}
+
+TEST(ParticleFilter, AReconfigurationReachesMotionAndFitness) {
+  World world = roundWorld();
+  TrackerConfig config;
+  config.tracker = "pf_gaussian";
+  config.pf.random_share = 0.0;
+  config.pf.pull = 0.0;
+  ParticleFilter filter = makeFilter(world, config.tracker, 7, config.pf);
+  filter.update(world.from(onCircle(0.0)));
+  config.pf.gaussian_std_m = 0.0;
+  config.fitness.distance_sigma_m = 0.5;
+  filter.configure(config);
+  const std::vector<Particle> before = filter.particles();
+  TrackerInput input = world.from(onCircle(0.0));
+  filter.update(input);
+  double sum = 0.0;
+  std::vector<double> fitness;
+  for (const Particle& particle : filter.particles()) {
+    const bool stood = std::any_of(before.begin(), before.end(),
+                                   [&](const Particle& other) { return other.position_m == particle.position_m; });
+    EXPECT_TRUE(stood) << "without noise a particle stays";
+    fitness.push_back(evaluateFitness(world.map().nearest(particle.position_m), input.scores, config.fitness).value);
+    sum += fitness.back();
+  }
+  for (std::size_t i = 0; i < fitness.size(); ++i) EXPECT_NEAR(filter.particles()[i].weight, fitness[i] / sum, 1e-12);
 }
 
 }  // namespace

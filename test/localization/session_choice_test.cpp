@@ -197,6 +197,46 @@ TEST_F(SessionChoiceTest, ChoosesNothingWhenItIsOff) {
 }
 
 /// A swarm on a round with two sessions of which one shows today's light.
+TEST(SessionChoice, AtTheSameTimeOfDayTheNewerOneIsChosen) {
+  MapHeader header;
+  header.image_size = {320, 240};
+  header.sessions = {{"old"}, {"new"}, {"older"}};
+  constexpr std::int64_t kDay_ns = 24 * kHour_ns;
+  std::vector<TrainingImage> images;
+  for (const int day : {3, 5, 1}) {
+    TrainingImage image;
+    image.stamp_ns = day * kDay_ns + 10 * kHour_ns;
+    image.session = static_cast<int>(images.size());
+    image.position_m = {1.0 * static_cast<double>(images.size()), 0.0};
+    images.push_back(image);
+  }
+  const TrainingMap map(header, images);
+  SessionChoice sessions(map, true);
+  sessions.startImage(9 * kDay_ns + 11 * kHour_ns);
+  EXPECT_EQ(sessions.chosen(), 1U);
+  sessions.startImage(9 * kDay_ns + 23 * kHour_ns);
+  EXPECT_EQ(sessions.chosen(), 1U) << "only the first image asks for the hour";
+}
+
+/// How often 1 in 3 matches must be seen before a session that matches `ratio` times as well is chosen; 100: never.
+int imagesUntilChosen(double ratio) {
+  const auto map = street();
+  SessionChoice sessions(*map, true);
+  sessions.startImage(8 * kHour_ns);
+  for (int images = 1; images < 100; ++images) {
+    sessions.learn(30, 0.1, 80, 0.1 * ratio);
+    if (sessions.chosen() == 1U) return images;
+  }
+  return 100;
+}
+
+TEST(SessionChoice, AMuchBetterMatchIsBelievedSoonerButNoneAtOnceWithoutLimit) {
+  EXPECT_EQ(imagesUntilChosen(1.0), 100);
+  EXPECT_LT(imagesUntilChosen(2.0), 100);
+  EXPECT_LE(imagesUntilChosen(4.0), imagesUntilChosen(2.0));
+  EXPECT_EQ(imagesUntilChosen(1000.0), imagesUntilChosen(20.0)) << "the ratio of one image has a limit";
+}
+
 TEST(SessionChoice, ASwarmComparesWithOneSession) {
   MapHeader header;
   header.image_size = {320, 240};

@@ -217,5 +217,80 @@ TEST(StateAssessor, NamesOfTheStates) {
   EXPECT_EQ(toString(LocalizationState::kRecovering), "RECOVERING");
 }
 
+/// State after four images like this one.
+LocalizationState afterFour(const TrackerEstimate& estimate, const Said& said) {
+  StateAssessor assessor{StateConfig()};
+  LocalizationState state = LocalizationState::kNoMap;
+  for (int i = 0; i < 4; ++i) state = assess(assessor, estimate, said);
+  return state;
+}
+
+TEST(StateAssessor, TheThresholdsThemselvesConfirm) {
+  const StateConfig config;
+  const auto tracks = [](const TrackerEstimate& estimate, const Said& said) {
+    return afterFour(estimate, said) == LocalizationState::kTracking;
+  };
+  TrackerEstimate estimate = seen(config.min_similarity, static_cast<std::size_t>(config.min_matches));
+  EXPECT_TRUE(tracks(estimate, sift()));
+  estimate.best.scale = config.max_scale;
+  EXPECT_TRUE(tracks(estimate, sift()));
+  estimate.best.scale = 1.0 / config.max_scale;
+  EXPECT_TRUE(tracks(estimate, sift()));
+  estimate.best.scale = 0.999 / config.max_scale;
+  EXPECT_FALSE(tracks(estimate, sift()));
+  estimate.best.scale = 1.001 * config.max_scale;
+  EXPECT_FALSE(tracks(estimate, sift()));
+  estimate = kGood;
+  estimate.best_distance_m = config.max_distance_m;
+  EXPECT_TRUE(tracks(estimate, sift()));
+  estimate.best_distance_m = 1.001 * config.max_distance_m;
+  EXPECT_FALSE(tracks(estimate, sift()));
+  EXPECT_FALSE(tracks(seen(0.999 * config.min_similarity, 100), sift()));
+  EXPECT_FALSE(tracks(seen(0.9, static_cast<std::size_t>(config.min_matches) - 1), sift()));
+  EXPECT_TRUE(tracks(seen(config.min_global_similarity, 0), global()));
+  EXPECT_FALSE(tracks(seen(0.999 * config.min_global_similarity, 0), global()));
+  EXPECT_TRUE(tracks(kGood, placeRatio(config.min_place_ratio)));
+  EXPECT_FALSE(tracks(kGood, placeRatio(0.999 * config.min_place_ratio)));
+}
+
+TEST(StateAssessor, AStepAsLongAsIsAllowedKeepsTheConfirmations) {
+  StateConfig config;
+  config.max_motion_residual_m = 1e6;  // it alone decides
+  for (const double step_m : {config.max_step_m, 1.001 * config.max_step_m}) {
+    StateAssessor assessor{config};
+    afterGood(assessor, 6);
+    const bool tracks = assess(assessor, seen(0.3, 30, step_m), sift()) == LocalizationState::kTracking;
+    EXPECT_EQ(tracks, step_m == config.max_step_m);
+  }
+}
+
+TEST(StateAssessor, AVerifiedPoseDecidesAlone) {
+  StateAssessor assessor{StateConfig()};
+  Said verified = sift();
+  verified.evidence.verified = true;
+  EXPECT_EQ(assess(assessor, kBad, verified), LocalizationState::kTracking) << "whatever the match says";
+  Said refuted = sift();
+  refuted.evidence.verified = false;
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(assess(assessor, kGood, refuted), LocalizationState::kUncertain);
+  refuted.recovering = true;
+  EXPECT_EQ(assess(assessor, kGood, refuted), LocalizationState::kRecovering);
+  verified.recovering = true;
+  EXPECT_EQ(assess(assessor, kBad, verified), LocalizationState::kTracking);
+}
+
+TEST(StateAssessor, OffTheMapAfterExactlySoManyImages) {
+  StateConfig config;
+  config.off_map_images = 7;
+  StateAssessor assessor{config};
+  for (int i = 1; i <= 6; ++i) EXPECT_EQ(assess(assessor, kBad, sift()), LocalizationState::kInitializing) << i;
+  EXPECT_EQ(assess(assessor, kBad, lost()), LocalizationState::kOffMap);
+  for (int i = 1; i <= 30; ++i) assess(assessor, kBad, lost());
+  Said verified = sift();
+  verified.evidence.verified = true;
+  EXPECT_EQ(assess(assessor, kGood, verified), LocalizationState::kTracking);
+  for (int i = 1; i <= 6; ++i) EXPECT_NE(assess(assessor, kBad, sift()), LocalizationState::kOffMap) << i;
+  EXPECT_EQ(assess(assessor, kBad, sift()), LocalizationState::kOffMap) << "counted anew";
+}
+
 }  // namespace
 }  // namespace visual_localization

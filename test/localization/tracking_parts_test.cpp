@@ -135,5 +135,47 @@ TEST(Prior, RefusesWhatIsLargerThanAnyLocalMap) {
   EXPECT_THROW(normallyDistributed({0.0, 0.0}, kBeyond_m * kBeyond_m * one), std::invalid_argument);
 }
 
+TEST(Fitness, AboutAVerifiedPositionIsAGaussianOfAMetre) {
+  EXPECT_DOUBLE_EQ(fitnessAbout({1.0, 2.0}, {1.0, 2.0}), 1.0);
+  EXPECT_DOUBLE_EQ(fitnessAbout({1.0, 2.0}, {4.0, 6.0}), std::exp(-12.5));
+}
+
+TEST(Cloud, ScatterCountsAllAlike) {
+  const std::vector<Particle> cloud{particleAt(0.0, 0.0, 0.9), particleAt(4.0, 2.0, 0.1)};
+  Eigen::Matrix2d expected;
+  expected << 0.5 * (1.0 + 9.0), 0.5 * (1.0 + 3.0), 0.5 * (1.0 + 3.0), 0.5 * (1.0 + 1.0);
+  EXPECT_LT((scatterAbout({1.0, 1.0}, cloud) - expected).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_EQ(scatterAbout({1.0, 1.0}, {}), Eigen::Matrix2d::Zero());
+}
+
+TEST(Cloud, WithoutWeightsItHasNoMoments) {
+  const CloudMoments moments = momentsOf({particleAt(3.0, 0.0, 0.0), particleAt(5.0, 1.0, 0.0)});
+  EXPECT_EQ(moments.mean_m, Eigen::Vector2d(0.0, 0.0));
+  EXPECT_EQ(moments.covariance_m2, Eigen::Matrix2d::Zero().eval());
+}
+
+TEST(Prior, ADiscReachesAllAround) {
+  const Prior prior = around({10.0, 20.0}, 4.0);
+  Random random(4);
+  int quadrants[4] = {};
+  for (int i = 0; i < 4000; ++i) {
+    const Eigen::Vector2d offset_m = prior(random) - Eigen::Vector2d(10.0, 20.0);
+    ++quadrants[(offset_m.x() > 0.0 ? 1 : 0) + (offset_m.y() > 0.0 ? 2 : 0)];
+  }
+  for (const int count : quadrants) EXPECT_NEAR(count, 1000, 150);
+}
+
+TEST(Prior, SymmetryIsAskedForInRelationToTheSize) {
+  Eigen::Matrix2d large = 1e6 * Eigen::Matrix2d::Identity();
+  large(0, 1) = 1000.0;
+  large(1, 0) = 1000.5;  // half a millionth of the largest
+  EXPECT_NO_THROW(normallyDistributed({0.0, 0.0}, large));
+  Eigen::Matrix2d small = 1e-4 * Eigen::Matrix2d::Identity();
+  small(0, 1) = 5e-7;  // nothing beside one square metre
+  EXPECT_NO_THROW(normallyDistributed({0.0, 0.0}, small));
+  large(1, 0) = 1003.0;
+  EXPECT_THROW(normallyDistributed({0.0, 0.0}, large), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace visual_localization
