@@ -1,0 +1,326 @@
+// The rules of the localizer, by images that are known by their scores alone.
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "test/support/fake_image.h"
+#include "test/support/synthetic.h"
+#include "visual_localization/localization/localizer.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+/// What a robot sees from a position: training images near it look alike.
+class SeenFrom final : public test::FakeImage {
+ public:
+  explicit SeenFrom(std::shared_ptr<const TrainingMap> map) : map_(std::move(map)) {}
+
+  bool isRepeated() const override { return repeated; }
+  std::size_t siftFeatures() override { return features; }
+  ImageReport report() const override {
+    ImageReport report;
+    report.features_kept = features;
+    return report;
+  }
+  void configure(const FrontEndConfig&, const SimilarityConfig& similarity) override {
+    sift_recognised = similarity.sift_recognised;
+  }
+  Score compare(FeatureKind kind, std::size_t i) override {
+    ++compared;
+    const double width_m = kind == FeatureKind::kSift ? 2.0 : 10.0;
+    const double offset = (map_->position_m(i) - position_m).norm() / width_m;
+    const double height = map_->pose(i).session == 0 ? best : best_of_others;
+    const double similarity = height * std::exp(-0.5 * offset * offset);
+    // It looks the larger the farther ahead it was taken.
+    const double scale = std::exp(0.1 * (position_m - map_->position_m(i)).x());
+    return {similarity, similarity, static_cast<std::size_t>(100.0 * similarity), similarity >= sift_recognised, scale};
+  }
+
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  double best = 0.5;
+  double best_of_others = 0.5;
+  double sift_recognised = 0.05;
+  bool repeated = false;
+  std::size_t features = 100;
+  int compared = 0;
+
+ private:
+  std::shared_ptr<const TrainingMap> map_;
+};
+
+std::shared_ptr<const TrainingMap> twoSessions() {
+  MapHeader header;
+  header.image_size = {320, 240};
+  header.sessions = {{"first"}, {"second"}};
+  std::vector<TrainingImage> images;
+  for (int session = 0; session < 2; ++session) {
+    for (int i = 0; i < 60; ++i) {
+      TrainingImage image;
+      image.stamp_ns = (i + 1000 * session) * kSecond_ns;
+      image.session = session;
+      image.position_m = {1.0 * i, 0.1 * session};
+      images.push_back(image);
+    }
+  }
+  return std::make_shared<const TrainingMap>(header, images);
+}
+
+/// A robot on a street of 60 m with a training image every metre.
+class LocalizerRules : public testing::Test {
+ protected:
+  LocalizerRules() { make({}); }
+
+  void make(const LocalizerConfig& config) { make(config, test::mapAt(test::street(60, 1.0))); }
+  void make(const LocalizerConfig& config, std::shared_ptr<const TrainingMap> map) {
+    config_ = config;
+    image_ = std::make_shared<SeenFrom>(map);
+    localizer_ = std::make_unique<Localizer>(map, config, image_);
+    second_ = 0.0;
+  }
+  Estimate see(double x_m, double after_s = 1.0) {
+    image_->position_m = {x_m, 0.0};
+    second_ += after_s;
+    return localizer_->process(static_cast<std::int64_t>(second_ * 1e9), cv::Mat());
+  }
+  /// A tracked position at 20 m.
+  Estimate settle() {
+    Estimate estimate;
+    for (int i = 0; i < 40; ++i) estimate = see(20.0);
+    EXPECT_EQ(estimate.state, LocalizationState::kTracking);
+    return estimate;
+  }
+
+  LocalizerConfig config_;
+  std::shared_ptr<SeenFrom> image_;
+  std::unique_ptr<Localizer> localizer_;
+  double second_ = 0.0;
+};
+
+TEST_F(LocalizerRules, ARepeatedImageGetsTheSameAnswerWithItsOwnStampAndReport) {
+  const Estimate first = settle();
+  EXPECT_EQ(first.stamp_ns, 40 * kSecond_ns);
+  EXPECT_EQ(first.repeats, 0U);
+  image_->repeated = true;
+  image_->features = 77;
+  const int compared = image_->compared;
+  const Estimate second = see(50.0, 0.1);
+  EXPECT_EQ(image_->compared, compared) << "nothing is computed";
+  EXPECT_EQ(second.stamp_ns, static_cast<std::int64_t>(40.1 * 1e9));
+  EXPECT_EQ(second.repeats, 1U);
+  EXPECT_EQ(second.image.features_kept, 77U);
+  EXPECT_EQ(second.pose.position_m, first.pose.position_m);
+  EXPECT_EQ(second.state, first.state);
+  EXPECT_FALSE(second.frozen);
+  image_->repeated = false;
+  EXPECT_EQ(see(20.0).repeats, 0U);
+}
+
+TEST_F(LocalizerRules, TheCameraIsFrozenAfterSoManyImagesInSoLongATime) {
+  LocalizerConfig config;
+  config.state.frozen_images = 4;
+  config.state.frozen_time_s = 2.0;
+  make(config);
+  settle();
+  image_->repeated = true;
+  for (int i = 1; i <= 3; ++i) EXPECT_FALSE(see(20.0, 1.0).frozen) << i << ": long enough, but too few";
+  const Estimate frozen = see(20.0, 1.0);
+  EXPECT_TRUE(frozen.frozen);
+  EXPECT_EQ(frozen.state, LocalizationState::kUncertain);
+
+  make(config);
+  settle();
+  image_->repeated = true;
+  for (int i = 1; i <= 7; ++i) EXPECT_FALSE(see(20.0, 0.25).frozen) << i << ": many, but in less than two seconds";
+  EXPECT_TRUE(see(20.0, 0.25).frozen) << "exactly two seconds";
+}
+
+TEST_F(LocalizerRules, ADriverThatSendsItsLastImageOnAndOnIsStuck) {
+  LocalizerConfig config;
+  config.state.frozen_images = 4;
+  config.state.frozen_time_s = 2.0;
+  make(config);
+  settle();
+  image_->repeated = true;
+  see(20.0, 0.1);  // one with another stamp, then always the same
+  for (int i = 1; i <= 29; ++i) EXPECT_FALSE(see(20.0, 0.0).frozen) << i;
+  EXPECT_TRUE(see(20.0, 0.0).frozen);
+}
+
+TEST_F(LocalizerRules, WithoutFreezingOnlyTheSameStampIsTheSameImage) {
+  LocalizerConfig config;
+  config.state.frozen_images = 0;
+  make(config);
+  settle();
+  image_->repeated = true;
+  int compared = image_->compared;
+  see(20.0, 0.0);
+  EXPECT_EQ(image_->compared, compared);
+  see(20.0, 0.1);
+  EXPECT_GT(image_->compared, compared) << "an image like any other";
+  for (int i = 0; i < 50; ++i) EXPECT_FALSE(see(20.0, 0.0).frozen);
+}
+
+TEST_F(LocalizerRules, WhatShowsNothingIsBlind) {
+  const auto min_features = static_cast<std::size_t>(config_.state.min_features);
+  image_->features = min_features;
+  EXPECT_FALSE(see(20.0).evidence.blind);
+  image_->features = min_features - 1;
+  EXPECT_TRUE(see(20.0).evidence.blind);
+  LocalizerConfig config;
+  config.features = "global";
+  make(config);
+  image_->features = 0;
+  EXPECT_FALSE(see(20.0).evidence.blind) << "global features need none";
+  image_->best = 0.0;
+  EXPECT_TRUE(see(20.0).evidence.blind);
+}
+
+TEST_F(LocalizerRules, OnlyWhatIsRecognisedIsAPlace) {
+  EXPECT_EQ(settle().source, PoseSource::kPlace);
+  image_->best = 0.04;
+  const Estimate estimate = see(20.0);
+  EXPECT_EQ(estimate.source, PoseSource::kNone);
+  EXPECT_FALSE(estimate.tracked.best.recognised);
+  LocalizerConfig lenient = config_;
+  lenient.similarity.sift_recognised = 0.01;
+  localizer_->configure(lenient);
+  EXPECT_EQ(see(20.0).source, PoseSource::kPlace) << "the image learnt the new threshold";
+}
+
+TEST_F(LocalizerRules, ATrackedPlaceHasTheCovarianceOfItsMode) {
+  const double floor_m2 = config_.min_position_std_m * config_.min_position_std_m;
+  const Estimate tracked = settle();
+  EXPECT_LT((tracked.pose.covariance_m2 - tracked.tracked.mode_covariance_m2 - floor_m2 * Eigen::Matrix2d::Identity())
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-12);
+  image_->best = 0.0;
+  Estimate lost;
+  for (int i = 0; i < 5; ++i) lost = see(20.0);
+  ASSERT_NE(lost.state, LocalizationState::kTracking);
+  EXPECT_LT((lost.pose.covariance_m2 - lost.tracked.cloud_covariance_m2 - floor_m2 * Eigen::Matrix2d::Identity())
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-12);
+}
+
+TEST_F(LocalizerRules, APlaceIsInterpolatedBetweenTheTrainingImagesOrTheBestParticle) {
+  Estimate estimate;
+  for (int i = 0; i < 40; ++i) estimate = see(20.3);
+  EXPECT_NEAR(estimate.pose.position_m.x(), 20.3, 1e-6) << "by the size of what it shows";
+  EXPECT_EQ(estimate.pose.position_m.y(), 0.0);
+  for (const auto& [name, value] : {std::make_pair("estimate", "image"), std::make_pair("features", "global")}) {
+    LocalizerConfig config;
+    (std::string(name) == "estimate" ? config.estimate : config.features) = value;
+    make(config);
+    for (int i = 0; i < 40; ++i) estimate = see(20.3);
+    EXPECT_EQ(estimate.pose.position_m, estimate.tracked.position_m) << name;
+  }
+}
+
+TEST_F(LocalizerRules, AMatchFarFromTheParticlesIsNotWhereTheRobotIs) {
+  LocalizerConfig config;
+  config.state.max_distance_m = 0.1;
+  config.state.place_check = false;
+  config.dpso.particles = 10;  // few are near
+  make(config);
+  int far = 0;
+  int near = 0;
+  for (int i = 0; i < 100; ++i) {
+    const Estimate estimate = see(20.3);
+    if (!estimate.tracked.best.recognised) continue;
+    const bool is_far = estimate.tracked.best_distance_m > 0.1;
+    EXPECT_EQ(estimate.pose.position_m == estimate.tracked.position_m, is_far) << "otherwise interpolated";
+    ++(is_far ? far : near);
+  }
+  EXPECT_GT(far, 3);
+  EXPECT_GT(near, 3);
+}
+
+TEST_F(LocalizerRules, TheSecondWitnessIsAskedOnlyWhereTheFirstIsNotSure) {
+  settle();
+  image_->best = config_.state.sure_similarity + 0.05;
+  Estimate estimate;
+  for (int i = 0; i < 5; ++i) estimate = see(20.0);
+  EXPECT_EQ(estimate.swept, 0U);
+  EXPECT_EQ(estimate.evidence.place_ratio, 1.0);
+  image_->best = 0.9 * config_.state.sure_similarity;
+  EXPECT_GT(see(20.0).swept, 0U);
+  LocalizerConfig without = config_;
+  without.state.place_check = false;
+  localizer_->configure(without);
+  EXPECT_EQ(see(20.0).swept, 0U);
+}
+
+TEST_F(LocalizerRules, ReconfiguringChangesTrackerAndParticles) {
+  settle();
+  LocalizerConfig config;
+  config.dpso.particles = 30;
+  localizer_->configure(config);
+  EXPECT_EQ(localizer_->particles().size(), 30U);
+  int near = 0;
+  for (const Particle& particle : localizer_->particles())
+    near += std::abs(particle.position_m.x() - 20.0) < 12.0 ? 1 : 0;
+  EXPECT_GT(near, 20) << "drawn from those before";
+  config.dpso.quantum_share = 0.2;
+  localizer_->configure(config);
+  int quantum = 0;
+  for (const Particle& particle : localizer_->particles()) quantum += particle.kind == ParticleKind::kQuantum ? 1 : 0;
+  EXPECT_EQ(quantum, 6);
+  config.tracker = "pf_linear";
+  localizer_->configure(config);
+  EXPECT_EQ(localizer_->particles().size(), static_cast<std::size_t>(config.pf.particles));
+  config.sweep_images = 10;
+  config.features = "global";
+  localizer_->configure(config);
+  EXPECT_EQ(see(20.0).evidence.features, FeatureKind::kGlobal);
+}
+
+TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
+  make({}, twoSessions());
+  image_->best = 0.2;
+  image_->best_of_others = 0.2;
+  Estimate estimate = see(20.0);
+  EXPECT_EQ(estimate.session, "first") << "at this time of day";
+  for (int i = 0; i < 60; ++i) estimate = see(20.0);
+  EXPECT_EQ(estimate.session, "first");
+  image_->best_of_others = 0.6;
+  for (int i = 0; i < 60; ++i) estimate = see(20.0);
+  EXPECT_EQ(estimate.session, "second");
+}
+
+TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
+  make({}, twoSessions());
+  for (int i = 0; i < 30; ++i) see(20.0);
+  EXPECT_EQ(see(20.0).session, "first") << "something is seen";
+  image_->best = image_->best_of_others = 0.0;
+  bool second = false;
+  for (int i = 0; i < 8; ++i) second = see(20.0).session == "second" || second;
+  EXPECT_TRUE(second);
+}
+
+TEST_F(LocalizerRules, RelocalizingSpreadsTheParticles) {
+  settle();
+  const auto reach_m = [this] {
+    double farthest_m = 0.0;
+    for (const Particle& particle : localizer_->particles()) {
+      farthest_m = std::max(farthest_m, std::abs(particle.position_m.x() - 20.0));
+    }
+    return farthest_m;
+  };
+  localizer_->relocalize(around({20.0, 0.0}, 3.0));
+  EXPECT_LE(reach_m(), 3.0);
+  localizer_->relocalize();
+  EXPECT_GT(reach_m(), 30.0);
+  image_->best = 0.0;
+  EXPECT_EQ(see(20.0).state, LocalizationState::kInitializing) << "what confirmed it before is forgotten";
+}
+
+}  // namespace
+}  // namespace visual_localization
