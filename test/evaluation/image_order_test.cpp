@@ -35,6 +35,28 @@ TEST(ImageOrder, RefusesIndicesBeyondTheRound) {
   EXPECT_TRUE(imageOrder(0, 0, RunShape{}).empty());
 }
 
+TEST(ImageOrder, OnAnOpenRoundTheRobotIsCarriedBack) {
+  RunShape shape{kOpen};
+  shape.kidnapped = true;
+  EXPECT_THAT(imageOrder(8, 0, shape), ElementsAre(0, 1, 2, 3, 0, 1, 2, 3));
+  EXPECT_THAT(imageOrder(7, 0, shape), ElementsAre(0, 1, 2, 0, 1, 2, 3));
+  EXPECT_THAT(imageOrder(8, 3, shape), ElementsAre(3, 4, 1, 2, 3));
+  EXPECT_THAT(imageOrder(1, 0, shape), ElementsAre(0));
+  shape.speed = 3.0;
+  EXPECT_THAT(imageOrder(10, 0, shape), ElementsAre(0, 3, 1, 4));
+  for (std::size_t images = 1; images < 40; ++images) {
+    for (const double speed : {0.5, 1.0, 2.0, 5.0}) {
+      shape.speed = speed;
+      for (const std::size_t start : startImages(images, kOpen, 0)) {
+        const std::vector<std::size_t> order = imageOrder(images, start, shape);
+        std::size_t jumps = 0;
+        for (std::size_t i = 1; i < order.size(); ++i) jumps += order[i] < order[i - 1] ? 1 : 0;
+        EXPECT_LE(jumps, 1U) << images << " images from " << start << ": it is carried once";
+      }
+    }
+  }
+}
+
 TEST(ImageOrder, AnOpenRoundIsDrivenToItsEnd) {
   EXPECT_THAT(imageOrder(5, 2, RunShape{kOpen}), ElementsAre(2, 3, 4));
   EXPECT_THAT(imageOrder(5, 4, RunShape{kOpen}), ElementsAre(4));

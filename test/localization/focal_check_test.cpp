@@ -1,3 +1,4 @@
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -68,6 +69,34 @@ TEST(FocalCheck, IgnoresWhatIsNotFinite) {
   check.add(1.0, std::numeric_limits<double>::infinity());
   EXPECT_FALSE(check.confirms());
   EXPECT_DOUBLE_EQ(check.scale(), 1.0);
+}
+
+TEST(FocalCheck, WhatContradictsDoesNotConfirm) {
+  FocalCheck check(kMaxError);
+  for (int i = 0; i < 20; ++i) check.add(1.05, 0.004);
+  EXPECT_TRUE(check.contradicts());
+  EXPECT_FALSE(check.confirms()) << "however sure it is";
+}
+
+// Each image counts with hypot(sigma, 0.003).
+TEST(FocalCheck, IsSureWhenTheMeanIsKnownToAHundredth) {
+  FocalCheck check(kMaxError);
+  const double sigma = std::sqrt(std::pow(0.0205, 2) - std::pow(0.003, 2));  // 0.0205 / sqrt(n) <= 0.01 from 5 on
+  for (int images = 1; images <= 6; ++images) {
+    check.add(1.0, sigma);
+    EXPECT_EQ(check.confirms(), images >= 5) << images;
+  }
+}
+
+TEST(FocalCheck, ContradictsBeyondTheAllowedErrorAndThreeSigmas) {
+  const double sigma = std::sqrt(std::pow(0.005, 2) - std::pow(0.003, 2));
+  for (const double off : {0.0249, 0.0251}) {
+    for (const double sign : {1.0, -1.0}) {
+      FocalCheck check(kMaxError);
+      check.add(1.0 + sign * off, sigma);
+      EXPECT_EQ(check.contradicts(), off > 0.025) << sign * off;
+    }
+  }
 }
 
 }  // namespace

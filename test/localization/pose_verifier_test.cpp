@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "base/angles.h"
+#include "localization/covariance.h"
 #include "test/localization/street_map.h"
 #include "test/support/fake_image.h"
 #include "visual_localization/features/sift_matcher.h"
@@ -227,6 +228,87 @@ TEST_F(PoseVerifierTest, OdometryIsBelievedAgainAfterTenPosesThatItAgreesWith) {
   EXPECT_TRUE(leads(4, 4.0)) << "nobody knows yet that this is wrong";
   for (int second = 5; second <= 14; ++second) EXPECT_FALSE(leads(second, 0.0)) << second;
   EXPECT_TRUE(leads(15, 0.0));
+}
+
+/// A robot that stands and whose wheels say that it moved and turned in the second before an image: whether odometry is
+/// still believed afterwards.
+class OdometryAgreement : public PoseVerifierTest {
+ protected:
+  bool stillBelieved(double moved_m, double turned_rad) {
+    OdometryTrack track(config_);
+    verifier_.useOdometry(track, config_);
+    verifier_.reset();
+    const SiftFeatures seen = street_.seenFrom(street_.trueNear(10, kBeside_m));
+    begin_s_ += 1000.0;
+    const auto at = [this](double time_s) { return static_cast<std::int64_t>((begin_s_ + time_s) * kSecond_ns); };
+    const auto look = [&](double time_s) { return verify(begin_s_ + time_s, seen, {9, 10, 11}); };
+    for (int k = -150; k <= 0; ++k) track.add({at(0.1 * k), {0.0, 0.0}, 0.0});
+    for (int second = -12; second < 0; ++second) look(second);  // so that it is believed again
+    const auto first = look(0.0);
+    EXPECT_TRUE(first);
+    for (int k = 1; k <= 15; ++k) {  // up to half a second after the image
+      const double share = std::min(1.0, 0.1 * k);
+      track.add({at(0.1 * k), {share * moved_m, 0.0}, share * turned_rad});
+    }
+    sigma_m_ = first ? largerSigma(allOf(*first).topLeftCorner<2, 2>()) : 0.0;
+    EXPECT_TRUE(look(1.0));
+    verifier_.startImage(at(1.2), seen, street_.camera());
+    const auto prediction = verifier_.predicted();
+    return prediction && prediction->by_odometry;
+  }
+
+  OdometryConfig config_;
+  double begin_s_ = 0.0;
+  double sigma_m_ = 0.0;  ///< of where odometry leads
+};
+
+TEST_F(OdometryAgreement, WithinThirtyCentimetresAndThreeSigmas) {
+  config_.distance_sigma = 0.0001;
+  EXPECT_TRUE(stillBelieved(0.0, 0.0));
+  const double most_m = 0.3 + 3.0 * sigma_m_;
+  ASSERT_LT(sigma_m_, 0.3) << "the test tells 3 from 6 sigmas and from a second of 0.3 m";
+  EXPECT_TRUE(stillBelieved(most_m - 0.02, 0.0));
+  EXPECT_FALSE(stillBelieved(most_m + 0.02, 0.0));
+  EXPECT_TRUE(stillBelieved(-most_m + 0.02, 0.0));
+  EXPECT_FALSE(stillBelieved(-most_m - 0.02, 0.0));
+}
+
+TEST_F(OdometryAgreement, WithinThreeTenthsOfARadian) {
+  for (const double direction : {1.0, -1.0}) {
+    EXPECT_TRUE(stillBelieved(0.0, direction * 0.28)) << direction;
+    EXPECT_FALSE(stillBelieved(0.0, direction * 0.32)) << direction;
+  }
+}
+
+TEST_F(PoseVerifierTest, OdometryLeadsNoFartherThanIsBelieved) {
+  for (const double max_distance_m : {7.5, 6.5}) {
+    OdometryConfig config;
+    config.max_distance_m = max_distance_m;
+    OdometryTrack track(config);
+    verifier_.useOdometry(track, config);
+    verifier_.reset();
+    ASSERT_TRUE(verifyNear(0.0, 10));
+    for (int i = 0; i <= 10; ++i) track.add({i * kSecond_ns / 10, {0.7 * i, 0.0}, 0.0});
+    verify(1.0, SiftFeatures(), {});
+    const auto prediction = verifier_.predicted();
+    ASSERT_TRUE(prediction) << "otherwise by the velocity";
+    EXPECT_EQ(prediction->by_odometry, max_distance_m > 7.0);
+  }
+}
+
+TEST_F(PoseVerifierTest, NothingIsPredictedForTimesBeforeThePose) {
+  ASSERT_TRUE(verifyNear(100.0, 10));
+  EXPECT_TRUE(verifier_.predicted()) << "of the same moment";
+  verify(99.0, SiftFeatures(), {});
+  EXPECT_FALSE(verifier_.predicted());
+}
+
+// Four metres a second predict four metres on, and that to 2 m of its own beside the 2 m that are allowed.
+TEST_F(PoseVerifierTest, AFastRobotMayBeFartherFromItsPrediction) {
+  ASSERT_TRUE(verifyNear(0.0, 6));
+  ASSERT_TRUE(verifyNear(1.0, 10));
+  const auto few = street_.fewSeenFrom(street_.trueNear(11, kBeside_m), 14);
+  EXPECT_TRUE(verify(2.0, few, {11})) << "3 m short of the prediction";
 }
 
 TEST_F(PoseVerifierTest, TheCovarianceIsScaledAndThatOfTheRobotNotOfTheCamera) {

@@ -237,6 +237,80 @@ TEST(SessionChoice, AMuchBetterMatchIsBelievedSoonerButNoneAtOnceWithoutLimit) {
   EXPECT_EQ(imagesUntilChosen(1000.0), imagesUntilChosen(20.0)) << "the ratio of one image has a limit";
 }
 
+TEST_F(SessionChoiceTest, TheOrderOfTrials) {
+  sessions_.startImage(8 * kHour_ns);
+  const auto sessionsTried = [this](int trials) {
+    std::vector<int> tried;
+    for (int i = 0; i < trials; ++i) tried.push_back(map_->pose(nextTrial()).session);
+    return tried;
+  };
+  EXPECT_EQ(sessionsTried(4), (std::vector<int>{1, 2, 1, 2})) << "beside the first one the others in turn";
+  sessions_.choose(70);
+  ASSERT_EQ(sessions_.chosen(), 1U);
+  EXPECT_EQ(sessionsTried(4), (std::vector<int>{0, 0, 2, 0})) << "beside another one the first one every second time";
+}
+
+TEST_F(SessionChoiceTest, EveryFourthImageIsATrial) {
+  for (int image = 1; image <= 12; ++image) {
+    sessions_.startImage(8 * kHour_ns);
+    EXPECT_EQ(sessions_.trial({80.0, 0.0}, 0.0).has_value(), image % 4 == 0) << image;
+  }
+}
+
+TEST_F(SessionChoiceTest, ATrialIsNearAndFacesAlike) {
+  const auto nearestTrial = [this](double x_m) {
+    for (int i = 0; i < 4; ++i) {
+      sessions_.startImage(8 * kHour_ns);
+      const auto trial = sessions_.trial({x_m, 0.0}, 0.0);
+      if (trial) return map_->position_m(*trial).x();
+    }
+    return -1.0;
+  };
+  EXPECT_EQ(nearestTrial(20.4), 20.0) << "of the session at noon";
+  EXPECT_EQ(nearestTrial(20.4), -1.0) << "in the evening it was not there";
+}
+
+TEST_F(SessionChoiceTest, WhileNothingIsSeenTheBestAndTheOthersTakeTurns) {
+  sessions_.startImage(13 * kHour_ns);
+  ASSERT_EQ(sessions_.chosen(), 1U);
+  std::vector<std::size_t> chosen;
+  for (int i = 0; i < 8; ++i) {
+    sessions_.sawSomething(false);
+    chosen.push_back(*sessions_.chosen());
+  }
+  EXPECT_EQ(chosen[0], 1U);
+  EXPECT_EQ(chosen[1], 1U);
+  for (const std::size_t i : {3U, 5U, 7U}) EXPECT_EQ(chosen[i], 1U) << "the session before";
+  EXPECT_NE(chosen[2], 1U);
+  EXPECT_NE(chosen[4], 1U);
+}
+
+TEST_F(SessionChoiceTest, OneImageThatMatchesNothingIsNotTheLastWord) {
+  sessions_.startImage(8 * kHour_ns);
+  sessions_.learn(30, 1.0, 80, 0.0);  // noon: a tenth at least, so 0.73 is left of 1
+  sessions_.learn(30, 0.1, 80, 0.21);
+  EXPECT_EQ(sessions_.chosen(), 1U) << "0.7 * 0.73 + 0.3 * 2 is more than 1.1";
+}
+
+TEST_F(SessionChoiceTest, WhatIsChosenCountsAsTheBest) {
+  sessions_.startImage(8 * kHour_ns);
+  sessions_.learn(30, 1.0, 80, 0.0);
+  sessions_.choose(80);
+  ASSERT_EQ(sessions_.chosen(), 1U);
+  for (int i = 0; i < 4; ++i) sessions_.sawSomething(false);
+  EXPECT_EQ(sessions_.chosen(), 1U) << "the fourth time the best one is asked";
+}
+
+TEST_F(SessionChoiceTest, AReachOfThreeMetres) {
+  sessions_.startImage(18 * kHour_ns);  // the evening begins at x = 50 m
+  ASSERT_EQ(sessions_.chosen(), 2U);
+  const auto nearestAt = [this](double x_m) {
+    return map_->pose(sessions_.around({x_m, 0.0}, 0.0, 3).front()).session;
+  };
+  EXPECT_EQ(nearestAt(47.5), 2) << "2.5 m away, the others half a metre";
+  EXPECT_NE(nearestAt(45.5), 2) << "4.5 m away, the others half a metre";
+}
+
 TEST(SessionChoice, ASwarmComparesWithOneSession) {
   MapHeader header;
   header.image_size = {320, 240};

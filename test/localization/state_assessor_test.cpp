@@ -292,5 +292,31 @@ TEST(StateAssessor, OffTheMapAfterExactlySoManyImages) {
   EXPECT_EQ(assess(assessor, kBad, sift()), LocalizationState::kOffMap) << "counted anew";
 }
 
+TEST(StateAssessor, OnlyMatchedLocalFeaturesSayThatThisIsTheMap) {
+  StateConfig config;
+  config.off_map_images = 7;
+  for (const bool local : {true, false}) {
+    StateAssessor assessor{config};
+    TrackerEstimate estimate = seen(0.9, 50);
+    LocalizationState state = LocalizationState::kNoMap;
+    for (int i = 0; i < 10; ++i) {
+      Said said = local ? sift() : global();
+      said.evidence.place_ratio = 0.0;  // another place looks more alike: nothing is certain
+      state = assess(assessor, estimate, said);
+    }
+    EXPECT_EQ(state == LocalizationState::kOffMap, !local);
+  }
+}
+
+TEST(StateAssessor, AJumpForgetsTheDoubtsOfTheOtherPlace) {
+  StateConfig config;
+  config.max_motion_residual_m = 1e6;
+  StateAssessor assessor{config};
+  for (int i = 0; i < 10; ++i) assess(assessor, kGood, placeRatio(0.0));
+  EXPECT_TRUE(assessor.isDoubtful());
+  assess(assessor, seen(0.3, 30, 100.0), placeRatio(1.0));
+  EXPECT_FALSE(assessor.isDoubtful());
+}
+
 }  // namespace
 }  // namespace visual_localization
