@@ -66,11 +66,13 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const
   };
   auto steps = static_cast<std::size_t>(std::ceil(static_cast<double>(ahead) / shape.speed));
   if (travelledAt(steps - 1) >= ahead) --steps;  // 21 / 0.7 is a little more than 30
+  // Half a closed drive ahead is half of it back, and an open one has nothing ahead of its end.
+  const std::size_t back = std::min(images / 2, start + travelledAt(steps / 2));
+  const std::size_t carried = shape.closed ? images / 2 : images - back;
   std::vector<std::size_t> order(steps);
   for (std::size_t step = 0; step < steps; ++step) {
-    const std::size_t travelled = travelledAt(step);
-    const std::size_t jump = shape.kidnapped && step >= steps / 2 ? images / 2 : 0;
-    order[step] = (start + travelled + jump) % images;
+    const std::size_t jump = shape.kidnapped && step >= steps / 2 ? carried : 0;
+    order[step] = (start + travelledAt(step) + jump) % images;
   }
   return order;
 }

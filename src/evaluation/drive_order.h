@@ -24,7 +24,7 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const
 struct RunShape {
   bool closed = true;      ///< indices wrap; an open drive is followed to its end
   double speed = 1.0;      ///< images of the drive per step: at 2 every other one, at 1/2 each one twice
-  bool kidnapped = false;  ///< after half of the run carried by half of the drive; closed drives only
+  bool kidnapped = false;  ///< after half of the run carried by half of the drive; an open one back
 };
 
 /// The images that the run beginning at `start` sees: once around a closed drive, to the end of an open one.

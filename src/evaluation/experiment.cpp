@@ -123,11 +123,6 @@ Experiment parse(YamlMap yaml) {
   experiment.front_end = localizerConfig(yaml);
   experiment.methods = readMethods(yaml, experiment.front_end);
   yaml.requireNoMore();
-  const auto kidnapped = std::find_if(experiment.methods.begin(), experiment.methods.end(),
-                                      [](const MethodSpec& method) { return method.kidnapped; });
-  if (!experiment.closed && kidnapped != experiment.methods.end()) {
-    yaml.refuse("methods", "'" + kidnapped->name + "' is kidnapped, which needs closed rounds");
-  }
   return experiment;
 }
 
