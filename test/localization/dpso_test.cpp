@@ -382,6 +382,49 @@ TEST(Dpso, AParticleThatTheCorridorHoldsKeepsOnlyTheSpeedAlongIt) {
   EXPECT_GT(held, 10);
 }
 
+TEST(Dpso, BeforeTheFirstImageThereIsNoWay) {
+  World world(test::mapAt(test::street(100, 1.0)));
+  OdometryConfig odometry;
+  odometry.share = 1.0;
+  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1, odometry);
+  swarm.reset(around({50.0, 0.0}, 5.0));
+  const std::vector<Particle> before = swarm.particles();
+  TrackerInput input = world.inTheDark();
+  input.travel.odometry = OdometryIncrement{{30.0, 0.0}, 0.0, 30.0};
+  swarm.update(input);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_EQ(swarm.particles()[i].position_m, before[i].position_m);
+  }
+}
+
+TEST(Dpso, TheAttractorMovesWithTheOdometry) {
+  World world(test::mapAt(test::street(100, 1.0)));
+  DpsoConfig config;
+  config.quantum_std = 0.0;
+  config.recovery = "none";
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  swarm.reset(around({50.0, 0.0}, 5.0));
+  swarm.update(world.inTheDark());
+  swarm.attract({50.0, 0.0});
+  TrackerInput input = world.inTheDark();
+  input.travel.odometry = OdometryIncrement{{3.0, 0.0}, 0.0, 3.0};
+  EXPECT_EQ(swarm.update(input).position_m, Eigen::Vector2d(53.0, 0.0));
+  EXPECT_EQ(swarm.particles().front().position_m, Eigen::Vector2d(53.0, 0.0)) << "a quantum particle";
+}
+
+TEST(Dpso, TheCovarianceIsThatOfTheModeAroundTheEstimate) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.mode_radius_m = 4.0;
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  for (int image = 0; image < 40; ++image) {
+    const TrackerEstimate estimate = swarm.update(world.from(onCircle(0.6 * image)));
+    EXPECT_EQ(estimate.mode_covariance_m2, covarianceAbout(estimate.position_m, swarm.particles(), 4.0));
+    EXPECT_EQ(estimate.cloud_covariance_m2, scatterAbout(estimate.position_m, swarm.particles()));
+    EXPECT_EQ(estimate.spread_m, momentsOf(swarm.particles()).spread());
+  }
+}
+
 TEST(DpsoConfig, SaysWhichConstraintIsViolated) {
   EXPECT_TRUE(violationsOf(DpsoConfig()).empty());
   DpsoConfig config;

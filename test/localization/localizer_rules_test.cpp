@@ -322,5 +322,63 @@ TEST_F(LocalizerRules, RelocalizingSpreadsTheParticles) {
   EXPECT_EQ(see(20.0).state, LocalizationState::kInitializing) << "what confirmed it before is forgotten";
 }
 
+TEST_F(LocalizerRules, ReconfiguringReachesStateAndSweep) {
+  settle();
+  LocalizerConfig strict;
+  strict.state.min_similarity = 0.9;
+  localizer_->configure(strict);
+  Estimate estimate;
+  for (int i = 0; i < 10; ++i) estimate = see(20.0);
+  EXPECT_NE(estimate.state, LocalizationState::kTracking) << "0.5 is not enough any more";
+  LocalizerConfig few;
+  few.sweep_images = 10;
+  few.state.sure_similarity = 1.0;
+  localizer_->configure(few);
+  const std::size_t swept = see(20.0).swept;
+  few.sweep_images = 20000;
+  localizer_->configure(few);
+  EXPECT_GT(see(20.0).swept, swept);
+}
+
+TEST_F(LocalizerRules, WhatIsToldMeanwhileIsNewsToARepeatedImage) {
+  settle();
+  image_->repeated = true;
+  int compared = image_->compared;
+  see(20.0, 0.0);
+  EXPECT_EQ(image_->compared, compared);
+  localizer_->configure({});
+  see(20.0, 0.0);
+  EXPECT_GT(image_->compared, compared) << "other parameters";
+  compared = image_->compared;
+  see(20.0, 0.0);
+  EXPECT_EQ(image_->compared, compared);
+  localizer_->setMount({});
+  see(20.0, 0.0);
+  EXPECT_GT(image_->compared, compared) << "another mount";
+}
+
+TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
+  LocalizerConfig config;
+  config.odometry.share = 1.0;
+  config.dpso.quantum_share = 0.0;
+  config.dpso.quantum_share_max = 0.0;
+  config.dpso.inertia = 0.0;
+  config.dpso.phi0 = 0.0;
+  config.dpso.phi2 = 0.0;
+  config.dpso.phi2_min = 0.0;
+  config.dpso.recovery = "none";
+  make(config);
+  for (int k = 0; k <= 100; ++k) localizer_->addOdometry({k * kSecond_ns / 10, {0.2 * k, 0.0}, 0.0});  // 2 m/s
+  localizer_->relocalize(around({20.0, 0.0}, 1.0));
+  image_->best = 0.0;
+  see(20.0);
+  double x_m = localizer_->particles().front().position_m.x();
+  for (int i = 0; i < 5; ++i) {
+    see(20.0);
+    EXPECT_NEAR(localizer_->particles().front().position_m.x(), x_m + 2.0, 1e-6) << i;
+    x_m = localizer_->particles().front().position_m.x();
+  }
+}
+
 }  // namespace
 }  // namespace visual_localization

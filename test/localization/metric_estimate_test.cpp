@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -160,6 +161,73 @@ TEST_F(MetricEstimate, APlaceIsNeverSurerThanItsFloor) {
   EXPECT_GE(estimate.pose.yaw_variance_rad2, 0.16);
   EXPECT_LT(estimate.pose.yaw_variance_rad2, 0.2);
   EXPECT_GT(estimate.motion_residual_m, 0.0);
+}
+
+TEST_F(MetricEstimate, WithoutLandmarksTheMotionLeadsOn) {
+  const auto odometryTo = [this](double x_m) {
+    for (int k = 1; k <= 10; ++k) {
+      localizer_->addOdometry({images_ * kSecond_ns + k * kSecond_ns / 10, {x_m + 0.1 * k, 0.0}, 0.0});
+    }
+  };
+  localizer_->addOdometry({0, {0.0, 0.0}, 0.0});
+  Estimate last;
+  for (std::size_t i = 2; i < 8; ++i) {
+    odometryTo(static_cast<double>(images_));
+    last = see(i);
+    ASSERT_EQ(last.source, PoseSource::kMetric) << i;
+    EXPECT_EQ(last.pose.geodetic.latitude_deg, street_.map().frame().toGeodetic(last.pose.position_m).latitude_deg);
+  }
+  odometryTo(static_cast<double>(images_));
+  const Estimate led = seeNothing();
+  EXPECT_EQ(led.source, PoseSource::kNone) << "nothing in the image";
+  const MetricPose::Covariance start = last.metric->covariance + last.metric->map_covariance;
+  const Eigen::Vector2d ahead(std::cos(last.pose.yaw_rad), std::sin(last.pose.yaw_rad));
+  EXPECT_LT((led.pose.position_m - last.pose.position_m - ahead).norm(), 0.01) << "a metre straight on";
+  EXPECT_NEAR(led.pose.yaw_rad, last.pose.yaw_rad, 1e-6);
+  EXPECT_GT(led.pose.yaw_variance_rad2, start(5, 5));
+  EXPECT_LT(led.pose.yaw_variance_rad2, start(5, 5) + 0.01);
+  EXPECT_EQ(led.pose.geodetic.latitude_deg, street_.map().frame().toGeodetic(led.pose.position_m).latitude_deg);
+}
+
+TEST_F(MetricEstimate, AProposedPoseAttractsTheTracker) {
+  LocalizerConfig config;
+  config.state.max_step_m = 10000.0;  // the particles stay; only the attractor moves
+  make(config);
+  for (std::size_t i = 3; i < 8; ++i) see(i);
+  ASSERT_EQ(see(40).source, PoseSource::kMetric);
+  const Estimate blind = seeNothing();
+  EXPECT_LT((blind.tracked.position_m - positionOf(40)).norm(), 0.5) << "an image of nothing moves no attractor";
+}
+
+TEST_F(MetricEstimate, HasNoLandmarksToDrawWithoutAPose) {
+  EXPECT_TRUE(localizer_->lastLandmarks().landmarks.empty());
+  for (std::size_t i = 3; i < 6; ++i) see(i);
+  EXPECT_FALSE(localizer_->lastLandmarks().landmarks.empty());
+  seeNothing();
+  EXPECT_TRUE(localizer_->lastLandmarks().landmarks.empty());
+}
+
+TEST(Estimate, SaysHowWrongTheCalibrationIs) {
+  Estimate estimate;
+  EXPECT_EQ(estimate.cameraTrouble(), "");
+  estimate.camera_contradicted = true;
+  estimate.focal_scale = 0.952;
+  EXPECT_NE(estimate.cameraTrouble().find("95.2"), std::string::npos) << estimate.cameraTrouble();
+}
+
+TEST(Estimate, ItsSigmasAreThoseOfThePoseOrInRelationToTheMap) {
+  Estimate estimate;
+  estimate.pose.covariance_m2 << 4.0, 0.0, 0.0, 9.0;
+  estimate.pose.yaw_variance_rad2 = 0.04;
+  EXPECT_DOUBLE_EQ(estimate.sigma_m(), 3.0);
+  EXPECT_DOUBLE_EQ(estimate.sigmaYaw_rad(), 0.2);
+  estimate.metric = MetricPose();
+  estimate.metric->covariance(0, 0) = 0.01;
+  estimate.metric->covariance(1, 1) = 0.04;
+  estimate.metric->covariance(5, 5) = 0.0001;
+  estimate.metric->map_covariance = 100.0 * MetricPose::Covariance::Identity();
+  EXPECT_DOUBLE_EQ(estimate.sigma_m(), 0.2);
+  EXPECT_DOUBLE_EQ(estimate.sigmaYaw_rad(), 0.01);
 }
 
 }  // namespace
