@@ -58,7 +58,8 @@ python3-opencv: images in scripts'
 readonly LINT='
 clang-format clang-tidy shellcheck: checks of style'
 readonly CLANG='
-clang libclang-rt-dev: fuzzing'
+clang libclang-rt-dev: fuzzing
+python3-clang: mutation testing'
 readonly RVIZ='
 rviz xvfb: rviz and a virtual display
 python3-tk: the window of plot_status.py'

@@ -11,7 +11,7 @@ usage() {
 Usage: mutate.sh [--sample N] [--jobs N] [--fresh] [--test FOLDER ...]
 Puts mutants into a copy of src/localization and src/geo: comparisons, arithmetic, constants, conditions and limits are
 changed, and calls and assignments left out. All are in one build; then the tests that reach a mutant run with it,
-until one fails. Needs python3-clang-14 (install_dependencies.sh --with-clang).
+until one fails. Needs python3-clang (install_dependencies.sh --with-clang).
   --sample N  only N mutants, chosen at random, always the same ones (default: all)
   --jobs N    mutants at a time (default: the number of cores)
   --fresh     forget the outcomes of a run before; otherwise those that are known are kept
