@@ -128,6 +128,21 @@ TEST(DrawnFrom, TheBestAndTheRivalsAreAmongTheDraws) {
   for (std::size_t i = 0; i < counts.size(); ++i) EXPECT_NEAR(counts[i], i == 7 ? 5500 : 500, 150);
 }
 
+// Half by weight, half all alike; weights need not sum to one.
+TEST(DrawnFrom, HalfOfTheDrawsAreByWeight) {
+  std::vector<Particle> cloud(3);
+  for (std::size_t i = 0; i < 3; ++i) cloud[i].position_m = {static_cast<double>(i), 0.0};
+  cloud[0].weight = 0.08;
+  cloud[1].weight = 0.02;
+  const Prior prior = drawnFrom(cloud);
+  Random random(3);
+  std::vector<double> shares(3, 0.0);
+  for (int i = 0; i < 20000; ++i) shares[static_cast<std::size_t>(prior(random).x())] += 1.0 / 20000.0;
+  EXPECT_NEAR(shares[0], 0.5 * 0.8 + 0.5 / 3.0, 0.02);
+  EXPECT_NEAR(shares[1], 0.5 * 0.2 + 0.5 / 3.0, 0.02);
+  EXPECT_NEAR(shares[2], 0.5 / 3.0, 0.02);
+}
+
 TEST(DrawnFrom, WithoutWeightsAllAreAlikeAndWithoutParticlesThereIsNoPrior) {
   Random random(1);
   EXPECT_TRUE(drawnFrom(std::vector<Particle>(3))(random).allFinite());
