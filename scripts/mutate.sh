@@ -53,7 +53,8 @@ main() {
   if [[ $fresh == yes ]]; then rm -f "$work/outcomes.jsonl"; fi
   "$repo/scripts/mutants.py" run --mutants "$work/mutants.json" --out "$work/outcomes.jsonl" "${options[@]}" \
     "${programs[@]}"
-  "$repo/scripts/mutants.py" report "$work/outcomes.jsonl" | tee "$work/report.md" | sed '/^$/q'
+  "$repo/scripts/mutants.py" report "$work/outcomes.jsonl" >"$work/report.md"
+  sed '/^$/,$d' "$work/report.md"
   echo "survivors: $work/report.md"
 }
 

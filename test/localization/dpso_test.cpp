@@ -40,7 +40,7 @@ TEST(Dpso, ParticlesStayInTheArea) {
   Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 2);
   const Area& area = world.map().area();
   for (int step = 0; step < 50; ++step) {
-    tracker.update(step % 10 == 9 ? world.inTheDark() : world.from(onCircle(0.6 * step)));
+    tracker.update(step % 10 == 9 ? world.inTheDark() : world.from(onCircle(4.0 * step)));  // all around
     for (const Particle& particle : tracker.particles()) {
       ASSERT_TRUE((particle.position_m.array() >= area.min_m.array()).all());
       ASSERT_TRUE((particle.position_m.array() <= area.max_m.array()).all());

@@ -380,5 +380,22 @@ TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
   }
 }
 
+TEST_F(LocalizerRules, APlaceHasTheHeadingOfItsTrainingImages) {
+  std::vector<Eigen::Vector2d> north;
+  for (int i = 0; i < 60; ++i) north.emplace_back(0.0, 1.0 * i);
+  make({}, test::mapAt(north));
+  Estimate estimate;
+  for (int i = 0; i < 40; ++i) {
+    image_->position_m = {0.0, 20.0};
+    estimate = localizer_->process((i + 1) * kSecond_ns, cv::Mat());
+  }
+  EXPECT_NEAR(estimate.pose.yaw_rad, std::acos(0.0), 1e-6);
+}
+
+TEST_F(LocalizerRules, TheReportIsThatOfTheImage) {
+  image_->features = 42;
+  EXPECT_EQ(see(20.0).image.features_kept, 42U);
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -87,6 +87,21 @@ TEST_F(MetricEstimate, AVerifiedPoseBringsTheParticles) {
   }
 }
 
+TEST_F(MetricEstimate, APoseThatIsNotConfirmedLeavesTheParticles) {
+  LocalizerConfig config;
+  config.state.max_step_m = 2.0;
+  make(config);
+  for (std::size_t i = 3; i < 8; ++i) see(i);
+  const Estimate estimate = show(street_.fewSeenFrom(street_.trueNear(40, kHere_m), 40, 30));
+  ASSERT_TRUE(estimate.metric);
+  ASSERT_FALSE(estimate.metric->confirmed) << "fewer than twice the inliers, and nothing predicts it";
+  double farthest_m = 0.0;
+  for (const Particle& particle : localizer_->particles()) {
+    farthest_m = std::max(farthest_m, (particle.position_m - positionOf(40)).norm());
+  }
+  EXPECT_GT(farthest_m, 10.0);
+}
+
 TEST_F(MetricEstimate, AMountHoldsFromTheNextImageAndForgetsTheMotion) {
   for (std::size_t i = 10; i < 14; ++i) see(i);
   const Estimate before = seeFew(14);

@@ -204,5 +204,23 @@ TEST(MotionModel, ParticlesStartInAllDirections) {
   for (const int count : quadrants) EXPECT_NEAR(count, 1000, 150);
 }
 
+TEST(MotionModel, OfALinearFilterTurnsBySixtyDegrees) {
+  const auto map = test::mapAt({{0.0, 0.0}, {10.0, 0.0}});
+  ParticleFilterConfig config;
+  config.pull = 0.0;
+  const auto motion = makeMotionModel("pf_linear", config, *map);
+  Random random(11);
+  double cosine = 0.0;
+  for (int i = 0; i < 4000; ++i) {
+    Particle particle;
+    particle.velocity_m = {2.0, 0.0};
+    motion->move(particle, Travel(), random);
+    cosine += particle.velocity_m.normalized().x() / 4000.0;
+    EXPECT_NEAR(particle.velocity_m.norm(), 2.0, 0.02) << "its speed hardly changes";
+    EXPECT_EQ(particle.position_m, particle.velocity_m);
+  }
+  EXPECT_NEAR(cosine, std::exp(-0.5 * kPi * kPi / 9.0), 0.03) << "mean cosine of a normal angle";
+}
+
 }  // namespace
 }  // namespace visual_localization

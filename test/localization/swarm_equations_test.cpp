@@ -356,6 +356,11 @@ TEST(SwarmEquations, RecoveryIsStepwiseAndEndsAtTheConfiguration) {
   EXPECT_EQ(swarm.tuning().v0, config.v0) << "not the limit of the slow robot before";
   EXPECT_EQ(swarm.tuning().quantum_share, config.quantum_share);
   EXPECT_EQ(swarm.tuning().phi2, config.phi2);
+  const Eigen::Vector2d before_m = centreOfTravellers(swarm);
+  swarm.update(world.from(onCircle(12.0)));
+  const Eigen::Vector2d step_m = centreOfTravellers(swarm) - before_m;
+  EXPECT_NEAR(swarm.tuning().speed_ema, step_m.cwiseQuotient(world.map().area().range()).norm(), 1e-12)
+      << "the speed of the search is forgotten";
 }
 
 TEST(SwarmEquations, ALimitBelowTheConfiguredOneRisesInARecoveryToo) {
