@@ -588,7 +588,6 @@ def report(options) -> int:
     for entry in outcomes.values():
         by_file[entry['file']].append(entry)
     print('| file | mutants | killed | survived | not reached | killed [%] |\n|---|---|---|---|---|---|')
-    total = defaultdict(int)
     for path, entries in sorted(by_file.items()) + [('all', list(outcomes.values()))]:
         count = defaultdict(int)
         for entry in entries:
@@ -596,7 +595,6 @@ def report(options) -> int:
         killed = count['killed'] + count['timed out']
         print(f'| {path} | {len(entries)} | {killed} | {count["survived"]} | {count["not reached"]} | '
               f'{100.0 * killed / len(entries):.1f} |')
-        total[path] = killed
     print()
     for path, entries in sorted(by_file.items()):
         for entry in sorted(entries, key=lambda e: (e['line'], e['id'])):

@@ -8,13 +8,14 @@ tests=(localization geo)
 
 usage() {
   cat <<'USAGE'
-Usage: mutate.sh [--sample N] [--jobs N] [--fresh] [--test FOLDER ...]
+Usage: mutate.sh [--sample N] [--seed N] [--jobs N] [--fresh] [--test FOLDER ...]
 Puts mutants into a copy of src/localization and src/geo: comparisons, arithmetic, constants, conditions and limits are
 changed, and calls and assignments left out. All are in one build; then the tests that reach a mutant run with it,
 until one fails. Needs python3-clang (install_dependencies.sh --with-clang).
-  --sample N  only N mutants, chosen at random, always the same ones (default: all)
+  --sample N  only N mutants, chosen at random (default: all)
+  --seed N    of that choice (default: 1)
   --jobs N    mutants at a time (default: the number of cores)
-  --fresh     forget the outcomes of a run before; otherwise those that are known are kept
+  --fresh     forget the outcomes of a run before; do so after any change of code or tests
   --test F    test programs of these folders, until the end of the line (default: localization geo)
 Writes build/mutation/outcomes.jsonl and build/mutation/report.md. With two cores: about 10 minutes to build, an hour to
 run all. Exit code 0 when the run is complete, whatever survived.
@@ -33,6 +34,7 @@ main() {
   while (($#)); do
     case $1 in
       --sample) options+=(--sample "${2:?--sample needs a number}"); shift ;;
+      --seed) options+=(--seed "${2:?--seed needs a number}"); shift ;;
       --jobs) options+=(--jobs "${2:?--jobs needs a number}"); shift ;;
       --fresh) fresh=yes ;;
       --test) shift; tests=("$@"); break ;;

@@ -36,7 +36,7 @@ struct MethodSpec {
   LocalizerConfig localizer;  ///< its `features` hold for place recognisers too
   PlaceRecogniserConfig recogniser;
   double speed = 1.0;          ///< simulated speed: images of the drive per step
-  bool kidnapped = false;      ///< carried to the other side of the drive after half of the run
+  bool kidnapped = false;      ///< carried by half of the drive, back on an open one after half of the run
   double map_gap = 0.0;        ///< share of the map's images that are left out
   double map_spacing_m = 0.0;  ///< training images nearer than this to the last one are left out
   double covered = 0.0;        ///< share of the run, after its half, during which something covers the camera

@@ -88,7 +88,7 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.stamp_ns = stamp_ns;
   estimate.state = state;
   estimate.metric = metric;
-  estimate.images_since_metric = verifier_->imagesSince();
+  estimate.images_since_metric = isMetric() ? verifier_->imagesSince() : 0;
   estimate.tracked = tracked;
   if (const auto session = sessions_->chosen()) estimate.session = map_->header().sessions[*session].name;
   choosePose(estimate);

@@ -25,6 +25,7 @@ void Localizer::configure(const LocalizerConfig& config) {
 void Localizer::setCamera(const CameraModel& camera) {
   camera_ = camera.scaledTo(map_->header().image_size);
   verifier_->resetCamera();
+  last_.reset();
 }
 
 void Localizer::setMount(const SensorMount& mount) {

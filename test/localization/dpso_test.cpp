@@ -330,7 +330,7 @@ TEST(Dpso, AShareOfTheParticlesMovesWithTheOdometryAndTheSpeedIsWithoutIt) {
       EXPECT_TRUE(way_m == 0.0 || std::abs(way_m - 3.0) < 1e-9) << way_m;
       moved += way_m > 1.0 ? 1 : 0;
     }
-    EXPECT_NEAR(moved, share * 80.0, share == 0.5 ? 20.0 : 0.0);
+    EXPECT_NEAR(moved, share * 80.0, share == 0.5 ? 10.0 : 0.0);
     EXPECT_NEAR(swarm.tuning().speed_ema, 0.0, 1e-12) << "the swarm itself did not move";
   }
 }

@@ -355,6 +355,15 @@ TEST_F(LocalizerRules, WhatIsToldMeanwhileIsNewsToARepeatedImage) {
   localizer_->setMount({});
   see(20.0, 0.0);
   EXPECT_GT(image_->compared, compared) << "another mount";
+  Intrinsics lens;
+  lens.size = {320, 240};
+  lens.fx = lens.fy = 300.0;
+  lens.cx = 160.0;
+  lens.cy = 120.0;
+  compared = image_->compared;
+  localizer_->setCamera(CameraModel(lens));
+  see(20.0, 0.0);
+  EXPECT_GT(image_->compared, compared) << "another camera";
 }
 
 TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {

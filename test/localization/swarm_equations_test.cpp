@@ -363,7 +363,7 @@ TEST(SwarmEquations, RecoveryIsStepwiseAndEndsAtTheConfiguration) {
       << "the speed of the search is forgotten";
 }
 
-TEST(SwarmEquations, ALimitBelowTheConfiguredOneRisesInARecoveryToo) {
+TEST(SwarmEquations, WhatIsAtItsLimitStaysThereInARecovery) {
   World world = roundWorld();
   DpsoConfig config;
   config.recovery = "paper";

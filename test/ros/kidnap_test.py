@@ -59,6 +59,7 @@ class KidnapTest(unittest.TestCase):
         self.drive(AFTER_S)
 
     def test_a_jump_that_nobody_announces(self):
+        """The stamps jump too, as after a pause."""
         self.drive(BEFORE_S)
         self.localizer.fix.clear()
         self.localizer.status.clear()
