@@ -180,11 +180,13 @@ std::optional<MetricPose> Localizer::poseNearProposal(const TrackerEstimate& tra
   std::optional<MetricPose> pose = verifier_->nearOneOf(scores_.mostSimilar());
   if (!pose) pose = verifier_->nearOneOf(sweep_.mostSimilar(scores_, kSweptImages));  // wherever that may be
   geometry_ms_ += stopwatch.elapsed_ms();
-  if (pose) bringTracker(tracked, *pose);
+  if (!pose) return pose;
+  tracker_->attract(pose->base.translation().head<2>());
+  bringTracker(tracked, *pose);
   return pose;
 }
 
-/// A verified pose takes the place of all comparisons but one: that with the training image that it is nearest to.
+/// A verified pose takes the place of all comparisons but one: that with the training image whose landmarks agree most.
 TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric) {
   const Travel travel{tracked_ns_ ? odometry_.between(*tracked_ns_, stamp_ns) : std::nullopt};
   tracked_ns_ = stamp_ns;
@@ -192,7 +194,7 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
   const Eigen::Vector2d position_m = metric->base.translation().head<2>();
   TrackerEstimate tracked = tracker_->update({scores_, sweep_, travel, position_m});
   bringTracker(tracked, *metric);
-  tracked.best_image = verifier_->compared().front();
+  tracked.best_image = verifier_->matched().training_image;
   tracked.best = scores_[tracked.best_image];
   tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
   return tracked;
@@ -205,10 +207,9 @@ void Localizer::learnSession(const TrackerEstimate& tracked) {
   if (trial) sessions_->learn(best, tracked.best.weight, *trial, scores_[*trial].weight);
 }
 
-/// To a pose that landmarks verify: the next image is searched around it.
+/// To a pose that landmarks confirm, from far away.
 void Localizer::bringTracker(const TrackerEstimate& tracked, const MetricPose& metric) {
   const Eigen::Vector2d position_m = metric.base.translation().head<2>();
-  tracker_->attract(position_m);
   const double farthest_m = std::max((tracked.position_m - position_m).norm(), tracked.spread_m.maxCoeff());
   if (metric.confirmed && farthest_m > config_.state.max_step_m) {
     tracker_->reset(normallyDistributed(position_m, Eigen::Matrix2d::Identity()));
@@ -273,7 +274,7 @@ Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool rec
 }
 
 LocalizationState Localizer::doubt() {
-  verifier_->reset();  // the motion may have been another meanwhile
+  verifier_->doubtMotion();
   const LocalizationState state = assessor_.doubt(tracker_->tuning().recovering);
   if (last_) {
     last_->state = state;

@@ -50,7 +50,7 @@ std::optional<PoseVerifier::Prediction> PoseVerifier::byOdometry() const {
 }
 
 std::optional<PoseVerifier::Prediction> PoseVerifier::byVelocity() const {
-  if (!last_) return std::nullopt;
+  if (!last_ || !last_->velocity_holds) return std::nullopt;
   const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
   if (!(elapsed_s >= 0.0 && elapsed_s <= config_.max_gap_s)) return std::nullopt;
   const MetricPose& last = last_->pose;

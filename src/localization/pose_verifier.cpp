@@ -12,42 +12,10 @@
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kImages = 20;
-constexpr double kLeastSigma = 0.003;  ///< landmarks err alike for neighbouring images
-constexpr double kSure = 0.01;         ///< a larger standard deviation of the mean says nothing yet
-constexpr double kSigmas = 3.0;
-
-}  // namespace
-
-void FocalCheck::add(double scale, double sigma) {
-  if (!std::isfinite(scale) || !std::isfinite(sigma)) return;
-  if (images_.size() == kImages) images_.erase(images_.begin());
-  images_.push_back({scale, 1.0 / (sigma * sigma + kLeastSigma * kLeastSigma)});
-}
-
-double FocalCheck::scale() const {
-  double sum = 0.0;
-  double weights = 0.0;
-  for (const Image& image : images_) {
-    sum += image.weight * image.scale;
-    weights += image.weight;
-  }
-  return weights > 0.0 ? sum / weights : 1.0;
-}
-
-double FocalCheck::sigma() const {
-  double weights = 0.0;
-  for (const Image& image : images_) weights += image.weight;
-  return 1.0 / std::sqrt(weights);
-}
-
-bool FocalCheck::contradicts() const {
-  return !images_.empty() && std::abs(scale() - 1.0) > max_error_ + kSigmas * sigma();
-}
-
-bool FocalCheck::confirms() const { return !images_.empty() && sigma() <= kSure && !contradicts(); }
-
-namespace {
+constexpr std::size_t kFocalImages = 20;
+constexpr double kLeastFocalSigma = 0.003;  ///< landmarks err alike for neighbouring images
+constexpr double kSureFocalSigma = 0.01;    ///< a larger standard deviation of the mean says nothing yet
+constexpr double kFocalSigmas = 3.0;
 
 constexpr std::size_t kHypotheses = 2;  ///< of positions that look alike
 constexpr double kApart_m = 5.0;        ///< training images closer than this belong to one hypothesis
@@ -68,6 +36,34 @@ MetricPose::Covariance atBase(const MetricPose::Covariance& of_camera, const Met
 
 }  // namespace
 
+void FocalCheck::add(double scale, double sigma) {
+  if (!std::isfinite(scale) || !std::isfinite(sigma)) return;
+  if (images_.size() == kFocalImages) images_.erase(images_.begin());
+  images_.push_back({scale, 1.0 / (sigma * sigma + kLeastFocalSigma * kLeastFocalSigma)});
+}
+
+double FocalCheck::scale() const {
+  double sum = 0.0;
+  double weights = 0.0;
+  for (const Image& image : images_) {
+    sum += image.weight * image.scale;
+    weights += image.weight;
+  }
+  return weights > 0.0 ? sum / weights : 1.0;
+}
+
+double FocalCheck::sigma() const {
+  double weights = 0.0;
+  for (const Image& image : images_) weights += image.weight;
+  return 1.0 / std::sqrt(weights);
+}
+
+bool FocalCheck::contradicts() const {
+  return !images_.empty() && std::abs(scale() - 1.0) > max_error_ + kFocalSigmas * sigma();
+}
+
+bool FocalCheck::confirms() const { return !images_.empty() && sigma() <= kSureFocalSigma && !contradicts(); }
+
 void PoseVerifier::configure(const MetricConfig& config) {
   config_ = config;
   focal_.configure(config.max_focal_error);
@@ -76,6 +72,10 @@ void PoseVerifier::configure(const MetricConfig& config) {
 void PoseVerifier::reset() {
   last_.reset();
   elsewhere_ = 0;
+}
+
+void PoseVerifier::doubtMotion() {
+  if (last_) last_->velocity_holds = false;
 }
 
 void PoseVerifier::useOdometry(const OdometryTrack& track, const OdometryConfig& config) {
@@ -243,8 +243,8 @@ MetricPose PoseVerifier::accepted(MetricPose pose) {
   const std::optional<bool> odometry_agrees = odometryAgrees(pose);
   pose.confirmed = !isElsewhere(pose, odometry_agrees) && focal_.confirms() && clear;
   if (odometry_agrees) judgeOdometry(*odometry_agrees);
-  Known known{stamp_ns_, pose, {}};
-  if (last_) {
+  Known known{stamp_ns_, pose, {}, true};
+  if (last_ && last_->velocity_holds) {
     const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
     if (elapsed_s > 0.0 && elapsed_s <= config_.max_gap_s) {
       known.velocity_mps = (pose.base.translation() - last_->pose.base.translation()).head<2>() / elapsed_s;

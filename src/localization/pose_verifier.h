@@ -71,8 +71,11 @@ class PoseVerifier {
   /// How far odometry moves since the last verified pose are believed, from now on. Until then there is none. `track`
   /// must outlive it.
   void useOdometry(const OdometryTrack& track, const OdometryConfig& config);
-  /// Forgets the motion.
+  /// The robot may be anywhere: forgets the last verified pose. How far odometry is believed does not depend on where
+  /// the robot is, and stays.
   void reset();
+  /// For a while nothing was seen: the velocity no longer holds, but what odometry says of the way since does.
+  void doubtMotion();
   /// Another camera, or another calibration of it.
   void resetCamera() { focal_.reset(); }
   /// The next image. Its features, not pruned, must live until the one after it.
@@ -93,7 +96,7 @@ class PoseVerifier {
   const MatchedLandmarks& matched() const { return matched_; }
   /// What the last images say about the calibration. While they contradict it no pose is verified.
   const FocalCheck& focal() const { return focal_; }
-  /// Images since the last verified one; 0 when it was the last.
+  /// Images since the last verified one; 0 when it was the last. No reset changes it.
   std::size_t imagesSince() const { return images_since_; }
 
  private:
@@ -101,6 +104,7 @@ class PoseVerifier {
     std::int64_t stamp_ns = 0;
     MetricPose pose;
     std::optional<Eigen::Vector2d> velocity_mps;
+    bool velocity_holds = true;
   };
   /// A landmark and the feature of the image that seems to show it.
   struct Match {

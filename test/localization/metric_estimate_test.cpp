@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -35,6 +36,13 @@ class MetricEstimate : public testing::Test {
   Estimate show(SiftFeatures features) {
     image_->features = std::move(features);
     return localizer_->process(++images_ * kSecond_ns, cv::Mat());
+  }
+  /// Ten readings until the next image, of a robot that drives a metre to `x_m`, or `way_m` if its wheels slip.
+  void odometryTo(double x_m, double way_m = 1.0) {
+    for (int k = 1; k <= 10; ++k) {
+      const std::int64_t stamp_ns = images_ * kSecond_ns + k * kSecond_ns / 10;
+      localizer_->addOdometry({stamp_ns, {x_m - way_m + 0.1 * k * way_m, 0.0}, 0.0});
+    }
   }
   Eigen::Vector2d positionOf(std::size_t i) const { return street_.mappedNear(i, kHere_m).position_m.head<2>(); }
 
@@ -134,28 +142,69 @@ TEST_F(MetricEstimate, DoubtForgetsTheMotion) {
   EXPECT_NE(seeFew(14).source, PoseSource::kMetric);
 }
 
+// Carried for four metres while nothing was seen: that is no velocity.
+TEST_F(MetricEstimate, NoVelocityIsTakenAcrossADoubt) {
+  for (std::size_t i = 10; i < 14; ++i) see(i);
+  localizer_->doubt();
+  ASSERT_EQ(see(17).source, PoseSource::kMetric);
+  const Estimate led = seeNothing();
+  EXPECT_LT((led.pose.position_m - positionOf(17)).norm(), 0.5);
+}
+
+TEST_F(MetricEstimate, ADoubtLeavesOdometry) {
+  std::vector<Eigen::Vector2d> led_m[2];
+  for (const bool doubts : {false, true}) {
+    make({});
+    for (std::size_t i = 10; i < 14; ++i) {
+      odometryTo(static_cast<double>(i));
+      see(i);
+    }
+    if (doubts) localizer_->doubt();
+    for (std::size_t i = 14; i < 20; ++i) {
+      odometryTo(static_cast<double>(i));
+      led_m[doubts ? 1 : 0].push_back(seeNothing().pose.position_m);
+    }
+  }
+  for (std::size_t k = 0; k < 6; ++k) EXPECT_LT((led_m[1][k] - led_m[0][k]).norm(), 0.05) << k;
+  EXPECT_NEAR((led_m[1].back() - led_m[1].front()).norm(), 5.0, 1e-6) << "a metre for each image";
+}
+
+// The wheels turn twelve metres while the robot drives one: what it is compared with first lies far ahead.
+TEST_F(MetricEstimate, ItsBestImageIsThatOfThePoseWhenTheWheelsSlip) {
+  LocalizerConfig config;
+  config.odometry.max_speed_mps = 20.0;
+  make(config);
+  double x_m = 10.0;
+  for (std::size_t i = 10; i < 14; ++i) {
+    odometryTo(x_m += 1.0);
+    see(i);
+  }
+  odometryTo(x_m + 12.0, 12.0);
+  const Estimate estimate = see(14);
+  ASSERT_EQ(estimate.source, PoseSource::kMetric);
+  EXPECT_LT((estimate.pose.position_m - positionOf(14)).norm(), 0.3);
+  EXPECT_LT(estimate.tracked.best_distance_m, 5.0);
+}
+
 TEST_F(MetricEstimate, OdometryIsJudgedByThePresentParameters) {
-  const auto driveTo = [this](double x_m) {
-    for (int k = 0; k < 10; ++k)
-      localizer_->addOdometry({(images_ * 10 + k) * kSecond_ns / 10, {x_m + 0.1 * k, 0.0}, 0.0});
-  };
   for (const double max_speed_mps : {10.0, 0.5}) {
     make({});
     LocalizerConfig config;
     config.odometry.max_speed_mps = max_speed_mps;
     localizer_->configure(config);
     for (std::size_t i = 2; i < 6; ++i) {
-      driveTo(static_cast<double>(i));
+      odometryTo(static_cast<double>(i));
       see(i);
     }
     for (std::size_t i = 6; i < 14; ++i) {
-      driveTo(static_cast<double>(i));
+      odometryTo(static_cast<double>(i));
       seeNothing();
     }
-    driveTo(14.0);
+    odometryTo(14.0);
     const Estimate estimate = seeNothing();
     const double error_m = (estimate.pose.position_m - positionOf(14)).norm();
-    EXPECT_EQ(error_m<2.0, max_speed_mps> 1.0) << error_m << " m; each reading is a jump at most";
+    const bool believed = max_speed_mps > 1.0;
+    EXPECT_EQ(error_m < 2.0, believed) << error_m << " m; each reading is a jump at most";
   }
 }
 
