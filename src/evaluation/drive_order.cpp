@@ -71,7 +71,7 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const
   const std::size_t carried = shape.closed ? images / 2 : images - back;
   std::vector<std::size_t> order(steps);
   for (std::size_t step = 0; step < steps; ++step) {
-    const std::size_t jump = shape.kidnapped && step >= steps / 2 ? carried : 0;
+    const std::size_t jump = shape.kidnapped && step > 0 && step >= steps / 2 ? carried : 0;
     order[step] = (start + travelledAt(step) + jump) % images;
   }
   return order;

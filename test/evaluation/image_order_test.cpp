@@ -42,6 +42,7 @@ TEST(ImageOrder, OnAnOpenRoundTheRobotIsCarriedBack) {
   EXPECT_THAT(imageOrder(7, 0, shape), ElementsAre(0, 1, 2, 0, 1, 2, 3));
   EXPECT_THAT(imageOrder(8, 3, shape), ElementsAre(3, 4, 1, 2, 3));
   EXPECT_THAT(imageOrder(1, 0, shape), ElementsAre(0));
+  EXPECT_THAT(imageOrder(6, 2, RunShape{kOpen, 64.0, true}), ElementsAre(2));
   shape.speed = 3.0;
   EXPECT_THAT(imageOrder(10, 0, shape), ElementsAre(0, 3, 1, 4));
   for (std::size_t images = 1; images < 40; ++images) {
@@ -51,7 +52,12 @@ TEST(ImageOrder, OnAnOpenRoundTheRobotIsCarriedBack) {
         const std::vector<std::size_t> order = imageOrder(images, start, shape);
         std::size_t jumps = 0;
         for (std::size_t i = 1; i < order.size(); ++i) jumps += order[i] < order[i - 1] ? 1 : 0;
+        EXPECT_EQ(order.front(), start);
         EXPECT_LE(jumps, 1U) << images << " images from " << start << ": it is carried once";
+        if (speed != 1.0) continue;
+        std::size_t carried = 0;
+        for (std::size_t i = 1; i < order.size(); ++i) carried += order[i] != order[i - 1] + 1 ? 1 : 0;
+        EXPECT_EQ(carried, order.size() > 1 ? 1U : 0U) << images << " images from " << start;
       }
     }
   }
