@@ -1,143 +1,22 @@
 #!/usr/bin/python3
-"""Puts mutants into C++ files, runs the tests on each, and reports which no test notices. See mutate.sh.
+"""Puts mutants into C++ files. See mutate.sh.
 
 All mutants are in one program: each place that can be mutated asks whether its mutant is the active one (environment
 variable MUTANT), so that one build serves them all. Places are found by libclang.
 """
 import argparse
-import concurrent.futures
 import json
-import os
-import random
 import re
-import resource
+import shlex
+import shutil
 import subprocess
 import sys
-import tempfile
-import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 
 from clang.cindex import CursorKind, Index, TypeKind
 
-RUNTIME = r'''#pragma once
-// Written by scripts/mutants.py: what a place with mutants asks.
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <type_traits>
-#include <utility>
-
-#include <Eigen/Core>
-
-namespace mutation {
-
-inline constexpr int kMost = 1 << 16;
-
-struct State {
-  int active = -1;
-  const char* log = nullptr;
-  bool reached[kMost] = {};
-
-  State() : log(std::getenv("MUTANTS_REACHED")) {
-    if (const char* text = std::getenv("MUTANT")) active = std::atoi(text);
-  }
-  ~State() {
-    if (log == nullptr) return;
-    std::FILE* file = std::fopen(log, "a");
-    if (file == nullptr) return;
-    for (int id = 0; id < kMost; ++id) {
-      if (reached[id]) std::fprintf(file, "%d\n", id);
-    }
-    std::fclose(file);
-  }
-};
-inline State state;
-
-inline bool on(int id) {
-  if (state.log != nullptr) state.reached[id] = true;
-  return id == state.active;
-}
-
-inline bool truth(int id, bool value) { return on(id) ? !value : value; }
-inline bool forced(int id, bool to, bool value) { return on(id) ? to : value; }
-
-template <class T>
-T constant(int id, T value) {
-  if (!on(id)) return value;
-  if constexpr (std::is_floating_point_v<T>) return value == T(0) ? T(1) : value * T(2);
-  else return static_cast<T>(value + 1);
-}
-inline bool constant(int id, bool value) { return on(id) ? !value : value; }
-
-#define MUTATION_COMPARISON(name, op, boundary, opposite)                       \
-  template <class A, class B>                                                   \
-  bool name(int id, const A& a, const B& b) {                                   \
-    if (on(id)) return a boundary b;                                            \
-    if (on(id + 1)) return a opposite b;                                        \
-    return a op b;                                                              \
-  }
-MUTATION_COMPARISON(less, <, <=, >=)
-MUTATION_COMPARISON(lessEqual, <=, <, >)
-MUTATION_COMPARISON(greater, >, >=, <=)
-MUTATION_COMPARISON(greaterEqual, >=, >, <)
-#undef MUTATION_COMPARISON
-template <class A, class B>
-bool equal(int id, const A& a, const B& b) { return on(id) ? !(a == b) : a == b; }
-template <class A, class B>
-bool unequal(int id, const A& a, const B& b) { return on(id) ? a == b : a != b; }
-
-#define MUTATION_ARITHMETIC(name, op, other)                                                                \
-  template <class A, class B, std::enable_if_t<std::is_arithmetic_v<A> && std::is_arithmetic_v<B>, int> = 0> \
-  auto name(int id, A a, B b) { return on(id) ? a other b : a op b; }
-MUTATION_ARITHMETIC(plus, +, -)
-MUTATION_ARITHMETIC(minus, -, +)
-MUTATION_ARITHMETIC(times, *, /)
-MUTATION_ARITHMETIC(over, /, *)
-#undef MUTATION_ARITHMETIC
-template <class A, class B>
-typename A::PlainObject plus(int id, const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b) {
-  return on(id) ? (a - b).eval() : (a + b).eval();
-}
-template <class A, class B>
-typename A::PlainObject minus(int id, const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b) {
-  return on(id) ? (a + b).eval() : (a - b).eval();
-}
-template <class A, class B>
-void add(int id, A&& a, const B& b) { if (on(id)) a -= b; else a += b; }
-template <class A, class B>
-void subtract(int id, A&& a, const B& b) { if (on(id)) a += b; else a -= b; }
-template <class A, class B>
-void scale(int id, A&& a, const B& b) { if (on(id)) a /= b; else a *= b; }
-
-template <class T>
-T negative(int id, T value) { return on(id) ? value : -value; }
-
-struct Max {
-  int id;
-  template <class T> T operator()(const T& a, const T& b) const { return on(id) ? std::min(a, b) : std::max(a, b); }
-};
-struct Min {
-  int id;
-  template <class T> T operator()(const T& a, const T& b) const { return on(id) ? std::max(a, b) : std::min(a, b); }
-};
-struct Clamp {
-  int id;
-  template <class T> T operator()(const T& value, const T& low, const T& high) const {
-    if (on(id)) return std::min(value, high);
-    if (on(id + 1)) return std::max(value, low);
-    return std::clamp(value, low, high);
-  }
-};
-struct Abs {
-  int id;
-  template <class T> T operator()(T value) const { return on(id) ? value : std::abs(value); }
-};
-
-}  // namespace mutation
-'''
-
+MOST = 1 << 16  # mutants, as in mutation.h
 COMPARISONS = {'<': ('less', '<=', '>='), '<=': ('lessEqual', '<', '>'), '>': ('greater', '>=', '<='),
                '>=': ('greaterEqual', '>', '<')}
 EQUALITIES = {'==': ('equal', '!='), '!=': ('unequal', '==')}
@@ -311,11 +190,14 @@ class Mutator:
             ids = self.add(cursor, [f'without !: {self.text(cursor)}'])
             if ids is not None:
                 self.wrap(start, cursor.extent.end.offset, f'::mutation::truth({ids}, ', ')')
-        elif token == b'-' and self.source[start + 1:start + 2] != b'-' and is_number(cursor.type.get_canonical().kind) and child.extent.start.offset > start:
+        elif self.is_minus(start, child) and is_number(cursor.type.get_canonical().kind):
             ids = self.add(cursor, [f'without -: {self.text(cursor)}'])
             if ids is not None:
                 self.replaced[start] = (start + 1, '')
                 self.wrap(start, cursor.extent.end.offset, f'::mutation::negative({ids}, ', ')')
+
+    def is_minus(self, start: int, operand) -> bool:
+        return re.match(b'-[^-]', self.source[start:start + 2]) is not None and operand.extent.start.offset > start
 
     def visit_literal(self, cursor, parents: list):
         text = self.text(cursor)
@@ -384,10 +266,9 @@ class Mutator:
 
     def add(self, cursor, descriptions: list):
         """The first id of the mutants of a place, or nothing where none may be."""
-        line = cursor.extent.start.line
-        if line in self.left_out or cursor.extent.start.offset < 0:
-            return None
-        if Path(cursor.extent.start.file.name) != self.path if cursor.extent.start.file else True:
+        start = cursor.extent.start
+        line = start.line
+        if line in self.left_out or start.offset < 0 or not start.file or Path(start.file.name) != self.path:
             return None
         first = self.next
         for description in descriptions:
@@ -421,14 +302,13 @@ class Mutator:
                 at, text = self.replaced[offset]
                 out.append(text.encode())
         out.append(self.source[at:])
-        return b'#include "mutation.h" /**/ ' + b''.join(out) if not b''.join(out).startswith(b'#') else \
-            b''.join(out).replace(b'\n', b'\n#include "mutation.h"\n#line 2\n', 1)
+        return b'#include "mutation.h"\n#line 1\n' + b''.join(out)
 
 
 def arguments_of(database: list, path: Path) -> list:
     """How the file is compiled, for libclang."""
     entry = next(e for e in database if Path(e['file']) == path)
-    words = entry['command'].split()[1:]
+    words = shlex.split(entry['command'])[1:]
     kept, skip = [], False
     for word in words:
         if skip:
@@ -437,15 +317,15 @@ def arguments_of(database: list, path: Path) -> list:
             skip = word in ('-o', '-include')
         elif word.startswith(('-I', '-D', '-std', '-isystem')) or not word.startswith('-'):
             kept.append(word)
-    include = subprocess.run(['clang', '-print-resource-dir'], capture_output=True, text=True, check=True).stdout.strip()
-    return kept + ['-isystem', include + '/include']
+    clang = subprocess.run(['clang', '-print-resource-dir'], capture_output=True, text=True, check=True)
+    return kept + ['-isystem', clang.stdout.strip() + '/include']
 
 
 def insert(options) -> int:
     """Mutates the files; those lines that do not compile with mutants are left as they are."""
     source, build = Path(options.source).resolve(), Path(options.build).resolve()
     database = json.loads((build / 'compile_commands.json').read_text())
-    (source / 'src' / 'mutation.h').write_text(RUNTIME)
+    shutil.copy(Path(__file__).with_name('mutation.h'), source / 'src')
     originals = {}
     for folder in options.folder:
         for path in sorted((source / 'src' / folder).glob('*.cpp')):
@@ -459,8 +339,10 @@ def insert(options) -> int:
             mutator = Mutator(path, arguments, len(mutants), left_out)
             path.write_bytes(mutator.mutated())
             entry = next(e for e in database if Path(e['file']) == path)
-            command = re.sub(r' -o \S+', ' -fsyntax-only -w', entry['command']).replace('-Werror', '')
-            result = subprocess.run(command, shell=True, cwd=entry['directory'], capture_output=True, text=True)
+            words = [word for word in shlex.split(entry['command']) if word != '-Werror']
+            output = words.index('-o')
+            words[output:output + 2] = ['-fsyntax-only', '-w']
+            result = subprocess.run(words, cwd=entry['directory'], capture_output=True, text=True, check=False)
             if result.returncode == 0:
                 break
             lines = {int(n) for n in re.findall(rf'{re.escape(path.name)}:(\d+):', result.stderr)} - left_out
@@ -470,163 +352,26 @@ def insert(options) -> int:
         mutants += mutator.mutants
         print(f'{path.relative_to(source)}: {len(mutator.mutants)} mutants'
               + (f', {len(left_out)} lines left as they are' if left_out else ''), flush=True)
+    if len(mutants) > MOST:
+        sys.exit(f'{len(mutants)} mutants, of which mutation.h can tell {MOST} apart')
+    alike = Counter()
     for mutant in mutants:
         mutant['file'] = str(Path(mutant['file']).relative_to(source))
+        text = mutant['file'], mutant['what']
+        mutant['nth'] = alike[text]  # of those that read alike: no edit elsewhere changes who it is
+        alike[text] += 1
     Path(options.out).write_text(json.dumps(mutants, indent=0))
     print(f'{len(mutants)} mutants')
     return 0
 
 
-def limits():
-    resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30))
-    os.nice(5)
-
-
-def run_tests(program: str, tests: list, environment: dict, timeout_s: float) -> str:
-    """'passed', 'failed' or 'timed out'."""
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            result = subprocess.run(
-                [program, '--gtest_filter=' + ':'.join(tests), '--gtest_fail_fast', '--gtest_brief=1'],
-                env={**os.environ, 'TMPDIR': folder, **environment}, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, timeout=timeout_s, preexec_fn=limits, check=False)
-        except subprocess.TimeoutExpired:
-            return 'timed out'
-    return 'passed' if result.returncode == 0 else 'failed'
-
-
-def list_tests(program: str) -> list:
-    names, suite = [], ''
-    text = subprocess.run([program, '--gtest_list_tests'], capture_output=True, text=True, check=True).stdout
-    for line in text.splitlines():
-        if not line.startswith(' '):
-            suite = line.split()[0] if line.strip() else suite
-        elif suite and suite.endswith('.'):
-            names.append(suite + line.split()[0])
-    return names
-
-
-class Suite:
-    """Which tests of the programs reach which mutants, and how long each takes. Those that take longer than
-    `slowest_s` are left out."""
-
-    def __init__(self, programs: list, jobs: int, slowest_s: float):
-        self.reached, self.seconds, self.reach = defaultdict(list), {}, {}
-        tests = [(program, test) for program in programs for test in list_tests(program)]
-        with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-            for (program, test), (seconds, ids) in zip(tests, pool.map(lambda t: self.record(*t), tests)):
-                self.seconds[(program, test)] = seconds
-                self.reach[(program, test)] = len(ids)
-                for mutant in ids if seconds <= slowest_s else ():
-                    self.reached[mutant].append((program, test))
-
-    @staticmethod
-    def record(program: str, test: str):
-        with tempfile.NamedTemporaryFile('r', suffix='.reached') as log:
-            start = time.monotonic()
-            if run_tests(program, [test], {'MUTANTS_REACHED': log.name}, 900) != 'passed':
-                sys.exit(f'{test} of {program} fails without any mutant')
-            return time.monotonic() - start, {int(line) for line in log.read().split()}
-
-    def judge(self, mutant: int) -> str:
-        """'killed', 'timed out', 'survived', or 'not reached'."""
-        by_program = defaultdict(list)
-        for program, test in self.reached.get(mutant, []):
-            by_program[program].append(test)
-        if not by_program:
-            return 'not reached'
-        for program, tests in by_program.items():
-            for part in self.parts(program, tests):
-                expected_s = sum(self.seconds[(program, test)] for test in part)
-                outcome = run_tests(program, part, {'MUTANT': str(mutant)}, 20.0 + 10.0 * expected_s)
-                if outcome != 'passed':
-                    return 'killed' if outcome == 'failed' else outcome
-        return 'survived'
-
-    def parts(self, program: str, tests: list):
-        """Those that reach the fewest places first, since they look at them; in parts, because most mutants die soon."""
-        part, part_s, most_s = [], 0.0, 0.3
-        for test in sorted(tests, key=lambda test: self.reach[(program, test)]):
-            part.append(test)
-            part_s += self.seconds[(program, test)]
-            if part_s > most_s:
-                yield part
-                part, part_s, most_s = [], 0.0, 4.0 * most_s
-        if part:
-            yield part
-
-
-def run(options) -> int:
-    """Runs the tests on each mutant and writes the outcome after each, so that a stopped run goes on."""
-    mutants = json.loads(Path(options.mutants).read_text())
-    results = Path(options.out)
-    done = {}
-    if results.exists():
-        done = {entry['id']: entry for entry in map(json.loads, results.read_text().splitlines())}
-    chosen = [m for m in mutants if m['id'] not in done]
-    if options.sample and options.sample < len(mutants):
-        picked = set(random.Random(options.seed).sample(range(len(mutants)), options.sample))
-        chosen = [m for m in chosen if m['id'] in picked]
-    if options.only:
-        again = set(options.only)
-        chosen = [m for m in mutants if m['id'] in again]
-    print(f'{len(chosen)} mutants to run; what each test reaches is found out first', flush=True)
-    suite = Suite(options.program, options.jobs, options.slowest)
-    with results.open('a') as out, concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        for number, (mutant, outcome) in enumerate(zip(chosen, pool.map(lambda m: suite.judge(m['id']), chosen)), 1):
-            out.write(json.dumps({**mutant, 'outcome': outcome}) + '\n')
-            out.flush()
-            if number % 50 == 0:
-                print(f'{number} of {len(chosen)}', flush=True)
-    return 0
-
-
-def report(options) -> int:
-    """A table of the files and the list of the survivors, as Markdown."""
-    outcomes = {entry['id']: entry for entry in map(json.loads, Path(options.results).read_text().splitlines())}
-    by_file = defaultdict(list)
-    for entry in outcomes.values():
-        by_file[entry['file']].append(entry)
-    print('| file | mutants | killed | survived | not reached | killed [%] |\n|---|---|---|---|---|---|')
-    for path, entries in sorted(by_file.items()) + [('all', list(outcomes.values()))]:
-        count = defaultdict(int)
-        for entry in entries:
-            count[entry['outcome']] += 1
-        killed = count['killed'] + count['timed out']
-        print(f'| {path} | {len(entries)} | {killed} | {count["survived"]} | {count["not reached"]} | '
-              f'{100.0 * killed / len(entries):.1f} |')
-    print()
-    for path, entries in sorted(by_file.items()):
-        for entry in sorted(entries, key=lambda e: (e['line'], e['id'])):
-            if entry['outcome'] in ('survived', 'not reached'):
-                print(f'- {path}:{entry["line"]} #{entry["id"]} {entry["outcome"]}: `{entry["what"]}`')
-    return 0
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    commands = parser.add_subparsers(dest='command', required=True)
-    command = commands.add_parser('insert', help='put the mutants into the files')
-    command.add_argument('--source', required=True)
-    command.add_argument('--build', required=True, help='a configured build of it')
-    command.add_argument('--out', required=True, help='what each mutant is, JSON')
-    command.add_argument('folder', nargs='+', help='folders of src')
-    command.set_defaults(function=insert)
-    command = commands.add_parser('run', help='run the tests on each')
-    command.add_argument('--mutants', required=True)
-    command.add_argument('--out', required=True, help='outcomes, one JSON text a line; those that are there are kept')
-    command.add_argument('--jobs', type=int, default=os.cpu_count())
-    command.add_argument('--sample', type=int, default=0, help='as many, chosen at random')
-    command.add_argument('--slowest', type=float, default=0.5, help='tests that take longer are left out [s]')
-    command.add_argument('--seed', type=int, default=1)
-    command.add_argument('--only', type=int, nargs='*', help='these again')
-    command.add_argument('program', nargs='+', help='GoogleTest programs')
-    command.set_defaults(function=run)
-    command = commands.add_parser('report', help='print the table and the survivors')
-    command.add_argument('results')
-    command.set_defaults(function=report)
-    options = parser.parse_args()
-    return options.function(options)
+    parser.add_argument('--source', required=True)
+    parser.add_argument('--build', required=True, help='a configured build of it')
+    parser.add_argument('--out', required=True, help='what each mutant is, JSON')
+    parser.add_argument('folder', nargs='+', help='folders of src')
+    return insert(parser.parse_args())
 
 
 if __name__ == '__main__':

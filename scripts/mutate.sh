@@ -8,35 +8,37 @@ tests=(localization geo)
 
 usage() {
   cat <<'USAGE'
-Usage: mutate.sh [--sample N] [--seed N] [--jobs N] [--fresh] [--test FOLDER ...]
+Usage: mutate.sh [--sample N] [--seed N] [--jobs N] [--resume] [--test FOLDER ...]
 Puts mutants into a copy of src/localization and src/geo: comparisons, arithmetic, constants, conditions and limits are
 changed, and calls and assignments left out. All are in one build; then the tests that reach a mutant run with it,
 until one fails. Needs python3-clang (install_dependencies.sh --with-clang).
   --sample N  only N mutants, chosen at random (default: all)
   --seed N    of that choice (default: 1)
   --jobs N    mutants at a time (default: the number of cores)
-  --fresh     forget the outcomes of a run before; do so after any change of code or tests
+  --resume    keep the outcomes of a run before; they hold for the code and tests of that run
   --test F    test programs of these folders, until the end of the line (default: localization geo)
 Writes build/mutation/outcomes.jsonl and build/mutation/report.md. With two cores: about 10 minutes to build, an hour to
 run all. Exit code 0 when the run is complete, whatever survived.
 USAGE
 }
 
-# A copy of what git knows, with the changes of the checkout, so that the mutants never stand in the sources.
+# A copy of the checkout as it is, without what git ignores, so that the mutants never stand in the sources.
 copy_sources() {
   rm -rf "$work/source"
   mkdir -p "$work/source"
-  git -C "$repo" ls-files -z | (cd "$repo" && xargs -0 cp --parents -t "$work/source")
+  git -C "$repo" ls-files -z --cached --others --exclude-standard | (cd "$repo" && while IFS= read -r -d '' file; do
+    if [[ -f $file ]]; then printf '%s\0' "$file"; fi  # not one that was deleted
+  done | xargs -0 cp --parents -t "$work/source")
 }
 
 main() {
-  local options=() fresh=no
+  local options=()
   while (($#)); do
     case $1 in
       --sample) options+=(--sample "${2:?--sample needs a number}"); shift ;;
       --seed) options+=(--seed "${2:?--seed needs a number}"); shift ;;
       --jobs) options+=(--jobs "${2:?--jobs needs a number}"); shift ;;
-      --fresh) fresh=yes ;;
+      --resume) options+=(--resume) ;;
       --test) shift; tests=("$@"); break ;;
       -h | --help) usage; exit 0 ;;
       *) usage >&2; exit 2 ;;
@@ -49,13 +51,12 @@ main() {
   cmake -S "$work/source" -B "$build" -DCMAKE_BUILD_TYPE=Release -DVISUAL_LOCALIZATION_ROS=OFF \
     -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
     '-DCMAKE_CXX_FLAGS=-w -D_GLIBCXX_ASSERTIONS' -DCMAKE_CXX_FLAGS_RELEASE=-O2
-  "$repo/scripts/mutants.py" insert --source "$work/source" --build "$build" --out "$work/mutants.json" "${folders[@]}"
+  "$repo/scripts/mutants.py" --source "$work/source" --build "$build" --out "$work/mutants.json" "${folders[@]}"
   cmake --build "$build" --parallel "$(nproc)" --target "${tests[@]/#/test_}"
   for test in "${tests[@]}"; do programs+=("$build/test/test_$test"); done
-  if [[ $fresh == yes ]]; then rm -f "$work/outcomes.jsonl"; fi
-  "$repo/scripts/mutants.py" run --mutants "$work/mutants.json" --out "$work/outcomes.jsonl" "${options[@]}" \
+  "$repo/scripts/mutant_outcomes.py" run --mutants "$work/mutants.json" --out "$work/outcomes.jsonl" "${options[@]}" \
     "${programs[@]}"
-  "$repo/scripts/mutants.py" report "$work/outcomes.jsonl" >"$work/report.md"
+  "$repo/scripts/mutant_outcomes.py" report "$work/outcomes.jsonl" >"$work/report.md"
   sed '/^$/,$d' "$work/report.md"
   echo "survivors: $work/report.md"
 }
