@@ -161,19 +161,6 @@ class Merger {
   std::uint64_t next_id_ = 0;
 };
 
-}  // namespace
-
-std::vector<NamedMap> inOrderOfTime(std::vector<NamedMap> maps) {
-  std::vector<std::pair<decltype(ageOf(*maps.front().map)), std::size_t>> ages;
-  for (std::size_t k = 0; k < maps.size(); ++k) ages.emplace_back(ageOf(*maps[k].map), k);
-  std::sort(ages.begin(), ages.end());
-  std::vector<NamedMap> ordered;
-  for (const auto& [age, k] : ages) ordered.push_back(std::move(maps[k]));
-  return ordered;
-}
-
-namespace {
-
 template <class Target>
 std::vector<MergedMap> mergeTo(const Target& target, const std::vector<NamedMap>& maps, const std::string& edit,
                                std::size_t threads, const Progress& progress) {
@@ -198,6 +185,15 @@ std::vector<MergedMap> mergeTo(const Target& target, const std::vector<NamedMap>
 }
 
 }  // namespace
+
+std::vector<NamedMap> inOrderOfTime(std::vector<NamedMap> maps) {
+  std::vector<std::pair<decltype(ageOf(*maps.front().map)), std::size_t>> ages;
+  for (std::size_t k = 0; k < maps.size(); ++k) ages.emplace_back(ageOf(*maps[k].map), k);
+  std::sort(ages.begin(), ages.end());
+  std::vector<NamedMap> ordered;
+  for (const auto& [age, k] : ages) ordered.push_back(std::move(maps[k]));
+  return ordered;
+}
 
 std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const std::string& path,
                                  std::size_t threads, const Progress& progress) {

@@ -17,6 +17,14 @@ double share(std::size_t part, std::size_t rest) {
   return static_cast<double>(part) / static_cast<double>(part + rest);
 }
 
+constexpr double kInside95 = 5.991464547107979;  // chi squared with two degrees of freedom
+
+/// NaN without any.
+template <class Sum>
+double mean(Sum sum, std::size_t count) {
+  return static_cast<double>(sum) / static_cast<double>(count);
+}
+
 }  // namespace
 
 ErrorStatistics summarise(std::vector<double> errors_m) {
@@ -83,18 +91,6 @@ double Trust::lostPrecision() const { return share(lost_right, lost_wrong); }
 double Trust::lostRecall() const { return share(lost_right, tracking_wrong); }
 double Trust::offMapPrecision() const { return share(off_map_right, off_map_wrong); }
 double Trust::offMapRecall() const { return share(off_map_right, off_map_missed); }
-
-namespace {
-
-constexpr double kInside95 = 5.991464547107979;  // chi squared with two degrees of freedom
-
-/// NaN without any.
-template <class Sum>
-double mean(Sum sum, std::size_t count) {
-  return static_cast<double>(sum) / static_cast<double>(count);
-}
-
-}  // namespace
 
 void PoseErrors::add(const StepErrors& errors) {
   const auto position = static_cast<double>(errors.position_m);

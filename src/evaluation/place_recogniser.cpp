@@ -46,6 +46,11 @@ double localContrast(const std::vector<double>& similarities, const Route& route
   return mean / std::max(deviation, config.min_contrast);
 }
 
+void normalise(std::vector<double>& masses) {
+  const double sum = std::accumulate(masses.begin(), masses.end(), 0.0);
+  for (double& mass : masses) mass /= sum;
+}
+
 }  // namespace
 
 void SequenceConfig::declare(ParameterVisitor& visitor) {
@@ -127,15 +132,6 @@ double SequenceMatcher::confidence(std::size_t best) const {
   if (std::isinf(rival) || rival < least + kRounding) return 0.0;
   return std::min(1.0, (rival - scores_[best]) / (rival - least));
 }
-
-namespace {
-
-void normalise(std::vector<double>& masses) {
-  const double sum = std::accumulate(masses.begin(), masses.end(), 0.0);
-  for (double& mass : masses) mass /= sum;
-}
-
-}  // namespace
 
 void TopologicalBayesConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"bayes/min_step", "1", "training images moved per image at least; negative is backwards (w_l)"},

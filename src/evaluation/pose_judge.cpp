@@ -19,6 +19,25 @@ constexpr double kSpeed_m_s = 10.0;         ///< of a robot that nothing is know
 constexpr double kLongestPause_s = 10.0;
 constexpr double kGate = 30.0;  ///< squared Mahalanobis distance: beyond, it is another place
 
+constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr double kMostNees = 1e9;  ///< of a covariance that leaves no room for an error
+
+float degreesApart(double yaw_rad, double other_rad) {
+  return static_cast<float>(std::abs(angleDifference(other_rad, yaw_rad)) * 180.0 / kPi);
+}
+
+float neesOf(const Eigen::Vector2d& error_m, const Eigen::Matrix2d& covariance_m2) {
+  const double nees = error_m.dot(covariance_m2.inverse() * error_m);
+  return static_cast<float>(nees >= 0.0 ? std::min(nees, kMostNees) : kMostNees);
+}
+
+std::string tumLine(std::int64_t stamp_ns, const Eigen::Vector3d& position_m, const Eigen::Quaterniond& rotation) {
+  std::ostringstream out = numberStream();
+  out << secondsText(stamp_ns) << ' ' << position_m.x() << ' ' << position_m.y() << ' ' << position_m.z() << ' '
+      << rotation.x() << ' ' << rotation.y() << ' ' << rotation.z() << ' ' << rotation.w();
+  return out.str();
+}
+
 }  // namespace
 
 void VelocityFilter::add(std::int64_t stamp_ns, const Eigen::Vector2d& position_m,
@@ -55,29 +74,6 @@ void VelocityFilter::predict(double elapsed_s) {
   state_ = motion * state_;
   covariance_ = motion * covariance_ * motion.transpose() + density * noise;
 }
-
-namespace {
-
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-constexpr double kMostNees = 1e9;  ///< of a covariance that leaves no room for an error
-
-float degreesApart(double yaw_rad, double other_rad) {
-  return static_cast<float>(std::abs(angleDifference(other_rad, yaw_rad)) * 180.0 / kPi);
-}
-
-float neesOf(const Eigen::Vector2d& error_m, const Eigen::Matrix2d& covariance_m2) {
-  const double nees = error_m.dot(covariance_m2.inverse() * error_m);
-  return static_cast<float>(nees >= 0.0 ? std::min(nees, kMostNees) : kMostNees);
-}
-
-std::string tumLine(std::int64_t stamp_ns, const Eigen::Vector3d& position_m, const Eigen::Quaterniond& rotation) {
-  std::ostringstream out = numberStream();
-  out << secondsText(stamp_ns) << ' ' << position_m.x() << ' ' << position_m.y() << ' ' << position_m.z() << ' '
-      << rotation.x() << ' ' << rotation.y() << ' ' << rotation.z() << ' ' << rotation.w();
-  return out.str();
-}
-
-}  // namespace
 
 void judgePose(const Estimate& estimate, const Eigen::Vector2d& truth_m, const std::optional<double>& true_yaw_rad,
                const std::optional<MapError>& map_error, StepRecord& step) {

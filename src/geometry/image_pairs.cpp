@@ -61,6 +61,24 @@ struct Candidate {
   std::uint32_t image;
 };
 
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 5)
+constexpr int kRobustMethod = cv::USAC_MAGSAC;
+#else
+constexpr int kRobustMethod = cv::RANSAC;
+#endif
+constexpr double kConfidence = 0.999;
+constexpr std::size_t kMinimalSample = 5;
+
+Eigen::Quaterniond rotationOf(const cv::Mat& matrix) {
+  Eigen::Matrix3d rotation;
+  cv::cv2eigen(matrix, rotation);
+  return Eigen::Quaterniond(rotation).normalized();
+}
+
+double angle_rad(const Eigen::Quaterniond& rotation) {
+  return rotation.angularDistance(Eigen::Quaterniond::Identity());
+}
+
 }  // namespace
 
 std::vector<std::pair<std::uint32_t, std::uint32_t>> revisits(const std::vector<PathImage>& images) {
@@ -94,28 +112,6 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> revisits(const std::vector<
   }
   return pairs;
 }
-
-namespace {
-
-#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 5)
-constexpr int kRobustMethod = cv::USAC_MAGSAC;
-#else
-constexpr int kRobustMethod = cv::RANSAC;
-#endif
-constexpr double kConfidence = 0.999;
-constexpr std::size_t kMinimalSample = 5;
-
-Eigen::Quaterniond rotationOf(const cv::Mat& matrix) {
-  Eigen::Matrix3d rotation;
-  cv::cv2eigen(matrix, rotation);
-  return Eigen::Quaterniond(rotation).normalized();
-}
-
-double angle_rad(const Eigen::Quaterniond& rotation) {
-  return rotation.angularDistance(Eigen::Quaterniond::Identity());
-}
-
-}  // namespace
 
 std::optional<TwoView> verifyTwoViews(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
                                       const std::vector<FeatureMatch>& matches, double tolerance,

@@ -25,38 +25,6 @@ Eigen::Vector2d velocityAt_m_s(const std::vector<TrajectoryPoint>& path, std::si
   return (after.position_m - before.position_m) / elapsed_s;
 }
 
-}  // namespace
-
-std::vector<PositionObservation> positionsAt(const std::vector<TrajectoryPoint>& images,
-                                             const std::vector<MapFix>& fixes, double sigma_m) {
-  const Trajectory path(images);
-  std::vector<PositionObservation> positions;
-  auto fix = fixes.begin();
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const std::int64_t stamp_ns = images[i].stamp_ns;
-    const std::int64_t before_ns = i == 0 ? kReach_ns : reach(images[i - 1].stamp_ns, stamp_ns);
-    const std::int64_t after_ns = i + 1 == images.size() ? kReach_ns : reach(stamp_ns, images[i + 1].stamp_ns);
-    std::vector<double> east;
-    std::vector<double> north;
-    std::vector<double> sigmas_m;
-    while (fix != fixes.end() && fix->stamp_ns < stamp_ns - before_ns) ++fix;
-    for (; fix != fixes.end() && fix->stamp_ns < stamp_ns + after_ns; ++fix) {
-      const std::optional<TrajectoryPoint> then = path.at(fix->stamp_ns);
-      if (!then) continue;
-      const Eigen::Vector2d moved = fix->position_m + images[i].position_m - then->position_m;
-      east.push_back(moved.x());
-      north.push_back(moved.y());
-      sigmas_m.push_back(fix->sigma_m > 0.0 ? std::clamp(fix->sigma_m, kSmallestSigma_m, kLargestSigma_m) : sigma_m);
-    }
-    if (east.empty()) continue;
-    positions.push_back(
-        {static_cast<std::uint32_t>(i), {median(east), median(north)}, median(sigmas_m), velocityAt_m_s(images, i)});
-  }
-  return positions;
-}
-
-namespace {
-
 constexpr double kBelieved_m = 1.0;        ///< a fix farther from the cleaned path has no altitude to believe either
 constexpr double kReach_m = 20.0;          ///< along the path
 constexpr double kSlope = 0.1;             ///< of usual roads, one sigma
@@ -134,6 +102,34 @@ std::optional<Line> lineAt(double along_m, const std::vector<Altitude>& altitude
 }
 
 }  // namespace
+
+std::vector<PositionObservation> positionsAt(const std::vector<TrajectoryPoint>& images,
+                                             const std::vector<MapFix>& fixes, double sigma_m) {
+  const Trajectory path(images);
+  std::vector<PositionObservation> positions;
+  auto fix = fixes.begin();
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const std::int64_t stamp_ns = images[i].stamp_ns;
+    const std::int64_t before_ns = i == 0 ? kReach_ns : reach(images[i - 1].stamp_ns, stamp_ns);
+    const std::int64_t after_ns = i + 1 == images.size() ? kReach_ns : reach(stamp_ns, images[i + 1].stamp_ns);
+    std::vector<double> east;
+    std::vector<double> north;
+    std::vector<double> sigmas_m;
+    while (fix != fixes.end() && fix->stamp_ns < stamp_ns - before_ns) ++fix;
+    for (; fix != fixes.end() && fix->stamp_ns < stamp_ns + after_ns; ++fix) {
+      const std::optional<TrajectoryPoint> then = path.at(fix->stamp_ns);
+      if (!then) continue;
+      const Eigen::Vector2d moved = fix->position_m + images[i].position_m - then->position_m;
+      east.push_back(moved.x());
+      north.push_back(moved.y());
+      sigmas_m.push_back(fix->sigma_m > 0.0 ? std::clamp(fix->sigma_m, kSmallestSigma_m, kLargestSigma_m) : sigma_m);
+    }
+    if (east.empty()) continue;
+    positions.push_back(
+        {static_cast<std::uint32_t>(i), {median(east), median(north)}, median(sigmas_m), velocityAt_m_s(images, i)});
+  }
+  return positions;
+}
 
 PathHeights pathHeights(const std::vector<TrajectoryPoint>& images, const std::vector<MapFix>& fixes) {
   const PathHeights level{std::vector<double>(images.size()), std::vector<double>(images.size())};

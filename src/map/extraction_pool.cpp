@@ -16,6 +16,20 @@ namespace {
 
 constexpr std::size_t kNeighbours = 2;  ///< Weiss et al., section III
 
+constexpr int kPreviewQuality = 70;
+
+std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
+  if (width_px <= 0) return {};
+  const int height_px = std::max(1, static_cast<int>(std::lround(1.0 * grey.rows * width_px / grey.cols)));
+  cv::Mat small = grey;
+  if (grey.size() != cv::Size(width_px, height_px)) {
+    cv::resize(grey, small, {width_px, height_px}, 0.0, 0.0, cv::INTER_AREA);
+  }
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, kPreviewQuality});
+  return jpeg;
+}
+
 }  // namespace
 
 PruningNeighbours::PruningNeighbours(const TrainingMap& map) : map_(map), sessions_(map) {}
@@ -33,24 +47,6 @@ std::vector<std::size_t> PruningNeighbours::of(std::size_t image) const {
   }
   return neighbours;
 }
-
-namespace {
-
-constexpr int kPreviewQuality = 70;
-
-std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
-  if (width_px <= 0) return {};
-  const int height_px = std::max(1, static_cast<int>(std::lround(1.0 * grey.rows * width_px / grey.cols)));
-  cv::Mat small = grey;
-  if (grey.size() != cv::Size(width_px, height_px)) {
-    cv::resize(grey, small, {width_px, height_px}, 0.0, 0.0, cv::INTER_AREA);
-  }
-  std::vector<std::uint8_t> jpeg;
-  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, kPreviewQuality});
-  return jpeg;
-}
-
-}  // namespace
 
 ExtractionPool::ExtractionPool(const SiftConfig& sift, const std::string& sift_backend, int preview_width_px,
                                std::size_t threads)

@@ -67,27 +67,6 @@ void requireLandmark(const SeenLandmark& landmark) {
   }
 }
 
-}  // namespace
-
-void requireUsable(const ImageGeometry& geometry, std::size_t feature_count) {
-  requirePose(geometry.camera);
-  if (!isCovariance(geometry.covariance)) {
-    throw std::runtime_error("the covariance of the camera's pose is not symmetric and positive semi-definite");
-  }
-  std::size_t lowest = 0;
-  for (const SeenLandmark& landmark : geometry.landmarks) {
-    if (landmark.feature >= feature_count) {
-      throw std::runtime_error("a landmark belongs to feature " + std::to_string(landmark.feature) + " of " +
-                               std::to_string(feature_count));
-    }
-    if (landmark.feature < lowest) throw std::runtime_error("the landmarks are not in order of their features");
-    lowest = std::size_t{landmark.feature} + 1;
-    requireLandmark(landmark);
-  }
-}
-
-namespace {
-
 /// Images [begin, end) of the map, which are one session.
 UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::size_t end, const Session& of,
                              const std::vector<MapFix>& fixes) {
@@ -116,6 +95,23 @@ std::vector<std::size_t> begins(const TrainingMap& map, std::size_t sessions) {
 }
 
 }  // namespace
+
+void requireUsable(const ImageGeometry& geometry, std::size_t feature_count) {
+  requirePose(geometry.camera);
+  if (!isCovariance(geometry.covariance)) {
+    throw std::runtime_error("the covariance of the camera's pose is not symmetric and positive semi-definite");
+  }
+  std::size_t lowest = 0;
+  for (const SeenLandmark& landmark : geometry.landmarks) {
+    if (landmark.feature >= feature_count) {
+      throw std::runtime_error("a landmark belongs to feature " + std::to_string(landmark.feature) + " of " +
+                               std::to_string(feature_count));
+    }
+    if (landmark.feature < lowest) throw std::runtime_error("the landmarks are not in order of their features");
+    lowest = std::size_t{landmark.feature} + 1;
+    requireLandmark(landmark);
+  }
+}
 
 void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry) {
   const Eigen::Isometry3d base = mount.baseInMap(geometry.camera);

@@ -67,50 +67,9 @@ void addFrustum(Marker& marker, const CameraPose& pose, const CameraModel& camer
   addLine(marker, roof_m, corners_m[1]);
 }
 
-}  // namespace
-
-Marker toCameraMarker(const Estimate& estimate, const std::optional<CameraModel>& camera,
-                      const std_msgs::Header& header) {
-  Marker marker;
-  marker.header = header;
-  marker.ns = "camera";
-  marker.type = Marker::LINE_LIST;
-  marker.pose.orientation.w = 1.0;
-  marker.scale.x = kLine_m;
-  marker.color.r = 0.80F;
-  marker.color.b = 0.45F;
-  marker.color.a = 1.0F;
-  if (estimate.metric && camera) addFrustum(marker, estimate.metric->camera, *camera);
-  marker.action = marker.points.empty() ? Marker::DELETE : Marker::ADD;
-  return marker;
-}
-
-namespace {
-
 double distanceOf(const geometry_msgs::Point& a, const geometry_msgs::Point& b) {
   return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z);
 }
-
-}  // namespace
-
-void DrivenPath::add(const Estimate& estimate, const std_msgs::Header& header) {
-  if (estimate.state != LocalizationState::kTracking || estimate.images_since_metric > 0) return;
-  geometry_msgs::PoseStamped pose;
-  pose.header = header;
-  pose.pose = toPose(estimate, header).pose.pose;
-  if (!poses_.empty() && distanceOf(pose.pose.position, poses_.back().pose.position) < kStep_m) return;
-  poses_.push_back(pose);
-  if (poses_.size() > kMost) poses_.pop_front();
-}
-
-nav_msgs::Path DrivenPath::toPath(const std_msgs::Header& header) const {
-  nav_msgs::Path path;
-  path.header = header;
-  path.poses.assign(poses_.begin(), poses_.end());
-  return path;
-}
-
-namespace {
 
 const char* const kPositions = "positions";  ///< namespace of the markers of training images
 constexpr double kImageDiameter_m = 0.6;
@@ -208,6 +167,39 @@ visualization_msgs::Marker landmarkMarker(const TrainingMap& map, const std::str
 }
 
 }  // namespace
+
+Marker toCameraMarker(const Estimate& estimate, const std::optional<CameraModel>& camera,
+                      const std_msgs::Header& header) {
+  Marker marker;
+  marker.header = header;
+  marker.ns = "camera";
+  marker.type = Marker::LINE_LIST;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = kLine_m;
+  marker.color.r = 0.80F;
+  marker.color.b = 0.45F;
+  marker.color.a = 1.0F;
+  if (estimate.metric && camera) addFrustum(marker, estimate.metric->camera, *camera);
+  marker.action = marker.points.empty() ? Marker::DELETE : Marker::ADD;
+  return marker;
+}
+
+void DrivenPath::add(const Estimate& estimate, const std_msgs::Header& header) {
+  if (estimate.state != LocalizationState::kTracking || estimate.images_since_metric > 0) return;
+  geometry_msgs::PoseStamped pose;
+  pose.header = header;
+  pose.pose = toPose(estimate, header).pose.pose;
+  if (!poses_.empty() && distanceOf(pose.pose.position, poses_.back().pose.position) < kStep_m) return;
+  poses_.push_back(pose);
+  if (poses_.size() > kMost) poses_.pop_front();
+}
+
+nav_msgs::Path DrivenPath::toPath(const std_msgs::Header& header) const {
+  nav_msgs::Path path;
+  path.header = header;
+  path.poses.assign(poses_.begin(), poses_.end());
+  return path;
+}
 
 nav_msgs::Path toPath(const TrainingMap& map, const std::string& frame_id) {
   nav_msgs::Path path;

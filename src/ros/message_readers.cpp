@@ -18,18 +18,6 @@ double sigmaOf(const sensor_msgs::NavSatFix& message, double variance_m2) {
   return std::isfinite(variance_m2) && variance_m2 > 0.0 ? std::sqrt(variance_m2) : 0.0;
 }
 
-}  // namespace
-
-Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
-  return {stamp_ns,
-          {message.latitude, message.longitude, message.altitude},
-          message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX,
-          sigmaOf(message, 0.5 * (message.position_covariance[0] + message.position_covariance[4])),
-          sigmaOf(message, message.position_covariance[8])};
-}
-
-namespace {
-
 bool isRigid(const geometry_msgs::Transform& transform) {
   constexpr double kUnitTolerance = 1e-3;
   const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y,
@@ -39,6 +27,14 @@ bool isRigid(const geometry_msgs::Transform& transform) {
 }
 
 }  // namespace
+
+Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
+  return {stamp_ns,
+          {message.latitude, message.longitude, message.altitude},
+          message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX,
+          sigmaOf(message, 0.5 * (message.position_covariance[0] + message.position_covariance[4])),
+          sigmaOf(message, message.position_covariance[8])};
+}
 
 std::string withoutSlash(const std::string& frame) {
   return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
