@@ -44,6 +44,11 @@ inline Eigen::Vector2d block(double time_s) {
   return position;
 }
 
+constexpr std::int64_t kBegin_ns = 1'226'500'000'000'000'000;  ///< of a round, in November 2008
+
+/// Of a moment so many seconds after the begin.
+inline std::int64_t stampOf(double time_s) { return kBegin_ns + static_cast<std::int64_t>(time_s * 1e9); }
+
 /// A round that a receiver with 12 cm of noise recorded.
 inline std::vector<Fix> record(const Path& path, double duration_s, double rate_hz = kRate, double noise_m = 0.12) {
   std::mt19937 engine(17);
@@ -53,12 +58,12 @@ inline std::vector<Fix> record(const Path& path, double duration_s, double rate_
   for (double time_s = 0.0; time_s < duration_s; time_s += 1.0 / rate_hz) {
     const double x = noise(engine);
     const Eigen::Vector2d position = path(time_s) + noise_m * Eigen::Vector2d(x, noise(engine));
-    fixes.push_back({1226500000000000000 + static_cast<std::int64_t>(time_s * 1e9), frame.toGeodetic(position), true});
+    fixes.push_back({stampOf(time_s), frame.toGeodetic(position), true});
   }
   return fixes;
 }
 
-inline double timeOf(const Fix& fix) { return secondsBetween(1226500000000000000, fix.stamp_ns); }
+inline double timeOf(const Fix& fix) { return secondsBetween(kBegin_ns, fix.stamp_ns); }
 
 inline void shift(Fix& fix, const Eigen::Vector2d& offset_m) {
   const LocalFrame frame(kDatum);
@@ -73,7 +78,7 @@ inline CleanedTrajectory clean(const std::vector<Fix>& fixes) {
 inline std::vector<double> errorsOf(const CleanedTrajectory& cleaned, const Path& path, double duration_s) {
   std::vector<double> errors_m;
   for (double time_s = 0.5; time_s < duration_s - 1.0; time_s += 1.0) {
-    const auto point = cleaned.trajectory.at(1226500000000000000 + static_cast<std::int64_t>(time_s * 1e9));
+    const auto point = cleaned.trajectory.at(stampOf(time_s));
     if (point) errors_m.push_back((point->position_m - path(time_s)).norm());
   }
   return errors_m;

@@ -20,6 +20,7 @@ using test::meanOf;
 using test::Path;
 using test::record;
 using test::shift;
+using test::stampOf;
 using test::timeOf;
 
 TEST(TrajectoryCleaner, ACleanRoundLosesNothing) {
@@ -38,7 +39,7 @@ TEST(TrajectoryCleaner, HeadingIsTheDirectionOfTravel) {
   const CleanedTrajectory cleaned = clean(record(block, 250.0));
   for (const double time_s : {20.0, 100.0, 150.0}) {
     const Eigen::Vector2d ahead = block(time_s + 0.5) - block(time_s - 0.5);
-    const auto point = cleaned.trajectory.at(1226500000000000000 + static_cast<std::int64_t>(time_s * 1e9));
+    const auto point = cleaned.trajectory.at(stampOf(time_s));
     ASSERT_TRUE(point);
     EXPECT_LT(std::abs(angleDifference(std::atan2(ahead.y(), ahead.x()), point->yaw_rad)), 0.15);
   }

@@ -127,9 +127,7 @@ TEST(Verdicts, TheHeadingOfARobotThatStandsIsTheOneItCameWith) {
   };
   const std::vector<Fix> fixes = test::record(stop, 90.0, kRate_hz, 0.0);
   const CleanedTrajectory cleaned = cleanTrajectory(fixes, LocalFrame(kDatum), {});
-  const auto yawAt = [&](double time_s) {
-    return cleaned.trajectory.at(1226500000000000000 + static_cast<std::int64_t>(time_s * 1e9))->yaw_rad;
-  };
+  const auto yawAt = [&](double time_s) { return cleaned.trajectory.at(test::stampOf(time_s))->yaw_rad; };
   EXPECT_NEAR(yawAt(1.0), 0.0, 0.02);
   EXPECT_NEAR(yawAt(20.0), 0.0, 0.02);
   EXPECT_NEAR(yawAt(75.0), kPi / 2.0, 0.02);
@@ -137,7 +135,7 @@ TEST(Verdicts, TheHeadingOfARobotThatStandsIsTheOneItCameWith) {
     return time_s < 30.0 ? Eigen::Vector2d(0.0, 0.0) : Eigen::Vector2d(0.0, 2.0 * (time_s - 30.0));
   };
   const CleanedTrajectory begun = cleanTrajectory(test::record(early, 90.0, kRate_hz, 0.0), LocalFrame(kDatum), {});
-  EXPECT_NEAR(begun.trajectory.at(1226500000000000000 + 2'000'000'000)->yaw_rad, kPi / 2.0, 0.05)
+  EXPECT_NEAR(begun.trajectory.at(test::stampOf(2.0))->yaw_rad, kPi / 2.0, 0.05)
       << "before it moves, the one that it will have";
 }
 

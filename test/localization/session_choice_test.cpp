@@ -111,25 +111,6 @@ TEST_F(SessionChoiceTest, StaysWithWhatMatchesAsWell) {
   EXPECT_EQ(sessions_.chosen(), 0U);
 }
 
-TEST_F(SessionChoiceTest, TriesTheFirstSessionEverySecondTime) {
-  sessions_.startImage(18 * kHour_ns);
-  ASSERT_EQ(sessions_.chosen(), 2U);
-  int first = 0;
-  int other = 0;
-  for (int i = 0; i < 8; ++i) map_->pose(nextTrial()).session == 0 ? ++first : ++other;
-  EXPECT_GE(first, 4);
-  EXPECT_GE(other, 2);
-}
-
-TEST_F(SessionChoiceTest, TriesOneImageInFour) {
-  int trials = 0;
-  for (int i = 0; i < 40; ++i) {
-    sessions_.startImage(8 * kHour_ns);
-    trials += sessions_.trial({80.0, 0.0}, 0.0) ? 1 : 0;
-  }
-  EXPECT_EQ(trials, 10);
-}
-
 TEST_F(SessionChoiceTest, TriesOneSessionInAnImage) {
   nextTrial();
   EXPECT_EQ(sessions_.trial({80.0, 0.0}, 0.0), sessions_.trial({80.0, 0.0}, 0.0));

@@ -85,11 +85,10 @@ TEST(SwarmEquations, Eq4InertiaKeepsAShareOfTheVelocity) {
   config.inertia = 0.5;
   const OneMove move(world, config, {50.0, 30.0});
   for (const ParticleKind kind : {ParticleKind::kStandard, ParticleKind::kHighEnergy}) {
-    for (const double share : move.of(kind, [](const Particle&before, const Particle&after, int axis) {
-           return after.velocity_m[axis] / before.velocity_m[axis];
-         })) {
-      ASSERT_NEAR(share, 0.5, 1e-12);
-    }
+    const std::vector<double> shares = move.of(kind, [](const Particle& before, const Particle& after, int axis) {
+      return after.velocity_m[axis] / before.velocity_m[axis];
+    });
+    for (const double share : shares) ASSERT_NEAR(share, 0.5, 1e-12);
   }
 }
 
@@ -128,11 +127,11 @@ TEST(SwarmEquations, Eq5TheVelocityIsAddedToThePosition) {
   config.phi2 = 0.6;
   config.inertia = 0.99;
   const OneMove move(world, config, {50.0, 30.0});
-  for (const double off : move.of(ParticleKind::kStandard, [](const Particle&before, const Particle&after, int axis) {
-         return after.position_m[axis] - before.position_m[axis] - after.velocity_m[axis];
-       })) {
-    ASSERT_NEAR(off, 0.0, 1e-9);
-  }
+  const std::vector<double> left_m =
+      move.of(ParticleKind::kStandard, [](const Particle& before, const Particle& after, int axis) {
+        return after.position_m[axis] - before.position_m[axis] - after.velocity_m[axis];
+      });
+  for (const double off_m : left_m) ASSERT_NEAR(off_m, 0.0, 1e-9);
 }
 
 TEST(SwarmEquations, NoAxisIsFasterThanTheLimitAndThreeTimesThatWithHighEnergy) {
