@@ -1,21 +1,15 @@
 #include "apps/app_support.h"
 
 #include <array>
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <utility>
 
-#include <fcntl.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/process.h"
 #include "base/text.h"
-
-extern char** environ;
 
 namespace visual_localization::apps {
 namespace {
@@ -25,67 +19,6 @@ namespace fs = std::filesystem;
 constexpr std::chrono::milliseconds kDelay{2000};
 constexpr std::chrono::milliseconds kInterval{100};
 constexpr std::size_t kWidth = 40;
-
-std::string readAll(int descriptor) {
-  std::string text;
-  std::array<char, 4096> block{};
-  for (;;) {
-    const ssize_t count = ::read(descriptor, block.data(), block.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return text;
-    text.append(block.data(), static_cast<std::size_t>(count));
-  }
-}
-
-std::string lastLine(std::string text) {
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  return text.substr(text.rfind('\n') + 1);
-}
-
-/// Starts a program whose standard error goes to `error_output`; 0, or the error number.
-int start(std::vector<std::string> command, int error_output, pid_t& process) {
-  std::vector<char*> words;
-  for (std::string& word : command) words.push_back(word.data());
-  words.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  ::posix_spawn_file_actions_init(&actions);
-  ::posix_spawn_file_actions_adddup2(&actions, error_output, STDERR_FILENO);
-  const int error = ::posix_spawn(&process, words.front(), &actions, nullptr, words.data(), environ);
-  ::posix_spawn_file_actions_destroy(&actions);
-  return error;
-}
-
-/// What a program writes to its standard error until it ends. Throws std::runtime_error with the reason when it cannot
-/// be started, to which `hint` adds what may be missing, or fails.
-std::string errorOutputOf(const std::vector<std::string>& command, const std::string& hint) {
-  std::array<int, 2> pipe{};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::strerror(errno));
-  pid_t process = 0;
-  const int error = start(command, pipe[1], process);
-  ::close(pipe[1]);
-  const std::string output = readAll(pipe[0]);
-  ::close(pipe[0]);
-  if (error != 0) throw std::runtime_error("cannot be started: " + hint + std::strerror(error));
-  int status = 0;
-  while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (status != 0) throw std::runtime_error("failed: " + (output.empty() ? "without a message" : lastLine(output)));
-  return output;
-}
-
-/// A program that is installed beside this one. `hint`: see errorOutputOf.
-void runBeside(const std::string& name, const std::vector<std::string>& arguments, const std::string& hint) {
-  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / name;
-  std::vector<std::string> command{program.string()};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  std::fflush(stdout);
-  try {
-    if (!fs::exists(program)) throw std::runtime_error("is missing");
-    std::cerr << errorOutputOf(command, hint);  // warnings
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(program.string() + ": " + error.what());
-  }
-}
 
 }  // namespace
 
@@ -144,15 +77,11 @@ std::string humanSize(double bytes) {
   return text.data();
 }
 
-void runProgramBeside(const std::string& name, const std::vector<std::string>& arguments) {
-  runBeside(name, arguments, "");
-}
-
 void runScript(const std::string& name, const std::vector<std::string>& arguments) {
   std::vector<std::string> words{"--"};
   words.insert(words.end(), arguments.begin(), arguments.end());
   // The file exists: what is missing is the interpreter that its first line names.
-  runBeside(name, words, "is Python 3 installed? ");
+  std::cerr << ChildProcess(0, "is Python 3 installed? ").run(programOfPackage(name), words);
 }
 
 ProgressBar::ProgressBar(std::string label)

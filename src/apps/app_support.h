@@ -51,10 +51,6 @@ class NewFolder {
 /// "1.2 kB", "3.4 MB".
 std::string humanSize(double bytes);
 
-/// Runs another program of this package to its end; its output goes to ours. Throws std::runtime_error, in one line,
-/// with the last line that it wrote to its standard error.
-void runProgramBeside(const std::string& name, const std::vector<std::string>& arguments);
-
 /// Runs a script that is installed beside this program with these arguments, and shows its warnings. Throws
 /// std::runtime_error, in one line, with the last line that the script wrote to its standard error.
 void runScript(const std::string& name, const std::vector<std::string>& arguments);

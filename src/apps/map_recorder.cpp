@@ -8,16 +8,19 @@
 #include <ros/init.h>
 #include <ros/spinner.h>
 
-#include "apps/app_support.h"
+#include "base/process.h"
 #include "base/text.h"
 
 namespace {
 
+using visual_localization::ChildProcess;
 using visual_localization::MapRecorder;
+using visual_localization::programOfPackage;
 using visual_localization::RecordedSession;
 
 constexpr int kFailed = 1;
 constexpr int kBadUsage = 2;
+constexpr int kNiceness = 10;  ///< of what writes a map, while the robot drives
 
 const char* const kHelp =
     "Usage: map_recorder _folder:=FOLDER [image:=TOPIC] [fix:=TOPIC] [odom:=TOPIC] [_map:=FILE] [_PARAMETER:=VALUE "
@@ -45,11 +48,11 @@ void buildMap(const RecordedSession& session) {
                                      "--fix-topic", session.fix_topic, "--output",      session.output};
   if (!session.config.empty()) arguments.insert(arguments.end(), {"--config", session.config});
   if (session.map.empty()) {
-    visual_localization::apps::runProgramBeside("map_builder", arguments);
+    std::cerr << ChildProcess(kNiceness).run(programOfPackage("map_builder"), arguments);  // warnings
     return;
   }
   arguments.insert(arguments.begin(), {"add", "--map", session.map});
-  visual_localization::apps::runProgramBeside("map_edit", arguments);
+  std::cerr << ChildProcess(kNiceness).run(programOfPackage("map_edit"), arguments);
 }
 
 }  // namespace

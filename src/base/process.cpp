@@ -1,0 +1,123 @@
+#include "base/process.h"
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char** environ;
+
+namespace visual_localization {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string readAll(int descriptor) {
+  std::string text;
+  std::array<char, 4096> block{};
+  for (;;) {
+    const ssize_t count = ::read(descriptor, block.data(), block.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return text;
+    text.append(block.data(), static_cast<std::size_t>(count));
+  }
+}
+
+std::string lastLine(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text.substr(text.rfind('\n') + 1);
+}
+
+/// Starts a program whose standard error goes to `error_output`; 0, or the error number.
+int start(std::vector<std::string> command, int error_output, pid_t& process) {
+  std::vector<char*> words;
+  for (std::string& word : command) words.push_back(word.data());
+  words.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, error_output, STDERR_FILENO);
+  const int error = ::posix_spawn(&process, words.front(), &actions, nullptr, words.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+/// The file that this function was loaded from.
+fs::path thisLibrary() {
+  Dl_info info{};
+  static const int here = 0;
+  if (::dladdr(&here, &info) == 0 || info.dli_fname == nullptr) return {};
+  std::error_code none;
+  return fs::weakly_canonical(info.dli_fname, none);
+}
+
+}  // namespace
+
+std::string programOfPackage(const std::string& name) {
+  const fs::path beside = fs::read_symlink("/proc/self/exe").parent_path() / name;
+  const fs::path installed = thisLibrary().parent_path() / "visual_localization" / name;
+  for (const fs::path& program : {beside, installed}) {
+    if (fs::exists(program)) return program.string();
+  }
+  throw std::runtime_error(beside.string() + ": is missing");
+}
+
+std::string ChildProcess::run(const std::string& program, const std::vector<std::string>& arguments) {
+  std::vector<std::string> command{program};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  std::fflush(stdout);
+  try {
+    return errorOutputOf(command);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(program + ": " + error.what());
+  }
+}
+
+void ChildProcess::terminate() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  terminated_ = true;
+  if (process_ > 0) ::kill(process_, SIGTERM);
+}
+
+std::string ChildProcess::errorOutputOf(const std::vector<std::string>& command) {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::strerror(errno));
+  pid_t process = 0;
+  int error = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    error = terminated_ ? ECANCELED : start(command, pipe[1], process);
+    if (error == 0) process_ = process;
+  }
+  ::close(pipe[1]);
+  if (error == 0 && niceness_ != 0) ::setpriority(PRIO_PROCESS, static_cast<id_t>(process), niceness_);
+  const std::string output = readAll(pipe[0]);
+  ::close(pipe[0]);
+  if (error != 0) throw std::runtime_error("cannot be started: " + hint_ + std::strerror(error));
+  if (waitFor(process) != 0) {
+    throw std::runtime_error("failed: " + (output.empty() ? "without a message" : lastLine(output)));
+  }
+  return output;
+}
+
+/// Its status; not 0 when nobody knows how it ended.
+int ChildProcess::waitFor(pid_t process) {
+  siginfo_t ended{};
+  while (::waitid(P_PID, static_cast<id_t>(process), &ended, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  process_ = 0;  // while its number is not another's
+  int status = 0;
+  return ::waitpid(process, &status, 0) == process ? status : -1;
+}
+
+}  // namespace visual_localization

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <sys/types.h>
+
+namespace visual_localization {
+
+/// Where another program or script of this package is: beside the running program, or, for a nodelet in another
+/// package's program, where the library that this is in was installed with it. Throws std::runtime_error when it is in
+/// neither place.
+std::string programOfPackage(const std::string& name);
+
+/// A program that runs as a process of its own.
+class ChildProcess {
+ public:
+  /// `niceness`: see nice(1). `hint`: what may be missing when it cannot be started.
+  explicit ChildProcess(int niceness = 0, std::string hint = "") : niceness_(niceness), hint_(std::move(hint)) {}
+
+  /// Runs a program to its end and returns what it wrote to its standard error; its output goes to ours. Throws
+  /// std::runtime_error, in one line that begins with the program, when it cannot be started or fails: then with the
+  /// last line that it wrote to its standard error. One call at a time.
+  std::string run(const std::string& program, const std::vector<std::string>& arguments);
+  /// Asks the program to end (SIGTERM), now and as soon as another one starts. From any thread.
+  void terminate();
+
+ private:
+  std::string errorOutputOf(const std::vector<std::string>& command);
+  int waitFor(pid_t process);
+
+  const int niceness_;
+  const std::string hint_;
+  std::mutex mutex_;
+  pid_t process_ = 0;  ///< that runs
+  bool terminated_ = false;
+};
+
+}  // namespace visual_localization

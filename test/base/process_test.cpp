@@ -1,0 +1,80 @@
+#include "base/process.h"
+
+#include <chrono>
+#include <filesystem>
+#include <future>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace visual_localization {
+namespace {
+
+using testing::HasSubstr;
+
+std::string refusalOf(const std::string& program, const std::vector<std::string>& arguments,
+                      const std::string& hint = "") {
+  try {
+    ChildProcess(0, hint).run(program, arguments);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ChildProcess, ReturnsWhatTheProgramWarnsOf) {
+  EXPECT_EQ(ChildProcess().run("/bin/sh", {"-c", "echo careful >&2; echo \"$0\" >&2", "a b"}), "careful\na b\n");
+  EXPECT_EQ(ChildProcess().run("/bin/true", {}), "");
+}
+
+TEST(ChildProcess, RefusesWithTheLastLineOfAProgramThatFails) {
+  EXPECT_EQ(refusalOf("/bin/sh", {"-c", "echo first >&2; echo last >&2; exit 3"}), "/bin/sh: failed: last");
+  EXPECT_EQ(refusalOf("/bin/false", {}), "/bin/false: failed: without a message");
+  EXPECT_EQ(refusalOf("/bin/sh", {"-c", "kill -9 $$"}), "/bin/sh: failed: without a message");
+}
+
+TEST(ChildProcess, SaysWhatMayBeMissing) {
+  EXPECT_EQ(refusalOf("/absent", {}, "is it installed? "),
+            "/absent: cannot be started: is it installed? No such file or directory");
+}
+
+TEST(ChildProcess, IsAsNiceAsAskedFor) {
+  EXPECT_EQ(ChildProcess(5).run("/bin/sh", {"-c", "sleep 0.3; nice >&2"}), std::to_string(::nice(0) + 5) + "\n");
+}
+
+TEST(ChildProcess, EndsWhenItIsTerminated) {
+  ChildProcess child;
+  auto refusal = std::async(std::launch::async, [&child]() -> std::string {
+    try {
+      return child.run("/bin/sh", {"-c", "echo begun >&2; exec sleep 600 2>&-"});
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  });
+  EXPECT_EQ(refusal.wait_for(std::chrono::milliseconds(300)), std::future_status::timeout);
+  child.terminate();
+  EXPECT_EQ(refusal.get(), "/bin/sh: failed: begun");
+  EXPECT_THROW(child.run("/bin/true", {}), std::runtime_error) << "nor does another one start";
+}
+
+TEST(ProgramOfPackage, FindsProgramsBesideTheLibrary) {
+  const std::string program = programOfPackage("map_info");  // this test lies elsewhere
+  EXPECT_TRUE(std::filesystem::exists(program));
+  EXPECT_THAT(ChildProcess().run(program, {"--version"}), "");
+}
+
+TEST(ProgramOfPackage, NamesWhatIsMissing) {
+  try {
+    programOfPackage("map_absent");
+    ADD_FAILURE();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("/map_absent: is missing"));
+  }
+}
+
+}  // namespace
+}  // namespace visual_localization
