@@ -43,7 +43,9 @@ def base_in_odom(stamp, x, y, yaw):
     return transform
 
 
-class TfTest(unittest.TestCase):
+class LocalizerWithOdometry(unittest.TestCase):
+    """Shows images of a drive, with odometry of their stamps."""
+
     def setUp(self):
         self.camera = rospy.Publisher('/stereo/left/image_raw/compressed', CompressedImage, queue_size=1)
         self.odometry = rospy.Publisher('/tf', TFMessage, queue_size=10)
@@ -88,6 +90,8 @@ class TfTest(unittest.TestCase):
     def from_map(self):
         return [t for message in self.transforms.messages() for t in message.transforms if t.header.frame_id == 'map']
 
+
+class TfTest(LocalizerWithOdometry):
     def test_1_before_the_first_metric_pose_nothing_is_broadcast(self):
         self.show_dark((3.0, -2.0, 0.7))
         self.assertEqual(self.from_map(), [])
