@@ -32,7 +32,8 @@ libtf2-ros-dev libtf2-geometry-msgs-dev libtf2-eigen-dev: tf
 librosbag-dev librosbag-storage-dev libroslz4-dev libbz2-dev: bags
 libdiagnostic-updater-dev: diagnostics
 libdynamic-reconfigure-config-init-mutex-dev: parameters that change while it runs
-librostest-dev: tests of the running node
+librostest-dev python3-rostest: tests of the running node
+parallel: tests of maps of many bags
 ros-message-generation ros-message-runtime: messages of this package
 ros-std-msgs ros-sensor-msgs ros-geometry-msgs ros-nav-msgs: definitions of messages
 ros-visualization-msgs ros-diagnostic-msgs ros-std-srvs: definitions of messages
@@ -42,13 +43,11 @@ readonly ROS_RUN='
 libnodeletlib-tools python3-nodelet python3-bond: nodelet managers
 image-transport-tools: image_transport republish
 topic-tools: rosrun topic_tools throttle
-parallel: maps of many bags
 rosout rosbash python3-roslaunch python3-rosmaster: roscore, rosrun and roslaunch
 python3-rosbag: rosbag play and the scripts that read bags
 python3-rosmsg python3-rosnode python3-rosparam python3-rosservice python3-rostopic: tools of the command line
 python3-rospy python3-tf2-ros: scripts that talk to the node
-python3-rostest: tests of the running node
-python3-dynamic-reconfigure: tests that change parameters
+python3-dynamic-reconfigure: rosrun dynamic_reconfigure dynparam
 python3-std-msgs python3-sensor-msgs python3-geometry-msgs python3-nav-msgs: Python modules of messages
 python3-visualization-msgs python3-diagnostic-msgs python3-std-srvs python3-tf2-msgs: Python modules of messages'
 readonly PLOTS='
@@ -71,13 +70,15 @@ readonly -A DEBIAN_11=(
 
 usage() {
   cat <<'USAGE'
-Usage: install_dependencies.sh [--with-lint] [--with-rviz] [--with-clang] [--core-only] [--list] [--log FILE]
+Usage: install_dependencies.sh [--with-lint] [--with-rviz] [--with-clang] [--core-only | --run-only] [--list]
+                               [--log FILE]
 Installs with apt what is missing; does nothing when everything is there. Needs root or sudo only to install.
 Before it installs, it prints what is missing, what for, and the command for root.
   --with-lint   also clang-format, clang-tidy and shellcheck
   --with-rviz   also rviz, a virtual display and what the window of plot_status.py needs
   --with-clang  also clang with its sanitizers and libFuzzer
   --core-only   only what the library without ROS needs
+  --run-only    only what the built package runs, beside the libraries that it is linked with
   --list        print the packages, one a line, and install nothing
   --log FILE    add apt's output to FILE (default: a temporary file, kept when apt fails)
 USAGE
@@ -176,6 +177,7 @@ main() {
       --with-clang) extra+=("$CLANG") ;;
       --with-rviz) extra+=("$RVIZ") ;;
       --core-only) tables=("$CORE") ;;
+      --run-only) tables=("$ROS_RUN" "$PLOTS") ;;
       --list) list=true ;;
       --log) log=${2:?--log needs a file}; shift ;;
       -h | --help) usage; exit 0 ;;

@@ -5,6 +5,8 @@ repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo
 # shellcheck source=scripts/build_progress.sh
 source "$repo/scripts/build_progress.sh"
+# shellcheck source=scripts/bare_tree.sh
+source "$repo/scripts/bare_tree.sh"
 readonly releases=(bullseye bookworm trixie)
 # Where the checkout and its build are in a tree; test.sh builds in the same folder.
 readonly source_dir=/root/visual_localization build_dir=/root/visual_localization/build/test
@@ -23,31 +25,6 @@ warnings as errors, and all tests. For Debian 11 it first builds CLI11 and Highw
 Debian 12. Needs debootstrap and 5 GB of disk a release. Prints one line of result a release; exit code 0 when all
 passed.
 USAGE
-}
-
-# The mirror of Debian itself that apt uses here.
-mirror_of_host() {
-  apt-get indextargets --format "\$(REPO_URI)" 'Created-By: Packages' 'Label: Debian' | head -n 1
-}
-
-# Runs commands in the tree. What they mount and start ends with them.
-in_tree() {
-  # shellcheck disable=SC2016
-  unshare --mount --pid --fork --kill-child bash -euc '
-    mount -t proc proc "$1/proc"
-    mount -t devpts devpts "$1/dev/pts"
-    mount -t tmpfs tmpfs "$1/dev/shm"
-    exec chroot "$1" env --ignore-environment HOME=/root LANG=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin \
-      DEBIAN_FRONTEND=noninteractive QT_QPA_PLATFORM=offscreen MPLBACKEND=Agg ${http_proxy:+http_proxy="$http_proxy"} \
-      bash -euo pipefail -c "$2"' in_tree "$tree" "$1"
-}
-
-# Chained by &&: where the steps are called, set -e is without effect. policy-rc.d keeps services from starting.
-make_tree() {
-  rm -rf --one-file-system "$tree" \
-    && debootstrap --variant=minbase --include=ca-certificates "$release" "$tree" "$mirror" \
-    && cp /etc/hosts /etc/resolv.conf "$tree/etc/" \
-    && install -m 755 /dev/stdin "$tree/usr/sbin/policy-rc.d" <<<$'#!/bin/sh\nexit 101'
 }
 
 copy_checkout() {
@@ -90,7 +67,7 @@ run_tests() {
 test_release() {
   local step steps=(make_tree copy_checkout) tree=$directory/$release log=$directory/$release.log
   if [[ $release == bullseye ]]; then steps+=(install_sources); fi
-  if [[ $reuse == true && -d $tree ]]; then steps=(copy_checkout); fi
+  if [[ $reuse == true ]] && is_tree; then steps=(copy_checkout); fi
   steps+=(install_packages configure build run_tests)
   : >"$log"
   for step in "${steps[@]}"; do
@@ -127,10 +104,8 @@ main() {
     shift
   done
   ((${#chosen[@]})) || chosen=("${releases[@]}")
-  ((EUID == 0)) || fail "only root can make a tree"
-  command -v debootstrap >/dev/null || fail "debootstrap is missing: apt-get install debootstrap"
   if [[ -z $mirror ]]; then mirror=$(mirror_of_host); fi
-  [[ -n $mirror ]] || fail "apt tells no Debian mirror here: name one with --mirror"
+  require_trees
   mkdir -p "$directory"
   touch "$directory/CATKIN_IGNORE"
   directory=$(cd "$directory" && pwd)

@@ -1,0 +1,40 @@
+# shellcheck shell=bash
+# Bare Debian trees by debootstrap, as root, for scripts that try the package where nothing is installed. To be sourced.
+# The functions work on `tree`, of the release `release`, from the mirror `mirror`.
+
+# The mirror of Debian itself that apt uses here.
+mirror_of_host() {
+  apt-get indextargets --format "\$(REPO_URI)" 'Created-By: Packages' 'Label: Debian' | head -n 1
+}
+
+# Fails with the reason when no tree can be made here.
+require_trees() {
+  ((EUID == 0)) || fail "only root can make a tree"
+  command -v debootstrap >/dev/null || fail "debootstrap is missing: apt-get install debootstrap"
+  [[ -n $mirror ]] || fail "apt tells no Debian mirror here: name one with --mirror"
+}
+
+# Runs commands in the tree. What they mount and start ends with them.
+in_tree() {
+  # shellcheck disable=SC2016,SC2154
+  unshare --mount --pid --fork --kill-child bash -euc '
+    mount -t proc proc "$1/proc"
+    mount -t devpts devpts "$1/dev/pts"
+    mount -t tmpfs tmpfs "$1/dev/shm"
+    exec chroot "$1" env --ignore-environment HOME=/root LANG=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin \
+      DEBIAN_FRONTEND=noninteractive QT_QPA_PLATFORM=offscreen MPLBACKEND=Agg ${http_proxy:+http_proxy="$http_proxy"} \
+      bash -euo pipefail -c "$2"' in_tree "$tree" "$1"
+}
+
+# Whether make_tree() has made the tree to its end.
+is_tree() { [[ -e $tree/root/.is_whole ]]; }
+
+# Chained by &&: where the steps are called, set -e is without effect. policy-rc.d keeps services from starting.
+make_tree() {
+  # shellcheck disable=SC2154
+  rm -rf --one-file-system "$tree" \
+    && debootstrap --variant=minbase --include=ca-certificates "$release" "$tree" "$mirror" \
+    && cp /etc/hosts /etc/resolv.conf "$tree/etc/" \
+    && install -m 755 /dev/stdin "$tree/usr/sbin/policy-rc.d" <<<$'#!/bin/sh\nexit 101' \
+    && touch "$tree/root/.is_whole"
+}
