@@ -1,0 +1,198 @@
+"""No input makes a program take more memory than doc/faults.md says: hostile inputs under that limit of address space.
+
+Prints what each took. A program that lacks memory ends with "out of memory" or by a signal, which fails here.
+"""
+import itertools
+import resource
+import subprocess
+import sys
+import threading
+import time
+import unittest
+import warnings
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+warnings.filterwarnings('ignore', category=DeprecationWarning)
+import genpy  # noqa: E402
+import rosbag  # noqa: E402
+from sensor_msgs.msg import CompressedImage, NavSatFix  # noqa: E402
+
+from program_runner import PROGRAMS, ProgramTest  # noqa: E402
+
+MAP, DRIVE, CORPUS = (Path(argument) for argument in sys.argv[2:5])
+IMAGES, FIXES = '/stereo/left/image_raw/compressed', '/gps/fix'
+THREADS = 2
+
+# The formulas of doc/faults.md, MiB.
+BASE, PER_THREAD = 260, 72
+LARGEST_PIXELS = 4096 * 4096
+SIFT_BYTES, DECODED_BYTES = 140, 8
+IMAGE_BYTES, FIX_BYTES = 2 ** 19, 2000
+
+
+def mib(count: float) -> float:
+    return count / 2.0 ** 20
+
+
+def builder_bound(pixels: int, images: int, fixes: int) -> float:
+    """Of map_builder and `map_edit add`. `pixels`: of the images that are used."""
+    return (BASE + THREADS * (PER_THREAD + mib(SIFT_BYTES * pixels + DECODED_BYTES * LARGEST_PIXELS))
+            + mib(IMAGE_BYTES * images + FIX_BYTES * fixes))
+
+
+def localizer_bound(map_pixels: int, cache_mib: float) -> float:
+    """Of localize and of the node."""
+    return BASE + PER_THREAD + 2.0 * cache_mib + mib(SIFT_BYTES * map_pixels + DECODED_BYTES * LARGEST_PIXELS)
+
+
+def editor_bound(cache_mib: float) -> float:
+    """Of map_info and of map_edit without `add`."""
+    return BASE + PER_THREAD + 2.0 * cache_mib
+
+
+class Run:
+    """A program under a limit of its address space."""
+
+    def __init__(self, bound_mib: float, program: str, *arguments):
+        limit = int(bound_mib * 2 ** 20)
+        self.peak_mib = 0.0
+        with subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.PIPE, text=True,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit))) as process:
+            watch = threading.Thread(target=self.watch, args=(process,))
+            watch.start()
+            try:
+                _, self.stderr = process.communicate(timeout=200)
+            finally:
+                process.kill()
+                watch.join()
+        self.code = process.returncode
+
+    def watch(self, process):
+        status = Path(f'/proc/{process.pid}/status')
+        while process.poll() is None:
+            try:
+                peaks = [line for line in status.read_text().splitlines() if line.startswith('VmPeak')]
+            except OSError:
+                return
+            if peaks:
+                self.peak_mib = float(peaks[0].split()[1]) / 1024.0
+            time.sleep(0.005)
+
+
+def at(seconds: float) -> genpy.Time:
+    return genpy.Time.from_sec(1_000_000_000 + seconds)
+
+
+def write_bag(path: Path, images: list, fixes: int, fix_period_s: float = 0.1):
+    """`images`: encoded, one a second."""
+    with rosbag.Bag(str(path), 'w') as bag:
+        for k in range(fixes):
+            fix = NavSatFix(latitude=48.5 + 1e-6 * k * (fix_period_s / 0.1), longitude=9.0, altitude=340.0)
+            fix.header.stamp = at(fix_period_s * k)
+            bag.write(FIXES, fix, fix.header.stamp)
+        for k, data in enumerate(images):
+            message = CompressedImage(format='jpeg', data=data)
+            message.header.stamp = at(k)
+            bag.write(IMAGES, message, message.header.stamp)
+
+
+def encoded(side: int, seed: int, extension: str = '.jpg') -> bytes:
+    pixels = np.random.default_rng(seed).integers(0, 256, (side * 3 // 4, side), dtype=np.uint8)
+    return cv2.imencode(extension, pixels)[1].tobytes()
+
+
+def with_size(jpeg: bytes, side: int) -> bytes:
+    """The JPEG, claiming another size."""
+    frame = jpeg.index(b'\xff\xc0')
+    return jpeg[:frame + 5] + side.to_bytes(2, 'big') * 2 + jpeg[frame + 9:]
+
+
+class MemoryTest(ProgramTest):
+    """Hostile inputs and what they may take."""
+
+    def check(self, name: str, bound_mib: float, *command):
+        run = Run(bound_mib, *command)
+        print(f'{command[0]:12} {name:44} bound {bound_mib:6.0f} MiB, took {run.peak_mib:6.0f} MiB, exit {run.code}',
+              flush=True)
+        self.assertIn(run.code, (0, 1), f'{name}: {run.stderr}')
+        self.assertNotIn('memory', run.stderr, name)
+
+    def build(self, name: str, images: list, used_pixels: int, fixes: int, fix_period_s: float = 0.1):
+        bag = self.folder / 'round.bag'
+        write_bag(bag, images, fixes, fix_period_s)
+        self.check(name, builder_bound(used_pixels, len(images), fixes), 'map_builder', '--bag', bag, '--threads',
+                   THREADS, '--output', self.folder / 'round.map')
+        self.check(name, localizer_bound(320 * 240, mib(MAP.stat().st_size)), 'localize', '--map', MAP, '--bag', bag,
+                   '--output', self.folder / 'track.csv')
+
+    def test_dense_noise(self):
+        self.build('noise of 1600 x 1200', [encoded(1600, k) for k in range(6)], 1600 * 1200, 60)
+
+    def test_a_few_huge_images_among_small_ones(self):
+        huge = encoded(4096, 0)
+        self.build('four of 4096 x 3072 before 30 of 320 x 240',
+                   4 * [huge] + [encoded(320, k) for k in range(30)], 320 * 240, 340)
+
+    def test_images_that_claim_to_be_huge(self):
+        small = [encoded(320, k) for k in range(20)]
+        bombs = [with_size(jpeg, 60000) for jpeg in small] + [with_size(jpeg, 4096) for jpeg in small]
+        self.build('JPEGs that claim 60000 and 4096 pixels a side', bombs + small, 320 * 240, 600)
+
+    def test_a_picture_that_compresses_well(self):
+        white = cv2.imencode('.png', np.full((2560, 2560), 255, np.uint8))[1].tobytes()
+        self.build('white PNGs of 2560 x 2560', 4 * [white], 2560 * 2560, 40)
+
+    def test_many_fixes_at_once(self):
+        self.build('50 000 fixes, 1 us apart', [encoded(320, k) for k in range(6)], 320 * 240, 50_000, 1e-6)
+
+    def test_bags_with_wrong_lengths(self):
+        whole = DRIVE.read_bytes()
+        bag = self.folder / 'wrong.bag'
+        places = itertools.chain(range(13, 60, 9), range(4131, 4400, 62), range(len(whole) - 900, len(whole) - 8, 401))
+        bound = builder_bound(320 * 240, 450, 2500)
+        for place in places:
+            bag.write_bytes(whole[:place] + b'\xf0\xff\xff\x7f' + whole[place + 4:])
+            self.check(f'a bag with a length of 2 GiB at {place}', bound, 'map_builder', '--bag', bag, '--threads',
+                       THREADS, '--output', self.folder / 'wrong.map')
+
+    def test_maps_of_others(self):
+        whole = MAP.read_bytes()
+        wrong = self.folder / 'wrong.map'
+        cases = {path.name: path.read_bytes() for path in sorted(CORPUS.glob('*.map'))}
+        for place in range(20, len(whole) - 8, len(whole) // 8):
+            cases[f'a map overwritten at {place}'] = whole[:place] + 64 * b'\xff' + whole[place + 64:]
+        cache = mib(len(whole))
+        for name, content in cases.items():
+            wrong.write_bytes(content)
+            self.check(name, editor_bound(cache), 'map_info', wrong, '--check')
+            self.check(name, localizer_bound(320 * 240, cache), 'localize', '--map', wrong, '--bag', DRIVE, '--output',
+                       self.folder / 'track.csv')
+            self.check(name, editor_bound(cache), 'map_edit', 'thin', '--map', wrong, '--spacing', 5, '--output',
+                       self.folder / 'thin.map')
+
+    def test_texts_without_end(self):
+        texts = {'aliases of aliases': 'a: &a [1,1,1,1,1,1,1,1,1]\n' + ''.join(
+            f'{chr(98 + k)}: &{chr(98 + k)} [{",".join(9 * ["*" + chr(97 + k)])}]\n' for k in range(12)),
+            'depth': 100_000 * '[', 'a long key': 1_000_000 * 'k' + ': 1\n'}
+        config = self.folder / 'config.yaml'
+        polygon = self.folder / 'polygon.json'
+        usage = self.folder / 'usage.csv'
+        usage.write_text('stamp_ns,poses,landmarks\n' + 200_000 * '1,1,' + '\n')
+        for name, text in texts.items():
+            config.write_text(text)
+            polygon.write_text(text)
+            output = self.folder / 'out.map'
+            self.check(name, localizer_bound(320 * 240, mib(MAP.stat().st_size)), 'localize', '--map', MAP, '--bag',
+                       DRIVE, '--config', config, '--output', self.folder / 'track.csv')
+            self.check(name, editor_bound(mib(MAP.stat().st_size)), 'map_edit', 'cut', '--map', MAP, '--polygon',
+                       polygon, '--output', output)
+        self.check('a usage of one line', editor_bound(mib(MAP.stat().st_size)), 'map_edit', 'summarise', '--map', MAP,
+                   '--usage', usage, '--output', self.folder / 'out.map')
+
+
+if __name__ == '__main__':
+    unittest.main(argv=sys.argv[:1])
