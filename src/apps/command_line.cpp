@@ -110,6 +110,13 @@ CLI::App& declareCommand(CLI::App& app, MapEditOptions& options, const char* nam
   return command;
 }
 
+CLI::Option* declareUsage(CLI::App& command, MapEditOptions& options, const char* what) {
+  return command.add_option("--usage", options.usage, what)
+      ->take_all()
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
 void declareOptions(CLI::App& app, MapEditOptions& options) {
   app.require_subcommand(1);
   const auto declare = [&](const char* name, const char* what) -> CLI::App& {
@@ -120,6 +127,7 @@ void declareOptions(CLI::App& app, MapEditOptions& options) {
   CLI::App& add = declare("add", "Adds recordings to a map, without those that it was made of");
   declareRecordings(add, options.build);
   declareThreads(add, options.build.threads);
+  declareUsage(add, options, "Leave out what these drives used least, where they were, as summarise does");
   CLI::App& merge = declareCommand(app, options, "merge", "Makes one map of several; the oldest one stays in place");
   merge.add_option("maps", options.maps, "Map files; they stay as they are")->required()->expected(2, kMostMaps);
   declareThreads(merge, options.build.threads);
@@ -132,11 +140,7 @@ void declareOptions(CLI::App& app, MapEditOptions& options) {
       ->required()
       ->check(CLI::Range(kLeastSpacing_m, kMostSpacing_m));
   CLI::App& summarise = declare("summarise", "Keeps what drives used, and one image of each session at each place");
-  summarise.add_option("--usage", options.usage, "What a drive used (localize --usage); repeat it for more drives")
-      ->required()
-      ->take_all()
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  declareUsage(summarise, options, "What a drive used (localize --usage); repeat it for more drives")->required();
   summarise.add_option("--per-place", options.images_per_place, "Images that stay within 5 m, all sessions together")
       ->check(CLI::Range(std::size_t{1}, std::size_t{1000}))
       ->capture_default_str();

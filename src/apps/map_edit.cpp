@@ -57,16 +57,34 @@ void mergeFiles(const MapEditOptions& options) {
   mergeInto(options.output, maps, provenance(kProgram, options.command, names), options.build.threads);
 }
 
+/// What `read` makes of a file, which is named when it makes nothing of it.
+template <class Error, class Read>
+auto readWith(const std::string& path, Read read) {
+  try {
+    return read(readFile(path, kMostText_bytes));
+  } catch (const Error& error) {
+    throw Error(path + ": " + error.what());
+  }
+}
+
+MapUsage usageOf(const MapEditOptions& options) {
+  MapUsage usage;
+  for (const std::string& path : options.usage) usage.add(readWith<UsageFileError>(path, MapUsage::fromCsv));
+  return usage;
+}
+
 void addBags(const MapEditOptions& options) {
   requireDifferent("--bag", options.build.bags);
   std::vector<std::string> inputs = options.build.bags;
+  inputs.insert(inputs.end(), options.usage.begin(), options.usage.end());
   inputs.insert(inputs.end(), {options.build.config, options.build.camera_info, options.build.mask});
   requireOutput(options, inputs);
   const OutputLock lock(options.output);
+  const MapUsage usage = usageOf(options);
   std::vector<std::string> from{options.map};
   from.insert(from.end(), options.build.bags.begin(), options.build.bags.end());
-  addSessions({options.map, openMap(options.map, 2)}, options.build, options.output,
-              provenance(kProgram, options.command, from));
+  addSessions({options.map, openMap(options.map, 2)}, options.build, options.usage.empty() ? nullptr : &usage,
+              options.output, provenance(kProgram, options.command, from));
 }
 
 /// A new map of some images of one.
@@ -95,16 +113,6 @@ std::vector<bool> inside(const TrainingMap& map, const Region& region) {
   return keep;
 }
 
-/// What `read` makes of a file, which is named when it makes nothing of it.
-template <class Error, class Read>
-auto readWith(const std::string& path, Read read) {
-  try {
-    return read(readFile(path, kMostText_bytes));
-  } catch (const Error& error) {
-    throw Error(path + ": " + error.what());
-  }
-}
-
 void cut(const MapEditOptions& options) {
   const auto region = readWith<RegionError>(
       options.polygon, [](const std::string& text) { return std::make_unique<const Region>(text); });
@@ -112,8 +120,7 @@ void cut(const MapEditOptions& options) {
 }
 
 void summarise(const MapEditOptions& options) {
-  MapUsage usage;
-  for (const std::string& path : options.usage) usage.add(readWith<UsageFileError>(path, MapUsage::fromCsv));
+  const MapUsage usage = usageOf(options);
   SummaryConfig config;
   config.images_per_place = options.images_per_place;
   select(

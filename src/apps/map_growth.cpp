@@ -80,6 +80,19 @@ void saveSessions(MapBuilder& builder, const MapBuilderOptions& options, const M
   printReport(options, builder.report(), config.geometry, sessions);
 }
 
+/// What `file` has, as a map beside `map`; see addDrive for `usage`.
+void mergeAndCull(const NamedMap& map, const std::string& name, const PartialFile& file, const MapUsage& usage,
+                  const std::string& output, const std::string& edit, std::size_t threads) {
+  const PartialFile merged(output);
+  mergeAndPrint(merged, {map, {name, openMap(file.path(), 2)}}, edit, threads);
+  const auto grown = openMap(merged.path());
+  SummaryConfig where_driven;
+  where_driven.unused_places = false;
+  const std::vector<bool> keep = summary(*grown, usage, where_driven);
+  std::cout << "left out where the drive was: " << std::count(keep.begin(), keep.end(), false) << " images\n";
+  writeSelection(*grown, keep, "", output);
+}
+
 }  // namespace
 
 std::string provenance(const std::string& program, const std::string& command, const std::vector<std::string>& from) {
@@ -99,15 +112,17 @@ void mergeInto(const std::string& path, const std::vector<NamedMap>& maps, const
   mergeAndPrint(path, maps, edit, threads);
 }
 
-void addSessions(const NamedMap& map, const MapBuilderOptions& options, const std::string& output,
-                 const std::string& edit) {
+void addSessions(const NamedMap& map, const MapBuilderOptions& options, const MapUsage* usage,
+                 const std::string& output, const std::string& edit) {
   MapBuilderConfig config = readConfig(options);
   MapBuilder builder = builderFor(*map.map, options, config, output);
   std::vector<PlottedSession> sessions;
   for (const std::string& bag : options.bags) addSession(builder, bag, options, config, sessions);
   const PartialFile added(output);
   saveSessions(builder, options, config, sessions, added);
-  mergeAndPrint(output, {map, {joined(options.bags), openMap(added.path(), 2)}}, edit, options.threads);
+  const std::string name = joined(options.bags);
+  if (usage != nullptr) return mergeAndCull(map, name, added, *usage, output, edit, options.threads);
+  mergeAndPrint(output, {map, {name, openMap(added.path(), 2)}}, edit, options.threads);
 }
 
 void addDrive(const NamedMap& map, const VerifiedDrive& drive, const MapBuilderOptions& options, const MapUsage& usage,
@@ -118,14 +133,7 @@ void addDrive(const NamedMap& map, const VerifiedDrive& drive, const MapBuilderO
   addVerifiedSession(builder, options.bags.front(), drive, options, sessions);
   const PartialFile added(output);
   saveSessions(builder, options, config, sessions, added);
-  const PartialFile merged(output);
-  mergeAndPrint(merged, {map, {options.bags.front(), openMap(added.path(), 2)}}, edit, options.threads);
-  const auto grown = openMap(merged.path());
-  SummaryConfig where_driven;
-  where_driven.unused_places = false;
-  const std::vector<bool> keep = summary(*grown, usage, where_driven);
-  std::cout << "left out where the drive was: " << std::count(keep.begin(), keep.end(), false) << " images\n";
-  writeSelection(*grown, keep, "", output);
+  mergeAndCull(map, options.bags.front(), added, usage, output, edit, options.threads);
 }
 
 }  // namespace visual_localization::apps

@@ -24,9 +24,10 @@ std::shared_ptr<const TrainingMap> openMap(const std::string& path, std::size_t 
 void mergeInto(const std::string& path, const std::vector<NamedMap>& maps, const std::string& edit,
                std::size_t threads);
 
-/// Adds the recordings of `options.bags` to a map, as sessions. Says what became of them.
-void addSessions(const NamedMap& map, const MapBuilderOptions& options, const std::string& output,
-                 const std::string& edit);
+/// Adds the recordings of `options.bags` to a map, as sessions. Says what became of them. `usage`: see addDrive; null:
+/// no image is left out.
+void addSessions(const NamedMap& map, const MapBuilderOptions& options, const MapUsage* usage,
+                 const std::string& output, const std::string& edit);
 
 /// Adds a drive to the map that it was localised in, by its verified poses instead of fixes, and leaves out what drives
 /// use least; see summary(). `usage`: of this drive.

@@ -1,8 +1,11 @@
 #include "bag/bag_writer.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
+#include <filesystem>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -48,6 +51,15 @@ std::string bagHeader(std::uint64_t index_at, std::size_t connections, std::uint
 [[noreturn]] void fail(const std::string& path) { throw FileError(path + ": " + std::strerror(errno)); }
 
 }  // namespace
+
+std::string newSessionBag(const std::string& folder) {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  ::localtime_r(&now, &parts);
+  std::array<char, 64> name{};
+  std::strftime(name.data(), name.size(), "session_%Y-%m-%d-%H-%M-%S.bag", &parts);
+  return (std::filesystem::path(folder) / name.data()).string();
+}
 
 BagWriter::BagWriter(const std::string& path)
     : path_(path), file_(::open(path.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644)) {

@@ -13,6 +13,9 @@
 
 namespace visual_localization {
 
+/// A bag in `folder` that is named after the local time: "session_2026-11-22-07-15-00.bag".
+std::string newSessionBag(const std::string& folder);
+
 /// Writes a bag (format 2.0) that is whole after every sync(), whatever happens to the process or the machine later.
 /// rosbag_storage writes the index of a bag when it is closed: what a robot recorded until its power was lost must be
 /// repaired first. Here each sync() appends a chunk and an index of all that is before it, flushes both to the disk,

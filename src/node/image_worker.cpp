@@ -151,10 +151,13 @@ void ImageWorker::publish(const LocalizedImage& image) {
   if (!isFinite(estimate)) return log_.error("not finite", "The estimate is not finite and is not published");
   const std::string trouble = imageTrouble(estimate);
   if (!trouble.empty()) log_.warn("trouble", trouble + " (" + topic_ + ")");
-  try {
-    output_.publish(image, counts());
-  } catch (const std::exception& error) {
-    log_.error("not published", "An image is localised, but not everything is published: " + std::string(error.what()));
+  for (ImageOutput* output : outputs_) {
+    try {
+      output->publish(image, counts());
+    } catch (const std::exception& error) {
+      log_.error("not published",
+                 "An image is localised, but not everything is published: " + std::string(error.what()));
+    }
   }
 }
 
@@ -168,13 +171,13 @@ bool ImageWorker::isLate(const ros::Time& stamp) {
     return true;
   }
   log_.warn("time went back", "Time went back by " + lag.str() + ", as when a bag starts again: continuing from there");
-  output_.timeWentBack();
+  for (ImageOutput* output : outputs_) output->timeWentBack();
   return false;
 }
 
 void ImageWorker::refuse(const std::string& reason) {
   count(&ImageCounts::refused);
-  output_.refused(reason);
+  for (ImageOutput* output : outputs_) output->refused(reason);
   log_.warn("refused", "Image refused: " + reason);
 }
 

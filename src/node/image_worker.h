@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <image_transport/image_transport.h>
 #include <opencv2/core.hpp>
@@ -145,16 +146,16 @@ class ImageOutput {
  public:
   virtual ~ImageOutput() = default;
   virtual void publish(const LocalizedImage& image, const ImageCounts& counts) = 0;
-  virtual void refused(const std::string& reason) = 0;
-  virtual void timeWentBack() = 0;
+  virtual void refused(const std::string& /*reason*/) {}
+  virtual void timeWentBack() {}
 };
 
 /// Localises the newest image in a thread of its own; the callbacks of roscpp only push.
 class ImageWorker {
  public:
-  /// All three must outlive it.
-  ImageWorker(SharedLocalizer& localizer, ImageOutput& output, ThrottledLog& log)
-      : localizer_(localizer), output_(output), log_(log) {}
+  /// All must outlive it. The outputs are served in their order.
+  ImageWorker(SharedLocalizer& localizer, std::vector<ImageOutput*> outputs, ThrottledLog& log)
+      : localizer_(localizer), outputs_(std::move(outputs)), log_(log) {}
   ~ImageWorker() { stop(); }
   ImageWorker(const ImageWorker&) = delete;
   ImageWorker& operator=(const ImageWorker&) = delete;
@@ -177,7 +178,7 @@ class ImageWorker {
   void count(std::uint64_t ImageCounts::*images);
 
   SharedLocalizer& localizer_;
-  ImageOutput& output_;
+  const std::vector<ImageOutput*> outputs_;
   ThrottledLog& log_;
   std::string topic_;
   LatestQueue<ReceivedImage> queue_;

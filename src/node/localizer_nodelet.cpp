@@ -1,14 +1,17 @@
 #include "node/localizer_nodelet.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <exception>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include <nodelet/exception.h>
 #include <pluginlib/class_list_macros.hpp>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include "base/process.h"
 #include "base/text.h"
 #include "node/node_config.h"
 #include "ros/message_readers.h"
@@ -21,6 +24,28 @@ namespace {
 
 constexpr std::uint32_t kOdometryQueue = 200;  ///< two seconds at 100 Hz
 constexpr double kTimerPeriod_s = 1.0;         ///< of diagnostics, and of the status while there is no map
+
+/// On half of the cores: the other half is for the images.
+void extendMap(const SessionExtension& extension, ChildProcess& map_edit) {
+  const unsigned threads = std::max(1U, std::thread::hardware_concurrency() / 2);
+  std::vector<std::string> arguments{"add",
+                                     "--map",
+                                     extension.map,
+                                     "--bag",
+                                     extension.bag,
+                                     "--image-topic",
+                                     extension.image_topic,
+                                     "--fix-topic",
+                                     extension.fix_topic,
+                                     "--usage",
+                                     extension.usage,
+                                     "--output",
+                                     extension.output};
+  if (!extension.mask.empty()) arguments.insert(arguments.end(), {"--mask", extension.mask});
+  arguments.insert(arguments.end(), {"--threads", std::to_string(threads)});
+  const std::string warnings = map_edit.run(programOfPackage("map_edit"), arguments);
+  if (!warnings.empty()) ROS_WARN_STREAM("map_edit: " << oneLine(warnings));
+}
 
 }  // namespace
 
@@ -58,6 +83,8 @@ void LocalizerNodelet::stop() {
   worker_.reset();
   camera_.reset();
   images_.reset();
+  usage_.reset();
+  sessions_.reset();
   publisher_.reset();
   diagnostics_.reset();
 }
@@ -71,7 +98,13 @@ void LocalizerNodelet::start() {
       node, private_node, getName(), parameters_.node, [this] { return images_->description(); },
       [this] { return worker_->counts(); });
   publisher_ = std::make_unique<LocalizerPublisher>(node, private_node, parameters_.node, *diagnostics_, log_);
-  worker_ = std::make_unique<ImageWorker>(*localizer_, *publisher_, log_);
+  sessions_ = std::make_unique<SessionRecorder>(parameters_.node.session_folder, extendMap, log_);
+  std::vector<ImageOutput*> outputs{publisher_.get(), sessions_.get()};
+  if (!parameters_.node.usage_file.empty()) {
+    usage_ = std::make_unique<UsageRecorder>(parameters_.node.usage_file, log_);
+    outputs.push_back(usage_.get());
+  }
+  worker_ = std::make_unique<ImageWorker>(*localizer_, std::move(outputs), log_);
   camera_ = std::make_unique<CameraWatch>(node, parameters_.node, node.resolveName("image"), *localizer_, *diagnostics_,
                                           [this](bool warning, const std::string& text) {
                                             if (warning) {
@@ -122,6 +155,7 @@ void LocalizerNodelet::offerServices() {
       [this](const std::string& reason) { NODELET_WARN_STREAM("Parameters: " << reason); });
   service_spinner_ = std::make_unique<ros::AsyncSpinner>(1, &service_queue_);
   service_spinner_->start();
+  sessions_->offer(getPrivateNodeHandle());
 }
 
 void LocalizerNodelet::onInitialPose(const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
@@ -219,6 +253,7 @@ void LocalizerNodelet::configure(const NodeParameters& parameters, const Paramet
   localizer_->configure(parameters.localizer);
   diagnostics_->setImageTimeout(parameters.node.image_timeout_s);
   publisher_->setTransformTolerance(parameters.node.transform_tolerance_s);
+  publisher_->setImageTimeout(parameters.node.image_timeout_s);
   std::vector<std::string> settings;
   for (const auto& [name, value] : changed) settings.push_back(name + " = " + parameters::toString(value));
   NODELET_INFO_STREAM("Parameters changed: " << joined(settings));
@@ -251,6 +286,7 @@ std::size_t LocalizerNodelet::useMap(const std::string& path) {
   }));
   localizer_->setMap(map);
   camera_->mapIs(map->header());
+  sessions_->mapIs(file, map);
   publisher_->publishMap(*map);
   diagnostics_->mapLoaded(path, map->size());
   NODELET_INFO_STREAM("Map " << oneLine(path) << " with " << map->size() << " training images");

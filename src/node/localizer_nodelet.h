@@ -25,8 +25,10 @@
 #include "node/localizer_publisher.h"
 #include "node/node_config.h"
 #include "node/reconfigure_server.h"
+#include "node/session_recorder.h"
 #include "node/shared_localizer.h"
 #include "node/throttled_log.h"
+#include "node/usage_recorder.h"
 
 namespace visual_localization {
 
@@ -62,6 +64,8 @@ class LocalizerNodelet : public nodelet::Nodelet {
   std::unique_ptr<SharedLocalizer> localizer_;
   std::unique_ptr<LocalizerDiagnostics> diagnostics_;
   std::unique_ptr<LocalizerPublisher> publisher_;
+  std::unique_ptr<UsageRecorder> usage_;  ///< only where it is asked for
+  std::unique_ptr<SessionRecorder> sessions_;
   std::unique_ptr<ImageWorker> worker_;
   std::unique_ptr<ImageSource> images_;
   std::unique_ptr<CameraWatch> camera_;

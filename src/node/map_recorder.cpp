@@ -1,7 +1,6 @@
 #include "node/map_recorder.h"
 
 #include <chrono>
-#include <ctime>
 #include <filesystem>
 #include <utility>
 
@@ -33,16 +32,6 @@ constexpr std::uint32_t kSlowQueue = 100;  ///< while the disk is slow
 constexpr std::uint32_t kFastQueue = 1000;
 constexpr double kReportPeriod_s = 1.0;
 constexpr int kLongestSide_px = 640;  ///< larger images are looked at in this size: a weak one shows there too
-
-/// Of the computer's clock: the bag's name.
-std::string localTime() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  ::localtime_r(&now, &parts);
-  char text[32];
-  const std::size_t size = std::strftime(text, sizeof(text), "%Y-%m-%d-%H-%M-%S", &parts);
-  return {text, size};
-}
 
 /// A bag knows no time before the first clock message of a simulation.
 ros::Time now() {
@@ -78,7 +67,7 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
   watch_.emplace(config_.watch, map);
   fix_topic_ = node_.resolveName("fix");
   image_topic_ = node_.resolveName("image");
-  bag_.emplace((std::filesystem::path(config_.folder) / ("session_" + localTime() + ".bag")).string());
+  bag_.emplace(newSessionBag(config_.folder));
 
   if (config_.image_transport == "compressed") {
     recordImages<sensor_msgs::CompressedImage>(image_topic_ + "/compressed");

@@ -66,6 +66,43 @@ bool isBelow(const fs::path& directory, const fs::path& file) {
   return in_directory == directory.end() && in_file != file.end();
 }
 
+using XmlRpc::XmlRpcValue;
+
+void flattenInto(XmlRpcValue value, const std::string& name, ParameterValues& out) {
+  switch (value.getType()) {
+    case XmlRpcValue::TypeStruct:
+      for (auto& [key, child] : value) flattenInto(child, name.empty() ? key : name + "/" + key, out);
+      return;
+    case XmlRpcValue::TypeBoolean:
+      out[name] = static_cast<bool>(value);
+      return;
+    case XmlRpcValue::TypeInt:
+      out[name] = std::int64_t{static_cast<int>(value)};
+      return;
+    case XmlRpcValue::TypeDouble:
+      out[name] = static_cast<double>(value);
+      return;
+    case XmlRpcValue::TypeString:
+      out[name] = static_cast<std::string>(value);
+      return;
+    default:
+      throw ParameterError("parameter '" + name + "' must be a single value: true or false, number or string");
+  }
+}
+
+XmlRpcValue toXmlRpc(const ParameterValue& value) {
+  if (const auto* flag = std::get_if<bool>(&value)) return XmlRpcValue(*flag);
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) return XmlRpcValue(static_cast<int>(*integer));
+  if (const auto* real = std::get_if<double>(&value)) return XmlRpcValue(*real);
+  return XmlRpcValue(std::get<std::string>(value));
+}
+
+void dropForeign(XmlRpcValue& tree, XmlRpcValue& kept) {
+  for (auto& [key, child] : tree) {
+    if (!belongsToOthers(key)) kept[key] = child;
+  }
+}
+
 }  // namespace
 
 void NodeConfig::declare(ParameterVisitor& visitor) {
@@ -90,18 +127,30 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.text({"mask_file", "", "grey PNG of the camera's size, features are used where it is white; empty: the map's",
                 kAtStartOnly},
                mask_file);
+  visitor.text(
+      {"usage_file", "", "what metric poses rest on is counted there, for map_edit, an absolute path; empty: nowhere",
+       kAtStartOnly},
+      usage_file);
+  visitor.text({"session_folder", "", "where ~record_session writes, an absolute path; empty: nowhere", kAtStartOnly},
+               session_folder);
   visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf", kAtStartOnly},
                  tf_mode, {"none", "map_to_odom", "map_to_base"});
   visitor.flag({"tf_metric_only", "",
                 "where landmarks can verify poses, only METRIC ones while TRACKING move the robot on tf", kAtStartOnly},
                tf_metric_only);
+  visitor.real({"tf_rate", "Hz", "of map_to_odom alone, stamped with the present; 0: with each image", kAtStartOnly},
+               tf_rate_hz, 0.0, 1000.0);
+  visitor.real(
+      {"tf_smoothing", "s", "with tf_rate: time constant in which a small correction moves the robot", kAtStartOnly},
+      tf_smoothing_s, 0.0, 60.0);
   visitor.flag(
       {"use_odometry", "", "wheel odometry on the topic odom bridges images that show nothing known", kAtStartOnly},
       use_odometry);
-  visitor.real({"transform_tolerance", "s", "added to the image stamp in the stamp of the transform"},
-               transform_tolerance_s, 0.0, 60.0);
+  visitor.real(
+      {"transform_tolerance", "s", "added to the stamp of the transform: the image's, or with tf_rate the present"},
+      transform_tolerance_s, 0.0, 60.0);
   visitor.real({"image_timeout", "s",
-                "after this time without an image diagnostics report an error and the state is not TRACKING"},
+                "without an image for so long: an error in diagnostics, no TRACKING, no transform by tf_rate"},
                image_timeout_s, 0.1, 3600.0);
   visitor.text({"global_frame_id", "", "frame of the map", kAtStartOnly}, global_frame_id);
   visitor.text({"odom_frame_id", "", "frame of the odometry", kAtStartOnly}, odom_frame_id);
@@ -112,6 +161,10 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   requireFrame(visitor, "odom_frame_id", odom_frame_id);
   requireFrame(visitor, "base_frame_id", base_frame_id);
   visitor.require(map_directory.empty() || map_directory.front() == '/', "map_directory", "'" + map_directory + "'",
+                  "an absolute path");
+  visitor.require(usage_file.empty() || usage_file.front() == '/', "usage_file", "'" + usage_file + "'",
+                  "an absolute path");
+  visitor.require(session_folder.empty() || session_folder.front() == '/', "session_folder", "'" + session_folder + "'",
                   "an absolute path");
   visitor.require(global_frame_id != base_frame_id && global_frame_id != odom_frame_id, "global_frame_id",
                   "'" + global_frame_id + "'", "another one than odom_frame_id and base_frame_id");
@@ -161,47 +214,6 @@ std::string mapFileBelow(const std::string& directory, const std::string& path, 
     return refuse("cannot be found below ~" + parameter + " '" + directory + "': " + error.code().message());
   }
 }
-
-namespace {
-
-using XmlRpc::XmlRpcValue;
-
-void flattenInto(XmlRpcValue value, const std::string& name, ParameterValues& out) {
-  switch (value.getType()) {
-    case XmlRpcValue::TypeStruct:
-      for (auto& [key, child] : value) flattenInto(child, name.empty() ? key : name + "/" + key, out);
-      return;
-    case XmlRpcValue::TypeBoolean:
-      out[name] = static_cast<bool>(value);
-      return;
-    case XmlRpcValue::TypeInt:
-      out[name] = std::int64_t{static_cast<int>(value)};
-      return;
-    case XmlRpcValue::TypeDouble:
-      out[name] = static_cast<double>(value);
-      return;
-    case XmlRpcValue::TypeString:
-      out[name] = static_cast<std::string>(value);
-      return;
-    default:
-      throw ParameterError("parameter '" + name + "' must be a single value: true or false, number or string");
-  }
-}
-
-XmlRpcValue toXmlRpc(const ParameterValue& value) {
-  if (const auto* flag = std::get_if<bool>(&value)) return XmlRpcValue(*flag);
-  if (const auto* integer = std::get_if<std::int64_t>(&value)) return XmlRpcValue(static_cast<int>(*integer));
-  if (const auto* real = std::get_if<double>(&value)) return XmlRpcValue(*real);
-  return XmlRpcValue(std::get<std::string>(value));
-}
-
-void dropForeign(XmlRpcValue& tree, XmlRpcValue& kept) {
-  for (auto& [key, child] : tree) {
-    if (!belongsToOthers(key)) kept[key] = child;
-  }
-}
-
-}  // namespace
 
 ParameterValues flatten(const XmlRpcValue& tree) {
   ParameterValues out;

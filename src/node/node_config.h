@@ -23,8 +23,12 @@ struct NodeConfig {
   std::string camera_info_file;
   std::string camera_mount;
   std::string mask_file;
+  std::string usage_file;
+  std::string session_folder;
   std::string tf_mode = "none";
   bool tf_metric_only = true;
+  double tf_rate_hz = 0.0;
+  double tf_smoothing_s = 0.5;
   bool use_odometry = false;
   double transform_tolerance_s = 0.1;
   double image_timeout_s = 5.0;

@@ -95,8 +95,14 @@ std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t sta
   if (!localizer_) return std::nullopt;
   passOdometry();
   const Estimate estimate = localizer_->process(stamp_ns, grey);
-  return Result{estimate,      localizer_->particles(),     localizer_->lastSift(),
-                config_.match, localizer_->lastLandmarks(), localizer_->camera(),
+  return Result{estimate,
+                localizer_->particles(),
+                localizer_->lastSift(),
+                config_.match,
+                localizer_->lastLandmarks(),
+                localizer_->camera(),
+                localizer_->mount(),
+                localizer_->mask(),
                 map_};
 }
 

@@ -35,6 +35,8 @@ class SharedLocalizer {
     MatchConfig match;                  ///< the rule that SIFT features are matched by
     MatchedLandmarks landmarks;         ///< see Localizer::lastLandmarks
     std::optional<CameraModel> camera;  ///< see Localizer::camera
+    SensorMount mount;
+    Mask mask;
     std::shared_ptr<const TrainingMap> map;
   };
 

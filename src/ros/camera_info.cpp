@@ -167,6 +167,19 @@ std::optional<CameraModel> toCamera(const sensor_msgs::CameraInfo& info, bool re
   return CameraModel(camera);
 }
 
+sensor_msgs::CameraInfo toMessage(const CameraModel& camera) {
+  const Intrinsics& intrinsics = camera.intrinsics();
+  sensor_msgs::CameraInfo info;
+  info.width = static_cast<std::uint32_t>(intrinsics.size.width);
+  info.height = static_cast<std::uint32_t>(intrinsics.size.height);
+  info.distortion_model = toString(intrinsics.distortion);
+  info.D = intrinsics.coefficients;
+  info.K = {intrinsics.fx, 0.0, intrinsics.cx, 0.0, intrinsics.fy, intrinsics.cy, 0.0, 0.0, 1.0};
+  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  info.P = {intrinsics.fx, 0.0, intrinsics.cx, 0.0, 0.0, intrinsics.fy, intrinsics.cy, 0.0, 0.0, 0.0, 1.0, 0.0};
+  return info;
+}
+
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
   return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model && a.D == b.D &&
          a.K == b.K && a.P == b.P && a.binning_x == b.binning_x && a.binning_y == b.binning_y &&

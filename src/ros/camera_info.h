@@ -15,6 +15,9 @@ namespace visual_localization {
 /// used.
 std::optional<CameraModel> toCamera(const sensor_msgs::CameraInfo& info, bool rectified = false);
 
+/// Inverse of toCamera(), for images that are not rectified; its header is empty.
+sensor_msgs::CameraInfo toMessage(const CameraModel& camera);
+
 /// Whether two messages say the same, whatever their headers.
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b);
 

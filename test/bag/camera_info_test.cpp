@@ -56,6 +56,22 @@ TEST(CameraInfo, IsReadFieldByField) {
   EXPECT_EQ(values.coefficients, example().D);
 }
 
+TEST(CameraInfo, IsWrittenAsItIsRead) {
+  Intrinsics lens{{640, 480}, 500.0, 510.0, 321.5, 238.0, Distortion::kEquidistant, {0.01, -0.002, 0.0003, 0.0}};
+  for (const Distortion distortion : {Distortion::kEquidistant, Distortion::kPlumbBob}) {
+    lens.distortion = distortion;
+    const auto camera = toCamera(toMessage(CameraModel(lens)));
+    ASSERT_TRUE(camera);
+    EXPECT_EQ(camera->size(), lens.size);
+    EXPECT_EQ(camera->intrinsics().fx, lens.fx);
+    EXPECT_EQ(camera->intrinsics().fy, lens.fy);
+    EXPECT_EQ(camera->intrinsics().cx, lens.cx);
+    EXPECT_EQ(camera->intrinsics().cy, lens.cy);
+    EXPECT_EQ(camera->intrinsics().distortion, distortion);
+    EXPECT_EQ(camera->intrinsics().coefficients, lens.coefficients);
+  }
+}
+
 TEST(CameraInfo, OfZerosMeansNotCalibrated) {
   EXPECT_FALSE(toCamera(sensor_msgs::CameraInfo()));
   EXPECT_FALSE(toCamera(sensor_msgs::CameraInfo(), true));

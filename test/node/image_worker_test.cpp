@@ -85,7 +85,7 @@ class ImageWorkerTest : public testing::Test {
   std::vector<std::string> lines_;  ///< of the log, by the worker's thread
   ThrottledLog log_{[this](ThrottledLog::Severity, const std::string& text) { lines_.push_back(text); },
                     std::chrono::milliseconds(0)};
-  ImageWorker worker_{localizer_, output_, log_};
+  ImageWorker worker_{localizer_, {&output_}, log_};
 };
 
 TEST_F(ImageWorkerTest, AnImageIsPublishedWithItsHeaderAndItsPixels) {
