@@ -25,7 +25,8 @@ USAGE
 build_package() {
   unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH PYTHONPATH
   cmake -S "$repo" -B "$build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=/usr -DBUILD_TESTING=OFF \
-    -DCATKIN_BUILD_BINARY_PACKAGE=1 -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+    -DVISUAL_LOCALIZATION_LIB_DESTINATION="lib/$(g++ -print-multiarch)" -DCATKIN_BUILD_BINARY_PACKAGE=1 \
+    -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DVISUAL_LOCALIZATION_DEB_DEPENDS="${depends//$'\n'/, }" \
     && cmake --build "$build" --parallel "$jobs" \
     && rm -f "$build"/*.deb \
@@ -68,6 +69,7 @@ main() {
   with_progress "build the package" "$log" build_package || fail "the package was not built; log $log"
   echo "$(ls "$build"/*.deb): $(du -h "$build"/*.deb | cut -f 1)"
   if [[ -z $tree ]]; then return; fi
+  # shellcheck disable=SC1091
   release=$(. /etc/os-release && echo "$VERSION_CODENAME")
   mkdir -p "$(dirname "$tree")"
   tree=$(cd "$(dirname "$tree")" && pwd)/$(basename "$tree")

@@ -81,7 +81,7 @@ void runScript(const std::string& name, const std::vector<std::string>& argument
   std::vector<std::string> words{"--"};
   words.insert(words.end(), arguments.begin(), arguments.end());
   // The file exists: what is missing is the interpreter that its first line names.
-  std::cerr << ChildProcess(0, "is Python 3 installed? ").run(programOfPackage(name), words);
+  std::cerr << ChildProcess(0, "is Python 3 installed? ").run(programBeside(name), words);
 }
 
 ProgressBar::ProgressBar(std::string label)

@@ -62,13 +62,20 @@ fs::path thisLibrary() {
 
 }  // namespace
 
+std::string programBeside(const std::string& name) {
+  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path() / name;
+  if (!fs::exists(program)) throw std::runtime_error(program.string() + ": is missing");
+  return program.string();
+}
+
 std::string programOfPackage(const std::string& name) {
-  const fs::path beside = fs::read_symlink("/proc/self/exe").parent_path() / name;
-  const fs::path installed = thisLibrary().parent_path() / "visual_localization" / name;
-  for (const fs::path& program : {beside, installed}) {
-    if (fs::exists(program)) return program.string();
+  const fs::path libraries = thisLibrary().parent_path();
+  // Debian has libraries one folder below.
+  for (const fs::path& folder : {fs::read_symlink("/proc/self/exe").parent_path(), libraries / "visual_localization",
+                                 libraries.parent_path() / "visual_localization"}) {
+    if (fs::exists(folder / name)) return (folder / name).string();
   }
-  throw std::runtime_error(beside.string() + ": is missing");
+  return programBeside(name);
 }
 
 std::string ChildProcess::run(const std::string& program, const std::vector<std::string>& arguments) {

@@ -9,9 +9,10 @@
 
 namespace visual_localization {
 
-/// Where another program or script of this package is: beside the running program, or, for a nodelet in another
-/// package's program, where the library that this is in was installed with it. Throws std::runtime_error when it is in
-/// neither place.
+/// Where a program or script is that lies beside the running program. Throws std::runtime_error when it does not.
+std::string programBeside(const std::string& name);
+/// The same for a nodelet in another package's program, too: there it is where the library that this is in was
+/// installed with it.
 std::string programOfPackage(const std::string& name);
 
 /// A program that runs as a process of its own.

@@ -118,15 +118,15 @@ TEST(MapPlot, RepairsNamesThatAreNotUtf8) {
 
 TEST(MapPlot, AFailureLeavesTheOldPlotAndNothingElse) {
   const test::TemporaryFolder folder;
-  test::writeAll(folder / "plot.xyz", "old");
+  test::writeAll(folder / "plot.png", "old");
   try {
-    drawMapPlot(folder / "plot.xyz", {sessionOf(fixesUntil(20))}, kFrame);
-    FAIL() << "no picture ends in .xyz";
+    drawMapPlot(folder / "plot.png", {sessionOf(fixesUntil(20))}, kFrame);
+    FAIL() << "there is no script beside this program";
   } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("plot_map.py: failed: "), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("plot_map.py: is missing"), std::string::npos) << error.what();
   }
-  EXPECT_EQ(folder.names(), std::vector<std::string>{"plot.xyz"});
-  EXPECT_EQ(test::readAll(folder / "plot.xyz"), "old");
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"plot.png"});
+  EXPECT_EQ(test::readAll(folder / "plot.png"), "old");
 }
 
 }  // namespace
