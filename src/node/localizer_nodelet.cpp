@@ -97,7 +97,7 @@ void LocalizerNodelet::start() {
   diagnostics_ = std::make_unique<LocalizerDiagnostics>(
       node, private_node, getName(), parameters_.node, [this] { return images_->description(); },
       [this] { return worker_->counts(); });
-  publisher_ = std::make_unique<LocalizerPublisher>(node, private_node, parameters_.node, *diagnostics_, log_);
+  publisher_ = std::make_unique<LocalizerPublisher>(node, private_node, parameters_, *diagnostics_, log_);
   sessions_ = std::make_unique<SessionRecorder>(parameters_.node.session_folder, extendMap, log_);
   std::vector<ImageOutput*> outputs{publisher_.get(), sessions_.get()};
   if (!parameters_.node.usage_file.empty()) {
@@ -252,8 +252,7 @@ bool LocalizerNodelet::onToLL(ToLL::Request& request, ToLL::Response& response) 
 void LocalizerNodelet::configure(const NodeParameters& parameters, const ParameterValues& changed) {
   localizer_->configure(parameters.localizer);
   diagnostics_->setImageTimeout(parameters.node.image_timeout_s);
-  publisher_->setTransformTolerance(parameters.node.transform_tolerance_s);
-  publisher_->setImageTimeout(parameters.node.image_timeout_s);
+  publisher_->configure(parameters.node);
   std::vector<std::string> settings;
   for (const auto& [name, value] : changed) settings.push_back(name + " = " + parameters::toString(value));
   NODELET_INFO_STREAM("Parameters changed: " << joined(settings));

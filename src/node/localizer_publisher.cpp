@@ -33,8 +33,13 @@ double latencyOf(const LocalizedImage& image) {
 }  // namespace
 
 LocalizerPublisher::LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHandle private_node,
-                                       const NodeConfig& config, LocalizerDiagnostics& diagnostics, ThrottledLog& log)
-    : config_(config), diagnostics_(diagnostics), log_(log), transform_(config, node), image_transport_(private_node) {
+                                       const NodeParameters& parameters, LocalizerDiagnostics& diagnostics,
+                                       ThrottledLog& log)
+    : config_(parameters.node),
+      diagnostics_(diagnostics),
+      log_(log),
+      transform_(parameters, node),
+      image_transport_(private_node) {
   constexpr bool kLatched = true;
   pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kMessagesQueued);
   fix_ = private_node.advertise<sensor_msgs::NavSatFix>("fix", kMessagesQueued);

@@ -26,14 +26,14 @@ namespace visual_localization {
 class LocalizerPublisher : public ImageOutput {
  public:
   /// `diagnostics` and `log` must outlive it.
-  LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHandle private_node, const NodeConfig& config,
+  LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHandle private_node, const NodeParameters& parameters,
                      LocalizerDiagnostics& diagnostics, ThrottledLog& log);
 
   void publishMap(const TrainingMap& map);
   /// What is known without an image: that there is no map, or that no image comes. Stamped with the present.
   void publishState(LocalizationState state, const ImageCounts& counts);
-  void setTransformTolerance(double transform_tolerance_s) { transform_.setTolerance(transform_tolerance_s); }
-  void setImageTimeout(double image_timeout_s) { transform_.setImageTimeout(image_timeout_s); }
+  /// What can change while it runs. From any thread.
+  void configure(const NodeConfig& config) { transform_.configure(config); }
 
   /// No pose and no transform after an image of a frozen camera.
   void publish(const LocalizedImage& image, const ImageCounts& counts) override;

@@ -24,8 +24,6 @@ constexpr std::chrono::milliseconds kOdometryWait{100};
 constexpr std::chrono::milliseconds kUnknownOdometryWait{20};
 constexpr std::chrono::milliseconds kOdometryPoll{5};
 constexpr double kSlidingSigmas = 3.0;
-constexpr double kDrift = 0.05;        ///< standard deviation of a way by odometry, share of the way
-constexpr double kDrift_rad_m = 0.01;  ///< of its heading, by the way
 
 tf2::Transform planar(double x_m, double y_m, double yaw_rad) {
   return tf2::Transform(tf2::Quaternion(tf2::Vector3(0.0, 0.0, 1.0), yaw_rad), tf2::Vector3(x_m, y_m, 0.0));
@@ -52,8 +50,8 @@ void SlidingCorrection::aimAt(const tf2::Transform& odom_in_map, const tf2::Tran
   target_ = odom_in_map;
   if (shown_) {
     const tf2::Transform left = (*shown_ * base_in_odom).inverseTimes(target_ * base_in_odom);
-    const double way_sigma_m = std::hypot(sigma_m, kDrift * way_m_);
-    const double way_sigma_rad = std::hypot(sigma_yaw_rad, kDrift_rad_m * way_m_);
+    const double way_sigma_m = std::hypot(sigma_m, odometry_.distance_sigma * way_m_);
+    const double way_sigma_rad = std::hypot(sigma_yaw_rad, odometry_.turn_sigma_rad_m * way_m_);
     const bool elsewhere = std::hypot(left.getOrigin().x(), left.getOrigin().y()) > kSlidingSigmas * way_sigma_m ||
                            std::abs(tf2::getYaw(left.getRotation())) > kSlidingSigmas * way_sigma_rad;
     if (elsewhere) shown_.reset();
@@ -74,12 +72,13 @@ tf2::Transform SlidingCorrection::after(double elapsed_s, const tf2::Transform& 
   return *shown_;
 }
 
-TransformPublisher::TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node)
-    : config_(config),
-      between_images_(config.tf_mode == "map_to_odom" && config.tf_rate_hz > 0.0),
-      tolerance_s_(config.transform_tolerance_s),
-      image_timeout_s_(config.image_timeout_s),
-      correction_(config.tf_smoothing_s) {
+TransformPublisher::TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node)
+    : config_(parameters.node),
+      odometry_(parameters.localizer.odometry),
+      between_images_(config_.tf_mode == "map_to_odom" && config_.tf_rate_hz > 0.0),
+      tolerance_s_(config_.transform_tolerance_s),
+      image_timeout_s_(config_.image_timeout_s),
+      correction_(config_.tf_smoothing_s, odometry_) {
   if (config_.tf_mode == "map_to_odom") listener_ = std::make_unique<tf2_ros::TransformListener>(buffer_, node);
   if (!between_images_) return;
   ros::NodeHandle timer_node(node);
@@ -95,6 +94,11 @@ TransformPublisher::~TransformPublisher() {
   spinner_.reset();
 }
 
+void TransformPublisher::configure(const NodeConfig& config) {
+  tolerance_s_ = config.transform_tolerance_s;
+  image_timeout_s_ = config.image_timeout_s;
+}
+
 void TransformPublisher::forget() {
   buffer_.clear();
   last_stamp_ = ros::Time();
@@ -104,7 +108,7 @@ void TransformPublisher::forget() {
 void TransformPublisher::forgetPose() {
   const std::lock_guard<std::mutex> lock(mutex_);
   odom_in_map_.reset();
-  correction_ = SlidingCorrection(config_.tf_smoothing_s);
+  correction_ = SlidingCorrection(config_.tf_smoothing_s, odometry_);
   last_between_ = ros::Time();
   trouble_between_.clear();
 }
@@ -151,27 +155,12 @@ void TransformPublisher::broadcastBetween(const ros::Time& now) {
   if (!odom_in_map_ || now == last_between_) return;  // simulated time may stand still
   const std::chrono::duration<double> silence = std::chrono::steady_clock::now() - last_image_;
   if (silence.count() > image_timeout_s_) return;
-  const auto base_in_odom = newestBaseInOdom();
+  const auto base_in_odom = lookUpBaseInOdom(ros::Time(), trouble_between_);
   if (!base_in_odom) return;
   const double elapsed_s = secondsBetween(static_cast<std::int64_t>(last_between_.toNSec()),
                                           static_cast<std::int64_t>(now.toNSec()));  // ros::Duration ends at 68 years
   broadcast(correction_.after(elapsed_s, *base_in_odom), config_.odom_frame_id, now);
   last_between_ = now;
-}
-
-/// The caller holds the mutex.
-std::optional<tf2::Transform> TransformPublisher::newestBaseInOdom() {
-  try {
-    tf2::Transform base_in_odom;
-    tf2::fromMsg(buffer_.lookupTransform(config_.odom_frame_id, config_.base_frame_id, ros::Time()).transform,
-                 base_in_odom);
-    trouble_between_.clear();
-    return base_in_odom;
-  } catch (const tf2::TransformException& error) {
-    trouble_between_ =
-        "no transform from " + config_.odom_frame_id + " to " + config_.base_frame_id + ": " + error.what();
-    return std::nullopt;
-  }
 }
 
 std::optional<tf2::Transform> TransformPublisher::baseInOdom(const ros::Time& stamp, std::string& reason) const {
@@ -182,10 +171,16 @@ std::optional<tf2::Transform> TransformPublisher::baseInOdom(const ros::Time& st
          std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(kOdometryPoll);
   }
+  return lookUpBaseInOdom(stamp, reason);
+}
+
+std::optional<tf2::Transform> TransformPublisher::lookUpBaseInOdom(const ros::Time& stamp, std::string& reason) const {
   try {
+    const tf2::BufferCore& transforms = buffer_;
     tf2::Transform base_in_odom;
     tf2::fromMsg(transforms.lookupTransform(config_.odom_frame_id, config_.base_frame_id, stamp).transform,
                  base_in_odom);
+    reason.clear();
     return base_in_odom;
   } catch (const tf2::TransformException& error) {
     reason = "no transform from " + config_.odom_frame_id + " to " + config_.base_frame_id + ": " + error.what();

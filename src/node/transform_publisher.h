@@ -19,6 +19,7 @@
 
 #include "node/node_config.h"
 #include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/odometry.h"
 
 namespace visual_localization {
 
@@ -34,7 +35,8 @@ bool movesRobot(const Estimate& estimate, bool metric_only);
 class SlidingCorrection {
  public:
   /// `smoothing_s`: time constant; after it 37 % of a correction are left. 0: at once.
-  explicit SlidingCorrection(double smoothing_s) : smoothing_s_(smoothing_s) {}
+  SlidingCorrection(double smoothing_s, const OdometryConfig& odometry)
+      : smoothing_s_(smoothing_s), odometry_(odometry) {}
 
   /// From now on towards this one. The standard deviations are those of the pose, of each axis and of the heading.
   /// Heights and tilts of the odometry are never a reason to be elsewhere.
@@ -45,6 +47,7 @@ class SlidingCorrection {
 
  private:
   double smoothing_s_;
+  OdometryConfig odometry_;
   tf2::Transform target_ = tf2::Transform::getIdentity();
   std::optional<tf2::Transform> shown_;
   std::optional<tf2::Transform> base_in_odom_;  ///< at the last call
@@ -52,17 +55,16 @@ class SlidingCorrection {
 };
 
 /// Broadcasts the estimate on tf as NodeConfig::tf_mode says: with each image, or with map_to_odom at
-/// NodeConfig::tf_rate, from a thread of its own. Tolerance and timeout may be set by any thread. When there is no
-/// odometry at an image's time it broadcasts nothing new: a guess would move the robot for everyone. After an estimate
-/// that may not move the robot, odometry goes on from the last one that might.
+/// NodeConfig::tf_rate, from a thread of its own. When there is no odometry at an image's time it broadcasts nothing
+/// new: a guess would move the robot for everyone. After an estimate that may not move the robot, odometry goes on from
+/// the last one that might.
 class TransformPublisher {
  public:
-  TransformPublisher(const NodeConfig& config, const ros::NodeHandle& node);
+  TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node);
   ~TransformPublisher();
 
-  void setTolerance(double transform_tolerance_s) { tolerance_s_ = transform_tolerance_s; }
-  /// Without an image for so long nothing is broadcast between images.
-  void setImageTimeout(double image_timeout_s) { image_timeout_s_ = image_timeout_s; }
+  /// What can change while it runs: tolerance and timeout. From any thread.
+  void configure(const NodeConfig& config);
   /// Time has gone back: the odometry in the buffer lies in the future.
   void forget();
   /// Another map: nothing is known of the robot in it. From any thread.
@@ -73,12 +75,15 @@ class TransformPublisher {
  private:
   std::string move(const PoseEstimate& pose, const ros::Time& stamp);
   std::string hold(const ros::Time& stamp);
+  /// Waits a moment for it.
   std::optional<tf2::Transform> baseInOdom(const ros::Time& stamp, std::string& reason) const;
+  /// `stamp` 0: the newest. `reason`: why there is none, otherwise empty.
+  std::optional<tf2::Transform> lookUpBaseInOdom(const ros::Time& stamp, std::string& reason) const;
   void broadcastBetween(const ros::Time& now);
-  std::optional<tf2::Transform> newestBaseInOdom();
   void broadcast(const tf2::Transform& child_in_map, const std::string& child, const ros::Time& stamp);
 
   const NodeConfig config_;
+  const OdometryConfig odometry_;
   const bool between_images_;  ///< instead of with them
   std::atomic<double> tolerance_s_;
   std::atomic<double> image_timeout_s_;

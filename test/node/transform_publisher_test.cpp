@@ -41,14 +41,14 @@ tf2::Transform withRobotAt(double x_m, double y_m, double yaw_rad) {
 }
 
 TEST(SlidingCorrection, BeginsWhereThePoseIs) {
-  SlidingCorrection correction(0.5);
+  SlidingCorrection correction(0.5, {});
   const auto target = withRobotAt(10.0, 5.0, 1.0);
   correction.aimAt(target, kFarInOdom, kSigma_m, kSigma_rad);
   EXPECT_LT(apart_m(correction.after(0.0, kFarInOdom), target), 1e-6);
 }
 
 TEST(SlidingCorrection, ASmallOneMovesTheRobotLittleByLittle) {
-  SlidingCorrection correction(0.5);
+  SlidingCorrection correction(0.5, {});
   const auto before = withRobotAt(10.0, 5.0, 1.0);
   const auto target = withRobotAt(10.4, 5.3, 1.1);
   correction.aimAt(before, kFarInOdom, kSigma_m, kSigma_rad);
@@ -72,7 +72,7 @@ TEST(SlidingCorrection, ASmallOneMovesTheRobotLittleByLittle) {
 TEST(SlidingCorrection, OneBeyondThreeSigmasMovesItAtOnce) {
   for (const auto& [x_m, yaw_rad, at_once] :
        {std::tuple(10.59, 1.0, false), {10.61, 1.0, true}, {10.0, 1.149, false}, {10.0, 0.849, true}}) {
-    SlidingCorrection correction(0.5);
+    SlidingCorrection correction(0.5, {});
     correction.aimAt(withRobotAt(10.0, 5.0, 1.0), kFarInOdom, kSigma_m, kSigma_rad);
     correction.after(0.0, kFarInOdom);
     const auto target = withRobotAt(x_m, 5.0, yaw_rad);
@@ -85,7 +85,7 @@ TEST(SlidingCorrection, OneBeyondThreeSigmasMovesItAtOnce) {
 
 // Odometry of a robot on a hill, which the planar pose in the map does not know.
 TEST(SlidingCorrection, HeightsAndTiltsAreFollowedAndNoReasonToBeElsewhere) {
-  SlidingCorrection correction(0.5);
+  SlidingCorrection correction(0.5, {});
   const auto climbing = [](double x_m) {
     tf2::Quaternion tilted;
     tilted.setRPY(0.2, -0.1, 0.3);
@@ -110,7 +110,7 @@ TEST(SlidingCorrection, HeightsAndTiltsAreFollowedAndNoReasonToBeElsewhere) {
 
 TEST(SlidingCorrection, AfterALongWayByOdometryALargerOneSlidesIn) {
   for (const double way_m : {0.0, 40.0}) {
-    SlidingCorrection correction(0.5);
+    SlidingCorrection correction(0.5, {});
     const auto straight = transform(0.0, 0.0, 0.0);
     correction.aimAt(straight, straight, kSigma_m, kSigma_rad);
     for (double x_m = 0.0; x_m <= way_m; x_m += 1.0) correction.after(0.02, transform(x_m, 0.0, 0.0));
@@ -123,7 +123,7 @@ TEST(SlidingCorrection, AfterALongWayByOdometryALargerOneSlidesIn) {
 }
 
 TEST(SlidingCorrection, WithoutSmoothingEachMovesItAtOnce) {
-  SlidingCorrection correction(0.0);
+  SlidingCorrection correction(0.0, {});
   for (const double x_m : {10.0, 10.1, 50.0}) {
     const auto target = withRobotAt(x_m, 5.0, 1.0);
     correction.aimAt(target, kFarInOdom, kSigma_m, kSigma_rad);
@@ -132,7 +132,7 @@ TEST(SlidingCorrection, WithoutSmoothingEachMovesItAtOnce) {
 }
 
 TEST(SlidingCorrection, LeavesTheMotionToOdometry) {
-  SlidingCorrection correction(0.5);
+  SlidingCorrection correction(0.5, {});
   const auto odom_in_map = withRobotAt(10.0, 5.0, 1.0);
   correction.aimAt(odom_in_map, kFarInOdom, kSigma_m, kSigma_rad);
   for (int k = 0; k < 10; ++k) {
