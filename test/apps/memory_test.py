@@ -22,35 +22,12 @@ from sensor_msgs.msg import CompressedImage, NavSatFix  # noqa: E402
 
 from program_runner import PROGRAMS, ProgramTest  # noqa: E402
 
+sys.path.append(str(Path(__file__).resolve().parent.parent / 'support'))
+from memory_bounds import builder_bound, editor_bound, localizer_bound, mib, peak_mib, with_size  # noqa: E402
+
 MAP, DRIVE, CORPUS = (Path(argument) for argument in sys.argv[2:5])
 IMAGES, FIXES = '/stereo/left/image_raw/compressed', '/gps/fix'
 THREADS = 2
-
-# The formulas of doc/faults.md, MiB.
-BASE, PER_THREAD = 260, 72
-LARGEST_PIXELS = 4096 * 4096
-SIFT_BYTES, DECODED_BYTES = 140, 8
-IMAGE_BYTES, FIX_BYTES = 2 ** 19, 2000
-
-
-def mib(count: float) -> float:
-    return count / 2.0 ** 20
-
-
-def builder_bound(pixels: int, images: int, fixes: int) -> float:
-    """Of map_builder and `map_edit add`. `pixels`: of the images that are used."""
-    return (BASE + THREADS * (PER_THREAD + mib(SIFT_BYTES * pixels + DECODED_BYTES * LARGEST_PIXELS))
-            + mib(IMAGE_BYTES * images + FIX_BYTES * fixes))
-
-
-def localizer_bound(map_pixels: int, cache_mib: float) -> float:
-    """Of localize and of the node."""
-    return BASE + PER_THREAD + 2.0 * cache_mib + mib(SIFT_BYTES * map_pixels + DECODED_BYTES * LARGEST_PIXELS)
-
-
-def editor_bound(cache_mib: float) -> float:
-    """Of map_info and of map_edit without `add`."""
-    return BASE + PER_THREAD + 2.0 * cache_mib
 
 
 class Run:
@@ -72,14 +49,8 @@ class Run:
         self.code = process.returncode
 
     def watch(self, process):
-        status = Path(f'/proc/{process.pid}/status')
         while process.poll() is None:
-            try:
-                peaks = [line for line in status.read_text().splitlines() if line.startswith('VmPeak')]
-            except OSError:
-                return
-            if peaks:
-                self.peak_mib = float(peaks[0].split()[1]) / 1024.0
+            self.peak_mib = max(self.peak_mib, peak_mib(process.pid))
             time.sleep(0.005)
 
 
@@ -105,12 +76,6 @@ def encoded(side: int, seed: int, extension: str = '.jpg') -> bytes:
     return cv2.imencode(extension, pixels)[1].tobytes()
 
 
-def with_size(jpeg: bytes, side: int) -> bytes:
-    """The JPEG, claiming another size."""
-    frame = jpeg.index(b'\xff\xc0')
-    return jpeg[:frame + 5] + side.to_bytes(2, 'big') * 2 + jpeg[frame + 9:]
-
-
 class MemoryTest(ProgramTest):
     """Hostile inputs and what they may take."""
 
@@ -124,7 +89,7 @@ class MemoryTest(ProgramTest):
     def build(self, name: str, images: list, used_pixels: int, fixes: int, fix_period_s: float = 0.1):
         bag = self.folder / 'round.bag'
         write_bag(bag, images, fixes, fix_period_s)
-        self.check(name, builder_bound(used_pixels, len(images), fixes), 'map_builder', '--bag', bag, '--threads',
+        self.check(name, builder_bound(THREADS, used_pixels, len(images), fixes), 'map_builder', '--bag', bag, '--threads',
                    THREADS, '--output', self.folder / 'round.map')
         self.check(name, localizer_bound(320 * 240, mib(MAP.stat().st_size)), 'localize', '--map', MAP, '--bag', bag,
                    '--output', self.folder / 'track.csv')
@@ -153,7 +118,7 @@ class MemoryTest(ProgramTest):
         whole = DRIVE.read_bytes()
         bag = self.folder / 'wrong.bag'
         places = itertools.chain(range(13, 60, 9), range(4131, 4400, 62), range(len(whole) - 900, len(whole) - 8, 401))
-        bound = builder_bound(320 * 240, 450, 2500)
+        bound = builder_bound(THREADS, 320 * 240, 450, 2500)
         for place in places:
             bag.write_bytes(whole[:place] + b'\xf0\xff\xff\x7f' + whole[place + 4:])
             self.check(f'a bag with a length of 2 GiB at {place}', bound, 'map_builder', '--bag', bag, '--threads',

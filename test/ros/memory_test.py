@@ -4,6 +4,7 @@ import os
 import pathlib
 import resource
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -17,23 +18,14 @@ from sensor_msgs.msg import CompressedImage
 import localizer_fixture as fixture
 from visual_localization.srv import LoadMap
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'support'))
+from memory_bounds import localizer_bound, mib, peak_mib, with_size  # noqa: E402
+
 LOCALIZER = roslib.packages.find_node('visual_localization', 'localizer_node')[0]
 DEADLINE_S = 60.0
 
-# The formula of doc/faults.md, MiB.
-BASE, PER_THREAD, THREADS = 260, 72, 14
-LARGEST_PIXELS, DECODED_BYTES, SIFT_BYTES = 4096 * 4096, 8, 140
+THREADS = 14
 MAP_PIXELS = 320 * 240
-
-
-def bound_mib(map_bytes):
-    return (BASE + PER_THREAD * THREADS
-            + (2 * map_bytes + SIFT_BYTES * MAP_PIXELS + DECODED_BYTES * LARGEST_PIXELS) / 2.0 ** 20)
-
-
-def peak_mib(process):
-    lines = pathlib.Path('/proc/%d/status' % process.pid).read_text().splitlines()
-    return [float(line.split()[1]) / 1024.0 for line in lines if line.startswith('VmPeak')][0]
 
 
 def compressed(data):
@@ -44,7 +36,8 @@ def compressed(data):
 
 class MemoryTest(unittest.TestCase):
     def start(self, map_file):
-        limit = int(bound_mib(os.path.getsize(map_file)) * 2 ** 20)
+        self.bound_mib = localizer_bound(MAP_PIXELS, mib(os.path.getsize(map_file)), THREADS)
+        limit = int(self.bound_mib * 2 ** 20)
         process = subprocess.Popen(
             [LOCALIZER, '__name:=localizer', '_map:=' + map_file, '_image_transport:=compressed',
              'image:=/stereo/left/image_raw'],
@@ -64,8 +57,7 @@ class MemoryTest(unittest.TestCase):
 
         white = cv2.imencode('.png', np.full((4096, 4096), 255, np.uint8))[1].tobytes()
         small = cv2.imencode('.jpg', np.zeros((240, 320), np.uint8))[1].tobytes()
-        frame = small.index(b'\xff\xc0')
-        bombs = [small[:frame + 5] + side.to_bytes(2, 'big') * 2 + small[frame + 9:] for side in (60000, 4096)]
+        bombs = [with_size(small, side) for side in (60000, 4096)]
         before = sum(localizer.counts())
         for data in (white, *bombs, b'', white):
             camera.publish(compressed(data))
@@ -84,7 +76,8 @@ class MemoryTest(unittest.TestCase):
         self.assertIn('METRIC', sources)
         self.assertGreaterEqual(sum(localizer.counts()) - before, 5)
         self.assertIsNone(process.poll())
-        rospy.loginfo('bound %.0f MiB, took %.0f MiB', bound_mib(os.path.getsize(map_file)), peak_mib(process))
+        self.assertLessEqual(len(os.listdir('/proc/%d/task' % process.pid)), THREADS)
+        print('bound %.0f MiB, took %.0f MiB' % (self.bound_mib, peak_mib(process.pid)))
 
 
 if __name__ == '__main__':
