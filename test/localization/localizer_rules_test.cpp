@@ -7,100 +7,15 @@
 
 #include <gtest/gtest.h>
 
-#include "test/support/fake_image.h"
-#include "test/support/synthetic.h"
-#include "visual_localization/localization/localizer.h"
+#include "test/localization/localizer_fixture.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
+using test::twoSessions;
 
-/// What a robot sees from a position: training images near it look alike.
-class SeenFrom final : public test::FakeImage {
- public:
-  explicit SeenFrom(std::shared_ptr<const TrainingMap> map) : map_(std::move(map)) {}
-
-  bool isRepeated() const override { return repeated; }
-  std::size_t siftFeatures() override { return features; }
-  ImageReport report() const override {
-    ImageReport report;
-    report.features_kept = features;
-    return report;
-  }
-  void configure(const FrontEndConfig&, const SimilarityConfig& similarity) override {
-    sift_recognised = similarity.sift_recognised;
-  }
-  Score compare(FeatureKind kind, std::size_t i) override {
-    ++compared;
-    const double width_m = kind == FeatureKind::kSift ? 2.0 : 10.0;
-    const double offset = (map_->position_m(i) - position_m).norm() / width_m;
-    const double height = map_->pose(i).session == 0 ? best : best_of_others;
-    const double similarity = height * std::exp(-0.5 * offset * offset);
-    // It looks the larger the farther ahead it was taken.
-    const double scale = std::exp(0.1 * (position_m - map_->position_m(i)).x());
-    return {similarity, similarity, static_cast<std::size_t>(100.0 * similarity), similarity >= sift_recognised, scale};
-  }
-
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-  double best = 0.5;
-  double best_of_others = 0.5;
-  double sift_recognised = 0.05;
-  bool repeated = false;
-  std::size_t features = 100;
-  int compared = 0;
-
- private:
-  std::shared_ptr<const TrainingMap> map_;
-};
-
-std::shared_ptr<const TrainingMap> twoSessions() {
-  MapHeader header;
-  header.image_size = {320, 240};
-  header.sessions = {{"first"}, {"second"}};
-  std::vector<TrainingImage> images;
-  for (int session = 0; session < 2; ++session) {
-    for (int i = 0; i < 60; ++i) {
-      TrainingImage image;
-      image.stamp_ns = (i + 1000 * session) * kSecond_ns;
-      image.session = session;
-      image.position_m = {1.0 * i, 0.1 * session};
-      images.push_back(image);
-    }
-  }
-  return std::make_shared<const TrainingMap>(header, images);
-}
-
-/// A robot on a street of 60 m with a training image every metre.
-class LocalizerRules : public testing::Test {
- protected:
-  LocalizerRules() { make({}); }
-
-  void make(const LocalizerConfig& config) { make(config, test::mapAt(test::street(60, 1.0))); }
-  void make(const LocalizerConfig& config, std::shared_ptr<const TrainingMap> map) {
-    config_ = config;
-    image_ = std::make_shared<SeenFrom>(map);
-    localizer_ = std::make_unique<Localizer>(map, config, image_);
-    second_ = 0.0;
-  }
-  Estimate see(double x_m, double after_s = 1.0) {
-    image_->position_m = {x_m, 0.0};
-    second_ += after_s;
-    return localizer_->process(static_cast<std::int64_t>(second_ * 1e9), cv::Mat());
-  }
-  /// A tracked position at 20 m.
-  Estimate settle() {
-    Estimate estimate;
-    for (int i = 0; i < 40; ++i) estimate = see(20.0);
-    EXPECT_EQ(estimate.state, LocalizationState::kTracking);
-    return estimate;
-  }
-
-  LocalizerConfig config_;
-  std::shared_ptr<SeenFrom> image_;
-  std::unique_ptr<Localizer> localizer_;
-  double second_ = 0.0;
-};
+using LocalizerRules = test::LocalizerTest;
 
 TEST_F(LocalizerRules, ARepeatedImageGetsTheSameAnswerWithItsOwnStampAndReport) {
   const Estimate first = settle();
@@ -258,30 +173,6 @@ TEST_F(LocalizerRules, TheSecondWitnessIsAskedOnlyWhereTheFirstIsNotSure) {
   EXPECT_EQ(see(20.0).swept, 0U);
 }
 
-TEST_F(LocalizerRules, ReconfiguringChangesTrackerAndParticles) {
-  settle();
-  LocalizerConfig config;
-  config.dpso.particles = 30;
-  localizer_->configure(config);
-  EXPECT_EQ(localizer_->particles().size(), 30U);
-  int near = 0;
-  for (const Particle& particle : localizer_->particles())
-    near += std::abs(particle.position_m.x() - 20.0) < 12.0 ? 1 : 0;
-  EXPECT_GT(near, 20) << "drawn from those before";
-  config.dpso.quantum_share = 0.2;
-  localizer_->configure(config);
-  int quantum = 0;
-  for (const Particle& particle : localizer_->particles()) quantum += particle.kind == ParticleKind::kQuantum ? 1 : 0;
-  EXPECT_EQ(quantum, 6);
-  config.tracker = "pf_linear";
-  localizer_->configure(config);
-  EXPECT_EQ(localizer_->particles().size(), static_cast<std::size_t>(config.pf.particles));
-  config.sweep_images = 10;
-  config.features = "global";
-  localizer_->configure(config);
-  EXPECT_EQ(see(20.0).evidence.features, FeatureKind::kGlobal);
-}
-
 TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
   make({}, twoSessions());
   image_->best = 0.2;
@@ -303,67 +194,6 @@ TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
   bool second = false;
   for (int i = 0; i < 8; ++i) second = see(20.0).session == "second" || second;
   EXPECT_TRUE(second);
-}
-
-TEST_F(LocalizerRules, RelocalizingSpreadsTheParticles) {
-  settle();
-  const auto reach_m = [this] {
-    double farthest_m = 0.0;
-    for (const Particle& particle : localizer_->particles()) {
-      farthest_m = std::max(farthest_m, std::abs(particle.position_m.x() - 20.0));
-    }
-    return farthest_m;
-  };
-  localizer_->relocalize(around({20.0, 0.0}, 3.0));
-  EXPECT_LE(reach_m(), 3.0);
-  localizer_->relocalize();
-  EXPECT_GT(reach_m(), 30.0);
-  image_->best = 0.0;
-  EXPECT_EQ(see(20.0).state, LocalizationState::kInitializing) << "what confirmed it before is forgotten";
-}
-
-TEST_F(LocalizerRules, ReconfiguringReachesStateAndSweep) {
-  settle();
-  LocalizerConfig strict;
-  strict.state.min_similarity = 0.9;
-  localizer_->configure(strict);
-  Estimate estimate;
-  for (int i = 0; i < 10; ++i) estimate = see(20.0);
-  EXPECT_NE(estimate.state, LocalizationState::kTracking) << "0.5 is not enough any more";
-  LocalizerConfig few;
-  few.sweep_images = 10;
-  few.state.sure_similarity = 1.0;
-  localizer_->configure(few);
-  const std::size_t swept = see(20.0).swept;
-  few.sweep_images = 20000;
-  localizer_->configure(few);
-  EXPECT_GT(see(20.0).swept, swept);
-}
-
-TEST_F(LocalizerRules, WhatIsToldMeanwhileIsNewsToARepeatedImage) {
-  settle();
-  image_->repeated = true;
-  int compared = image_->compared;
-  see(20.0, 0.0);
-  EXPECT_EQ(image_->compared, compared);
-  localizer_->configure({});
-  see(20.0, 0.0);
-  EXPECT_GT(image_->compared, compared) << "other parameters";
-  compared = image_->compared;
-  see(20.0, 0.0);
-  EXPECT_EQ(image_->compared, compared);
-  localizer_->setMount({});
-  see(20.0, 0.0);
-  EXPECT_GT(image_->compared, compared) << "another mount";
-  Intrinsics lens;
-  lens.size = {320, 240};
-  lens.fx = lens.fy = 300.0;
-  lens.cx = 160.0;
-  lens.cy = 120.0;
-  compared = image_->compared;
-  localizer_->setCamera(CameraModel(lens));
-  see(20.0, 0.0);
-  EXPECT_GT(image_->compared, compared) << "another camera";
 }
 
 TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
