@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include <bzlib.h>
 #include <roslz4/lz4s.h>
@@ -110,9 +111,9 @@ std::vector<FoundMessage> findMessages(const Bytes& bytes, Range range) {
 
 }  // namespace
 
-BagFile::BagFile(const std::string& path) : file_(path) {
-  requireVersion(file_);
-  const Record header = readRecord(file_, {kVersion.size(), file_.size()});
+BagFile::BagFile(std::unique_ptr<const Bytes> bytes) : file_(std::move(bytes)) {
+  requireVersion(*file_);
+  const Record header = readRecord(*file_, {kVersion.size(), file_->size()});
   require(header.op == Op::kBagHeader, "does not begin with a bag header");
   const auto encryptor = header.fields.find("encryptor");
   if (encryptor != header.fields.end() && !encryptor->second.empty()) throw UnsupportedBag("bag is encrypted");
@@ -121,10 +122,10 @@ BagFile::BagFile(const std::string& path) : file_(path) {
     throw UnsupportedBag("bag is not indexed, as after an interrupted recording; `rosbag reindex` may repair it");
   }
   require(index_at >= header.data.end, "the index lies in the header");
-  require(index_at <= file_.size(),
+  require(index_at <= file_->size(),
           "it ends before its index, as a copy that was cut off; `rosbag reindex` may repair it");
   readChunks({header.data.end, index_at});
-  readSummary(header, {index_at, file_.size()});
+  readSummary(header, {index_at, file_->size()});
 }
 
 /// Everything between the header and the summary: chunks, each followed by its indices.
@@ -132,7 +133,7 @@ void BagFile::readChunks(Range range) {
   Chunk* chunk = nullptr;
   std::uint64_t chunk_at = 0;
   while (range.begin < range.end) {
-    const Record record = readRecord(file_, range);
+    const Record record = readRecord(*file_, range);
     if (record.op == Op::kChunk) {
       chunk_at = range.begin;
       chunk = &chunks_[chunk_at];
@@ -149,7 +150,7 @@ void BagFile::readChunks(Range range) {
     range.begin = record.data.end;
   }
   for (const auto& [at, uncompressed] : chunks_) {
-    if (uncompressed.compression == "none") checkMessages(file_, uncompressed.data, uncompressed);
+    if (uncompressed.compression == "none") checkMessages(*file_, uncompressed.data, uncompressed);
   }
 }
 
@@ -174,7 +175,7 @@ void BagFile::readIndex(const Record& record, std::uint64_t chunk_at, Chunk& chu
   require(record.data.size() <= chunk.size - chunk.index_bytes,
           "the indices of a chunk have more entries than it has messages");
   chunk.index_bytes += record.data.size();
-  const std::string entries = readRange(file_, record.data, chunk.size, "an index");
+  const std::string entries = readRange(*file_, record.data, chunk.size, "an index");
   std::vector<Message>& index = chunk.indices.emplace_back();
   index.reserve(entries.size() / kEntry);
   for (std::size_t at = 0; at < entries.size(); at += kEntry) {
@@ -190,13 +191,13 @@ void BagFile::readSummary(const Record& header, Range range) {
   const std::uint64_t connections = number(header.fields, "conn_count", 4);
   const std::uint64_t chunks = number(header.fields, "chunk_count", 4);
   for (std::uint64_t i = 0; i < connections; ++i) {
-    const Record record = readRecord(file_, range);
+    const Record record = readRecord(*file_, range);
     require(record.op == Op::kConnection, "the summary lacks a connection");
-    connections_.emplace(word(record.fields, "conn"), readConnection(file_, record));
+    connections_.emplace(word(record.fields, "conn"), readConnection(*file_, record));
     range.begin = record.data.end;
   }
   for (std::uint64_t i = 0; i < chunks; ++i) {
-    const Record record = readRecord(file_, range);
+    const Record record = readRecord(*file_, range);
     require(record.op == Op::kChunkInfo, "the summary lacks the description of a chunk");
     readChunkInfo(record);
     range.begin = record.data.end;
@@ -259,12 +260,12 @@ std::string BagFile::read(const Message& message) {
   const bool is_packed = chunk.compression != "none";
   if (is_packed && (!unpacked_ || unpacked_at_ != message.chunk)) {
     unpacked_.reset();  // never two at once
-    auto unpacked = std::make_unique<MemoryBytes>(unpack(file_, chunk.data, chunk.compression, chunk.size));
+    auto unpacked = std::make_unique<MemoryBytes>(unpack(*file_, chunk.data, chunk.compression, chunk.size));
     checkMessages(*unpacked, {0, chunk.size}, chunk);
     unpacked_ = std::move(unpacked);
     unpacked_at_ = message.chunk;
   }
-  const Bytes& bytes = is_packed ? static_cast<const Bytes&>(*unpacked_) : file_;
+  const Bytes& bytes = is_packed ? static_cast<const Bytes&>(*unpacked_) : *file_;
   const Range range = is_packed ? Range{0, chunk.size} : chunk.data;
   require(message.offset < range.size(), "an index points beside its messages");
   const Record record = readRecord(bytes, {range.begin + message.offset, range.end});

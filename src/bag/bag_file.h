@@ -139,8 +139,9 @@ struct Message {
 /// page cache.)
 class BagFile {
  public:
-  /// Throws DamagedBag, or UnsupportedBag when the bag has no index, is encrypted or is of another version.
-  explicit BagFile(const std::string& path);
+  /// `bytes`: never null. Throws DamagedBag, or UnsupportedBag when the bag has no index, is encrypted or is of another
+  /// version.
+  explicit BagFile(std::unique_ptr<const Bytes> bytes);
 
   const std::map<std::uint32_t, Connection>& connections() const { return connections_; }
   /// The messages of these connections in the order of recording.
@@ -165,7 +166,7 @@ class BagFile {
   void readChunkInfo(const Record& info);
   static void checkMessages(const Bytes& bytes, Range range, const Chunk& chunk);
 
-  FileBytes file_;
+  std::unique_ptr<const Bytes> file_;
   std::map<std::uint32_t, Connection> connections_;
   std::map<std::uint64_t, Chunk> chunks_;  ///< by their offsets in the file
   std::unique_ptr<MemoryBytes> unpacked_;  ///< the chunk at unpacked_at_

@@ -98,7 +98,11 @@ cv::Size BagImages::usualSize() const {
 
 BagReader::BagReader(const std::string& path) : path_(path) {
   requireFile(path);
-  file_ = withBag(path, [&] { return std::make_shared<bag::BagFile>(path); });
+  file_ = withBag(path, [&] { return std::make_shared<bag::BagFile>(std::make_unique<bag::FileBytes>(path)); });
+}
+
+BagReader::BagReader(std::string name, std::unique_ptr<const bag::Bytes> bytes) : path_(std::move(name)) {
+  file_ = withBag(path_, [&] { return std::make_shared<bag::BagFile>(std::move(bytes)); });
 }
 
 BagImages BagReader::images(const std::string& topic) const {

@@ -85,7 +85,7 @@ std::string messageOf(std::uint64_t connection, const std::string& data) {
 TEST_F(BagFileTest, ReadsWhatWasWritten) {
   for (const std::string& bytes :
        plainAndPacked(messageOf(0, "one") + messageOf(0, "two"), indexOf({messageOf(0, "one").size(), 0}))) {
-    BagFile bag(writeBytes(bytes));
+    BagFile bag(inMemory(bytes));
     const std::vector<bag::Message> messages = bag.messages({0});
     ASSERT_EQ(messages.size(), 2U);
     EXPECT_EQ(bag.read(messages[0]), "two");  // of the same time: in the order of the index

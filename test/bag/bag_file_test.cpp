@@ -32,14 +32,14 @@ TEST_F(BagFileTest, AcceptsEveryCompression) {
 TEST_F(BagFileTest, OtherVersionsAndFilesAreRefused) {
   std::string bytes = test::readAll(writeBag(rosbag::compression::Uncompressed));
   bytes[9] = '1';
-  EXPECT_THROW(BagFile(writeBytes(bytes)), UnsupportedBag);
-  EXPECT_THROW(BagFile(writeBytes("no bag at all")), UnsupportedBag);
+  EXPECT_THROW(BagFile(inMemory(bytes)), UnsupportedBag);
+  EXPECT_THROW(BagFile(inMemory("no bag at all")), UnsupportedBag);
 }
 
 TEST_F(BagFileTest, EveryCutIsRefused) {
   const std::string bytes = test::readAll(writeBag(rosbag::compression::Uncompressed));
   for (std::size_t size = 14; size < bytes.size(); size += 37) {
-    EXPECT_THROW(BagFile(writeBytes(bytes.substr(0, size))), DamagedBag) << size;
+    EXPECT_THROW(BagFile(inMemory(bytes.substr(0, size))), DamagedBag) << size;
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <csignal>
+#include <memory>
 #include <set>
 #include <string>
 
@@ -51,10 +52,14 @@ class BagFileTest : public testing::Test {
     return path;
   }
 
+  static std::unique_ptr<const bag::Bytes> inMemory(const std::string& bytes) {
+    return std::make_unique<bag::MemoryBytes>(bytes);
+  }
+
   /// Why a bag cannot be read from its beginning to its end.
   static std::string refusal(const std::string& path) {
     try {
-      bag::BagFile bag(path);
+      bag::BagFile bag(std::make_unique<bag::FileBytes>(path));
       std::set<std::uint32_t> all;
       for (const auto& [id, connection] : bag.connections()) all.insert(id);
       for (const bag::Message& message : bag.messages(all)) bag.read(message);

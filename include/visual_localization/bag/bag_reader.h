@@ -22,6 +22,7 @@ namespace visual_localization {
 
 namespace bag {
 class BagFile;
+class Bytes;
 }
 
 /// A bag that cannot be read. The text is one line and begins with the path.
@@ -64,6 +65,8 @@ class BagReader {
  public:
   /// Throws BagError when there is no readable, indexed bag at `path`.
   explicit BagReader(const std::string& path);
+  /// The same for a bag that lies in `bytes` (never null); `name` takes the place of the path.
+  BagReader(std::string name, std::unique_ptr<const bag::Bytes> bytes);
 
   /// Finds `topic` as sensor_msgs/Image, or `topic` or `<topic>/compressed` as sensor_msgs/CompressedImage, in
   /// this order. Throws BagError naming the image topics that the bag does have.
