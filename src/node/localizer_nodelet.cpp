@@ -9,13 +9,12 @@
 
 #include <nodelet/exception.h>
 #include <pluginlib/class_list_macros.hpp>
-#include <tf2_eigen/tf2_eigen.h>
 
 #include "base/process.h"
 #include "base/text.h"
+#include "node/message_conversions.h"
 #include "node/node_config.h"
 #include "ros/message_readers.h"
-#include "visual_localization/geo/local_frame.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -217,35 +216,12 @@ bool LocalizerNodelet::onLoadMap(LoadMap::Request& request, LoadMap::Response& r
 }
 
 bool LocalizerNodelet::onFromLL(FromLL::Request& request, FromLL::Response& response) {
-  const GeodeticPoint point{request.latitude, request.longitude, 0.0};
-  const auto map = localizer_->map();
-  if (!map) {
-    response.message = "no map is loaded";
-  } else if (!isValid(point)) {
-    response.message = "the latitude must be from -90 to 90 degrees, the longitude from -180 to 180";
-  } else {
-    const Eigen::Vector2d position_m = map->frame().toEastNorth(point);
-    response.success = position_m.cwiseAbs().maxCoeff() <= kLargestCoordinate_m;
-    response.message = response.success ? "" : "farther than 1000 km from the map";
-    if (response.success) response.map_point = tf2::toMsg(Eigen::Vector3d(position_m.x(), position_m.y(), 0.0));
-  }
+  response = fromLL(localizer_->map().get(), request);
   return true;
 }
 
 bool LocalizerNodelet::onToLL(ToLL::Request& request, ToLL::Response& response) {
-  const Eigen::Vector2d position_m(request.map_point.x, request.map_point.y);
-  const auto map = localizer_->map();
-  if (!map) {
-    response.message = "no map is loaded";
-  } else if (!(position_m.array().abs() <= kLargestCoordinate_m).all()) {
-    response.message = "x and y must be from -1000 to 1000 km, in metres";
-  } else {
-    const GeodeticPoint point = map->frame().toGeodetic(position_m);
-    response.latitude = point.latitude_deg;
-    response.longitude = point.longitude_deg;
-    response.altitude = point.altitude_m;
-    response.success = true;
-  }
+  response = toLL(localizer_->map().get(), request);
   return true;
 }
 

@@ -10,6 +10,7 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include "base/text.h"
+#include "visual_localization/geo/local_frame.h"
 
 namespace visual_localization {
 namespace {
@@ -212,6 +213,39 @@ sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, co
     ++point;
   }
   return message;
+}
+
+FromLL::Response fromLL(const TrainingMap* map, const FromLL::Request& request) {
+  FromLL::Response response;
+  const GeodeticPoint point{request.latitude, request.longitude, 0.0};
+  if (map == nullptr) {
+    response.message = "no map is loaded";
+  } else if (!isValid(point)) {
+    response.message = "the latitude must be from -90 to 90 degrees, the longitude from -180 to 180";
+  } else {
+    const Eigen::Vector2d position_m = map->frame().toEastNorth(point);
+    response.success = position_m.cwiseAbs().maxCoeff() <= kLargestCoordinate_m;
+    response.message = response.success ? "" : "farther than 1000 km from the map";
+    if (response.success) response.map_point = tf2::toMsg(Eigen::Vector3d(position_m.x(), position_m.y(), 0.0));
+  }
+  return response;
+}
+
+ToLL::Response toLL(const TrainingMap* map, const ToLL::Request& request) {
+  ToLL::Response response;
+  const Eigen::Vector2d position_m(request.map_point.x, request.map_point.y);
+  if (map == nullptr) {
+    response.message = "no map is loaded";
+  } else if (!(position_m.array().abs() <= kLargestCoordinate_m).all()) {
+    response.message = "x and y must be from -1000 to 1000 km, in metres";
+  } else {
+    const GeodeticPoint point = map->frame().toGeodetic(position_m);
+    response.latitude = point.latitude_deg;
+    response.longitude = point.longitude_deg;
+    response.altitude = point.altitude_m;
+    response.success = true;
+  }
+  return response;
 }
 
 }  // namespace visual_localization

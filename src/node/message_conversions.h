@@ -9,11 +9,14 @@
 #include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
+#include <visual_localization/FromLL.h>
 #include <visual_localization/LocalizationStatus.h>
 #include <visual_localization/Swarm.h>
+#include <visual_localization/ToLL.h>
 
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/particles.h"
+#include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 
@@ -41,5 +44,9 @@ geometry_msgs::PoseArray toPoseArray(const std::vector<Particle>& particles, con
 Swarm toSwarm(const std::vector<Particle>& particles, const std_msgs::Header& header);
 /// Fields x, y, z and intensity (the weight), 32-bit floats, so that rviz can colour by weight.
 sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, const std_msgs::Header& header);
+
+// Between places on the earth and in the map (null: none is loaded). What is refused says why in its message.
+FromLL::Response fromLL(const TrainingMap* map, const FromLL::Request& request);
+ToLL::Response toLL(const TrainingMap* map, const ToLL::Request& request);
 
 }  // namespace visual_localization

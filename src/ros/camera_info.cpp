@@ -134,10 +134,9 @@ bool endsIn(const std::string& text, const std::string& ending) {
   return text.size() > ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
 }
 
-sensor_msgs::CameraInfo parseFile(const std::string& path) {
+sensor_msgs::CameraInfo parse(const std::string& content, const std::string& path) {
   const bool yaml = endsIn(path, ".yaml") || endsIn(path, ".yml");
   requireValue(yaml || endsIn(path, ".ini"), "must end in .yaml, .yml or .ini");
-  const std::string content = readFile(path, kLargestFile_bytes);
   if (yaml) requireCalibrationYaml(content, path);
   sensor_msgs::CameraInfo info;
   std::string name;
@@ -189,11 +188,17 @@ bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::Camera
 
 CameraModel readCameraFile(const std::string& path) {
   try {
-    const std::optional<CameraModel> camera = toCamera(parseFile(path));
-    if (!camera) throw CameraError("is not calibrated: its camera matrix is zero");
-    return *camera;
+    return parseCameraFile(readFile(path, kLargestFile_bytes), path);
   } catch (const FileError& error) {
     throw CameraError(oneLine(error.what()));
+  }
+}
+
+CameraModel parseCameraFile(const std::string& content, const std::string& path) {
+  try {
+    const std::optional<CameraModel> camera = toCamera(parse(content, path));
+    if (!camera) throw CameraError("is not calibrated: its camera matrix is zero");
+    return *camera;
   } catch (const ParameterError& error) {
     throw CameraError(oneLine(error.what()));
   } catch (const std::exception& error) {
