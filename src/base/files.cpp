@@ -11,6 +11,7 @@
 #include <memory>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -24,6 +25,34 @@ namespace {
 /// The names of all unfinished files, in a form that a signal handler may read.
 std::array<std::atomic<char*>, 32> unfinished{};
 
+std::atomic<bool> ending{false};    ///< a signal ends the process
+std::atomic<int> being_changed{0};  ///< threads that make a file and its entry in `unfinished`, or remove them
+
+/// While one lives, no signal ends the process: its handler waits, so that it sees every file and no entry that is half
+/// there.
+class Change {
+ public:
+  Change() {
+    sigset_t all;
+    sigfillset(&all);
+    ::pthread_sigmask(SIG_SETMASK, &all, &before_);  // a handler in this thread would wait for itself
+    ++being_changed;
+    if (!ending) return;
+    --being_changed;
+    while (true) ::pause();  // the process ends at any moment
+  }
+  ~Change() {
+    --being_changed;
+    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  Change(const Change&) = delete;
+  Change& operator=(const Change&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+/// Within a Change.
 int enlist(const std::string& path) {
   char* name = ::strdup(path.c_str());
   for (std::size_t i = 0; name != nullptr && i < unfinished.size(); ++i) {
@@ -34,11 +63,14 @@ int enlist(const std::string& path) {
   return -1;
 }
 
+/// Within a Change.
 void strike(int slot) {
   if (slot >= 0) std::free(unfinished[static_cast<std::size_t>(slot)].exchange(nullptr));
 }
 
 void removeUnfinishedAndDie(int signal_number) {
+  ending = true;
+  while (being_changed > 0) ::poll(nullptr, 0, 1);
   for (auto& slot : unfinished) {
     const char* name = slot.load();
     if (name != nullptr) ::unlink(name);
@@ -91,8 +123,9 @@ int flush(const std::string& path) {
 /// A new file of a name that nobody else has. Throws FileError.
 int createLocked(const std::string& shown, const std::string& target, std::string& path, int& slot) {
   while (true) {
+    const Change change;
     path = partialName(target);
-    slot = enlist(path);  // before it is there: a signal may come at any moment
+    slot = enlist(path);
     const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     const int error = errno;
     // Without locks the file is safe as well, since nobody can lock it to remove it.
@@ -117,6 +150,7 @@ PartialFile::PartialFile(const std::string& target) : shown_(target), target_(re
 }
 
 PartialFile::~PartialFile() {
+  const Change change;
   if (!committed_) ::unlink(partial_.c_str());
   strike(slot_);
   ::close(locked_);
@@ -148,6 +182,7 @@ void PartialFile::write(const std::string& content) {
 }
 
 OutputLock::OutputLock(const std::string& target) : path_(resolved(target) + kLockSuffix) {
+  const Change change;
   locked_ = openLocked(path_, O_CREAT);
   if (locked_ < 0 && errno == EWOULDBLOCK) refuse(target, "process " + holderIn(path_) + " is writing it");
   if (locked_ < 0) return;
@@ -157,6 +192,7 @@ OutputLock::OutputLock(const std::string& target) : path_(resolved(target) + kLo
 
 OutputLock::~OutputLock() {
   if (locked_ < 0) return;
+  const Change change;
   ::unlink(path_.c_str());
   strike(slot_);
   ::close(locked_);

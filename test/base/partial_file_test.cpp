@@ -1,5 +1,8 @@
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -146,6 +149,34 @@ TEST(PartialFile, DisappearsWhenTheProcessIsInterrupted) {
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal_number);
     EXPECT_TRUE(folder.names().empty());
+  }
+}
+
+/// Makes files and gives them up, in several threads, until the process ends.
+[[noreturn]] void makeFilesWithoutEnd(const std::string& target) {
+  const auto work = [&target] {
+    while (true) const PartialFile file(target);
+  };
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) threads.emplace_back(work);
+  while (true) const OutputLock lock(target);
+}
+
+TEST(PartialFile, DisappearsWhenTheProcessIsInterruptedWhileAnotherThreadMakesIt) {
+  const test::TemporaryFolder folder;
+  constexpr int kTimes = 100;
+  for (int i = 0; i < kTimes; ++i) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      removePartialFilesOnSignals();
+      makeFilesWithoutEnd(folder / "a");
+    }
+    ::usleep(static_cast<useconds_t>(5000 + 97 * i));
+    ::kill(child, i % 2 == 0 ? SIGINT : SIGTERM);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status));
+    ASSERT_TRUE(folder.names().empty()) << folder.names().front() << " after " << i;
   }
 }
 
