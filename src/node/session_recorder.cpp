@@ -92,6 +92,10 @@ void SessionRecorder::offer(ros::NodeHandle private_node) {
   service_ = private_node.advertiseService("record_session", &SessionRecorder::onRecordSession, this);
   spinner_ = std::make_unique<ros::AsyncSpinner>(kThreads, &queue_);
   spinner_->start();
+  std::error_code none;
+  if (!folder_.empty() && !std::filesystem::is_directory(folder_, none)) {
+    ROS_WARN_STREAM("session_folder " << oneLine(folder_) << ": is no folder, so no session can be recorded");
+  }
 }
 
 void SessionRecorder::mapIs(const std::string& path, std::shared_ptr<const TrainingMap> map) {
@@ -136,18 +140,18 @@ void SessionRecorder::end(const std::string& path, RecordSession::Response& resp
   const std::string output = outputOf(path);
   const std::unique_ptr<Session> session = take();
   const std::string bag = session->bag->path();
+  const std::shared_ptr<void> done(nullptr, [this](void*) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    writes_map_ = false;
+  });
   try {
     const SessionExtension extension = saved(*session, output);
     extend_(extension, map_edit_);
     response.map = extension.output;
     response.images = static_cast<std::uint32_t>(loadMap(extension.output, {0, {}})->size());
   } catch (const std::exception& error) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    writes_map_ = false;
     throw std::runtime_error(std::string(error.what()) + "; what was recorded is in " + bag);
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  writes_map_ = false;
   response.message = oneLine("wrote " + response.map + " with " + std::to_string(session->images) + " recorded images");
   ROS_INFO_STREAM("Session: " << response.message);
 }
