@@ -42,8 +42,7 @@ void printFile(std::ostream& out, const std::string& path, const TrainingMap& ma
       << key("images") << map.size() << " of " << header.image_size.width << 'x' << header.image_size.height << " px\n"
       << key("sift") << std::setprecision(6) << header.sift.octave_layers << " layers, contrast "
       << header.sift.contrast_threshold << ", edge " << header.sift.edge_threshold << ", sigma " << header.sift.sigma_px
-      << " px, " << (header.sift.max_features == 0 ? "all" : "at most " + std::to_string(header.sift.max_features))
-      << " features\n";
+      << " px, at most " << header.sift.mostFeatures() << " features\n";
 }
 
 void printHistory(std::ostream& out, const std::vector<std::string>& history) {

@@ -16,7 +16,7 @@ namespace {
 class OpenCvSiftExtractor : public SiftExtractor {
  public:
   explicit OpenCvSiftExtractor(const SiftConfig& config)
-      : sift_(cv::SIFT::create(config.max_features, config.octave_layers, config.contrast_threshold,
+      : sift_(cv::SIFT::create(config.mostFeatures(), config.octave_layers, config.contrast_threshold,
                                config.edge_threshold, config.sigma_px, CV_8U)) {}
 
   using SiftExtractor::extract;
@@ -47,7 +47,8 @@ void SiftConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"sift/edge_threshold", "1", "largest accepted ratio of principal curvatures"}, edge_threshold, 1.0,
                1000.0);
   visitor.real({"sift/sigma", "px", "blur of the first scale"}, sigma_px, 0.5, 10.0);
-  visitor.integer({"sift/max_features", "1", "keep at most this number of features, the strongest; 0 keeps all"},
+  visitor.integer({"sift/max_features", "1",
+                   "keep at most this number of features, the strongest; 0: " + std::to_string(kMostFeatures)},
                   max_features, 0, 100000);
 }
 

@@ -20,7 +20,13 @@ struct SiftConfig {
   double sigma_px = 1.6;
   int max_features = 0;
 
+  /// What holds instead of max_features 0: far more than an image with structure has, and few enough that an image of
+  /// noise, of which each pixel may give a feature, is matched in a second; time grows with the square.
+  static constexpr int kMostFeatures = 20000;
+
   void declare(ParameterVisitor& visitor);
+  /// How many features are kept, the strongest.
+  int mostFeatures() const { return max_features == 0 ? kMostFeatures : max_features; }
 };
 
 /// Names of the extractors: our own, and OpenCV's. Their features can be matched with each other, so a map does not

@@ -166,8 +166,8 @@ void NativeSiftExtractor::detectIn(std::size_t octave_index) {
 
 /// As in OpenCV, all features that are as strong as the weakest one kept are kept too.
 void NativeSiftExtractor::keepStrongest() {
-  const auto most = static_cast<std::size_t>(config_.max_features);
-  if (most == 0 || points_.size() <= most) return;
+  const auto most = static_cast<std::size_t>(config_.mostFeatures());
+  if (points_.size() <= most) return;
   responses_.clear();
   for (const SiftPoint& point : points_) responses_.push_back(point.response);
   const auto weakest = responses_.begin() + static_cast<std::ptrdiff_t>(most - 1);
