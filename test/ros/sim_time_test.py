@@ -15,7 +15,7 @@ DEADLINE_S = 30.0
 class SimTimeTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.images = fixture.images_of(rospy.get_param('~bag'), count=20)
+        cls.images = fixture.images_of(rospy.get_param('~bag'), count=40)
         cls.clock = rospy.Publisher('/clock', Clock, queue_size=1, latch=True)
         cls.diagnostics = fixture.Diagnostics('localizer')
         cls.localizer = fixture.Localizer()
@@ -47,7 +47,21 @@ class SimTimeTest(unittest.TestCase):
         self.set_clock(100.0)
         self.check_images_are_served(12)
 
-    def test_3_diagnostics_go_on(self):
+    def test_3_when_the_clock_jumps_by_years_and_back(self):
+        images = iter(self.images[18:])
+        # 2011, 2030, 2103 and back; images without a stamp were of today.
+        for seconds, is_later in ((1.3e9, False), (1.9e9, True), (4.2e9, True), (1.3e9, False)):
+            self.set_clock(seconds)
+            for number in range(4):
+                image = next(images)
+                image.header.stamp = rospy.Time.now() + rospy.Duration(0.1 * number)
+                if number == 0 and not is_later:  # the first one may be late
+                    self.camera.publish(image)
+                else:
+                    self.camera.show(image)
+        self.assertEqual(self.localizer.counts()[1], 0)
+
+    def test_4_diagnostics_go_on(self):
         """They tell of the missing odometry as well."""
         message = self.diagnostics.wait_for('transform', self.diagnostics.WARN, DEADLINE_S)
         self.assertIn('odom', message)
