@@ -23,9 +23,11 @@ from sensor_msgs.msg import CompressedImage, NavSatFix  # noqa: E402
 from program_runner import PROGRAMS, ProgramTest  # noqa: E402
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / 'support'))
-from memory_bounds import builder_bound, editor_bound, localizer_bound, mib, peak_mib, with_size  # noqa: E402
+from memory_bounds import (builder_bound, editor_bound, evaluate_bound, localizer_bound, merge_bound, mib,  # noqa: E402
+                           peak_mib, with_size)
 
 MAP, DRIVE, CORPUS = (Path(argument) for argument in sys.argv[2:5])
+MAP_IMAGES, DRIVE_IMAGES = 450, 450  # at most
 IMAGES, FIXES = '/stereo/left/image_raw/compressed', '/gps/fix'
 THREADS = 2
 
@@ -138,6 +140,44 @@ class MemoryTest(ProgramTest):
                        self.folder / 'track.csv')
             self.check(name, editor_bound(cache), 'map_edit', 'thin', '--map', wrong, '--spacing', 5, '--output',
                        self.folder / 'thin.map')
+
+    def evaluate(self, name: str, bag: Path, starts: str, bound_mib: float):
+        experiment = self.folder / 'experiment.yaml'
+        experiment.write_text(f'''experiment: memory
+title: "Memory"
+source: "a test"
+rounds:
+  image_topic: /stereo/left/image_raw
+  fix_topic: {FIXES}
+  bags:
+    - {{name: one, bag: {bag}, group: one}}
+    - {{name: two, bag: {bag}, group: two}}
+pairs:
+  - [one, two]
+starts: {starts}
+methods:
+  - {{name: DPSO-80, tracker: dpso}}
+''', encoding='utf-8')
+        self.check(name, bound_mib, 'evaluate', '--config', experiment, '--threads', THREADS, '--output',
+                   self.folder / 'results')
+
+    def test_evaluation_of_dense_noise(self):
+        bag = self.folder / 'noise.bag'
+        write_bag(bag, [encoded(1600, k) for k in range(6)], 60)
+        self.evaluate('noise of 1600 x 1200', bag, 'all', evaluate_bound(THREADS, 1600 * 1200, 6, 6, 6))
+
+    def test_evaluation_from_every_image(self):
+        bound = evaluate_bound(THREADS, 320 * 240, MAP_IMAGES, DRIVE_IMAGES, DRIVE_IMAGES)
+        self.evaluate('a run from every image', DRIVE, 'all', bound)
+
+    def test_merging(self):
+        other, merged = self.folder / 'other.map', self.folder / 'merged.map'
+        self.check('a recording', builder_bound(THREADS, 320 * 240, DRIVE_IMAGES, 2500), 'map_builder', '--bag', DRIVE,
+                   '--threads', THREADS, '--output', other)
+        for name, path in [('a map of another day', other)] + [(path.name, path) for path in CORPUS.glob('*.map')]:
+            sizes = mib(MAP.stat().st_size + path.stat().st_size)
+            self.check(name, merge_bound(THREADS, sizes, MAP_IMAGES + DRIVE_IMAGES), 'map_edit', 'merge', MAP, path,
+                       '--threads', THREADS, '--output', merged)
 
     def test_texts_without_end(self):
         texts = {'aliases of aliases': 'a: &a [1,1,1,1,1,1,1,1,1]\n' + ''.join(

@@ -4,6 +4,8 @@ BASE, PER_THREAD = 260, 72
 LARGEST_PIXELS = 4096 * 4096
 SIFT_BYTES, DECODED_BYTES = 140, 8
 IMAGE_BYTES, FIX_BYTES = 2 ** 19, 2000
+MERGE_CACHE_MIB, MERGED_IMAGE_BYTES = 512, 4000
+PAIR_BYTES, STEP_BYTES = 24, 200
 
 
 def mib(count: float) -> float:
@@ -26,6 +28,17 @@ def localizer_bound(map_pixels: int, features_mib: float, threads: int = 1) -> f
 def editor_bound(features_mib: float) -> float:
     """Of map_info and of map_edit without `add` and `merge`."""
     return BASE + PER_THREAD + 2.0 * features_mib
+
+
+def merge_bound(threads: int, maps_mib: float, images: int) -> float:
+    """Of `map_edit merge`. `maps_mib`, `images`: of all maps together."""
+    return BASE + PER_THREAD * threads + 2.0 * min(maps_mib, MERGE_CACHE_MIB) + mib(MERGED_IMAGE_BYTES * images)
+
+
+def evaluate_bound(threads: int, pixels: int, map_images: int, drive_images: int, starts: int) -> float:
+    """Of evaluate, with one recording as the map and one as the drive."""
+    return (builder_bound(threads, pixels, map_images + drive_images, 0)
+            + mib(drive_images * (PAIR_BYTES * map_images + STEP_BYTES * starts)))
 
 
 def peak_mib(pid: int) -> float:
