@@ -3,28 +3,43 @@
 set -euo pipefail
 repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo build=$repo/build/fuzz
-readonly targets=(map bag config messages unit_result edits)
+readonly targets=(map bag config camera reconfigure edits unit_result services sensors records images)
 
 usage() {
-  cat <<'USAGE'
+  cat <<USAGE
 Usage: fuzz.sh [--seconds N] [TARGET ...]
-Runs each target, map, bag, config, messages, unit_result or edits (default: all, one after the other), under
-AddressSanitizer and UndefinedBehaviorSanitizer.
+Runs each target (default: all, one after the other) under AddressSanitizer and UndefinedBehaviorSanitizer:
+${targets[*]}
   --seconds N  how long each target runs (default: 60)
 What is found is kept in build/fuzz/findings, new inputs in build/fuzz/corpus; those that ship are in test/fuzz/corpus.
-Exit code 0 when nothing was found.
+Prints a table at the end; scripts/fuzz_coverage.py says what was reached. Exit code 0 when nothing was found.
 USAGE
 }
 
 # Runs one target for so many seconds; fails when it finds something.
 fuzz() {
-  local target=$1 seconds=$2 corpus=$build/corpus/$1 findings=$build/findings/$1
+  local target=$1 seconds=$2 corpus=$build/corpus/$1 findings=$build/findings/$1 length=4096
+  local dictionary=$repo/test/fuzz/dictionaries/$target.dict options=()
+  if [[ $target == map || $target == bag ]]; then length=65536; fi
+  if [[ -e $dictionary ]]; then options+=("-dict=$dictionary"); fi
   printf '\n== %s, %s s\n' "$target" "$seconds"
-  mkdir -p "$corpus" "$findings"
-  # An allocation that is refused is std::bad_alloc, as without the sanitizer, and so the reader's own business.
-  ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1 \
-    "$build/fuzz/fuzz_$target" -max_total_time="$seconds" -timeout=60 -rss_limit_mb=4096 -max_len=65536 \
-    -print_final_stats=1 -verbosity=1 -artifact_prefix="$findings/" "$corpus" "$repo/test/fuzz/corpus/$target"
+  mkdir -p "$corpus" "$findings" "$build/log"
+  # An allocation that is refused is std::bad_alloc, as without the sanitizer, and so the reader's own business. The
+  # other options keep the sanitizer's own bookkeeping small.
+  ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1:malloc_context_size=2:quarantine_size_mb=16:max_malloc_fill_size=0 \
+    UBSAN_OPTIONS=print_stacktrace=1 \
+    "$build/fuzz/fuzz_$target" -max_total_time="$seconds" -timeout=60 -rss_limit_mb=4096 -max_len="$length" \
+    -entropic=0 -print_final_stats=1 -verbosity=1 -artifact_prefix="$findings/" "${options[@]}" "$corpus" \
+    "$repo/test/fuzz/corpus/$target" 2>&1 | tee "$build/log/$target.txt"
+}
+
+# One row of the table.
+summary() {
+  awk -v target="$1" '
+    /^#[0-9]+.* cov: / { for (i = 1; i < NF; ++i) if ($i == "cov:") edges = $(i + 1) }
+    /number_of_executed_units/ { executions = $2 }
+    /average_exec_per_sec/ { rate = $2 }
+    END { printf "| %s | %d | %d | %d |\n", target, executions, rate, edges }' "$build/log/$1.txt"
 }
 
 main() {
@@ -50,6 +65,8 @@ main() {
   cmake --build "$build" --parallel "$(nproc)" --target "${chosen[@]/#/fuzz_}"
   local target result=0
   for target in "${chosen[@]}"; do fuzz "$target" "$seconds" || result=1; done
+  printf '\n| target | executions | a second | edges |\n|---|---|---|---|\n'
+  for target in "${chosen[@]}"; do summary "$target"; done
   return "$result"
 }
 

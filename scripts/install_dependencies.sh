@@ -57,7 +57,7 @@ python3-opencv: images in scripts'
 readonly LINT='
 clang-format clang-tidy shellcheck: checks of style'
 readonly CLANG='
-clang libclang-rt-dev: fuzzing
+clang libclang-rt-dev llvm: fuzzing
 python3-clang: mutation testing'
 readonly RVIZ='
 rviz xvfb: rviz and a virtual display

@@ -1,8 +1,10 @@
 /// A bag file: its structure, its fixes, odometry and images, the camera and where the robot carries it.
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "bag/bag_file.h"
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/geometry/sensor_mount.h"
@@ -40,9 +42,8 @@ void readTopic(const BagReader& bag, const std::string& topic) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace visual_localization;
-  const std::string path = fuzz::inMemoryFile(data, size);
   fuzz::expect<BagError>([&] {
-    const BagReader bag(path);
+    const BagReader bag("fuzz.bag", std::make_unique<bag::MemoryBytes>(fuzz::Input(data, size).rest()));
     fuzz::expect<BagError>([&] { bag.fixes("/fix"); });
     fuzz::expect<BagError>([&] { bag.odometry("/odom", "base_link", "map"); });
     for (const char* topic : {"/raw", "/jpeg"}) readTopic(bag, topic);

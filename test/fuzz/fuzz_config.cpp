@@ -4,6 +4,7 @@
 #include <string>
 
 #include "evaluation/experiment.h"
+#include "parameters/yaml_map.h"
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/map/map_builder.h"
@@ -12,9 +13,9 @@
 namespace visual_localization {
 namespace {
 
-void readParameters(const std::string& path) {
+void readParameters(const std::string& text) {
   try {
-    const ParameterValues values = parameters::readYaml(path);
+    const ParameterValues values = parameters::YamlMap::parse(text, "parameters.yaml").parameters();
     MapBuilderConfig builder;
     fuzz::expect<ParameterError>([&] { assignParameters(builder, values); });
     LocalizerConfig localizer;
@@ -32,6 +33,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace visual_localization;
   const std::string text(reinterpret_cast<const char*>(data), size);
   fuzz::expect<ParameterError>([&] { parseExperiment(text, "experiment.yaml"); });
-  readParameters(fuzz::inMemoryFile(data, size));
+  readParameters(text);
   return 0;
 }

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <string>
+#include <type_traits>
 
 #include <unistd.h>
 
@@ -38,6 +41,43 @@ bool expect(Read read) {
     return false;
   }
 }
+
+/// Takes values from the bytes of an input, one after the other; zeros when they are used up.
+class Input {
+ public:
+  Input(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
+
+  template <class Number>
+  Number number() {
+    static_assert(std::is_arithmetic_v<Number>);
+    Number value{};
+    const std::size_t count = std::min(sizeof(value), size_);
+    if (count > 0) std::memcpy(&value, data_, count);
+    skip(count);
+    return value;
+  }
+
+  /// Of at most 255 characters.
+  std::string text() {
+    const std::size_t count = std::min<std::size_t>(number<std::uint8_t>(), size_);
+    const std::string text(reinterpret_cast<const char*>(data_), count);
+    skip(count);
+    return text;
+  }
+
+  /// All that is left.
+  std::string rest() const { return std::string(reinterpret_cast<const char*>(data_), size_); }
+  bool isEmpty() const { return size_ == 0; }
+
+ private:
+  void skip(std::size_t count) {
+    data_ += count;
+    size_ -= count;
+  }
+
+  const std::uint8_t* data_;
+  std::size_t size_;
+};
 
 /// The bytes as a file, the same one every time; removed at the end of the program.
 inline std::string inMemoryFile(const std::uint8_t* data, std::size_t size) {

@@ -161,7 +161,13 @@ class Editor {
   std::map<std::int64_t, std::int64_t> seeds_;  ///< of the images' rows
 };
 
-std::string anySql(Random& random) {
+/// A statement, and the table that it changes alone; empty: it may be any.
+struct Sql {
+  std::string text;
+  std::string table;
+};
+
+Sql anySql(Random& random) {
   static const std::array<const char*, 22> kColumns{"images.id",
                                                     "images.session",
                                                     "images.stamp_ns",
@@ -226,13 +232,39 @@ std::string anySql(Random& random) {
       "PRAGMA page_size = 1024; VACUUM",
       "PRAGMA auto_vacuum = FULL; VACUUM",
       "PRAGMA encoding = 'UTF-16'; VACUUM"};
-  if (random() % 6 == 0) return oneOf(kOthers, random);
+  if (random() % 6 == 0) return {oneOf(kOthers, random), ""};
   const std::string column = oneOf(kColumns, random);
   const std::size_t dot = column.find('.');
   const std::string table = column.substr(0, dot);
   const std::string where = random() % 4 == 0 ? "" : " WHERE rowid = " + std::to_string(random() % 4);
   const std::string which = table == "meta" ? " WHERE random() % 5 = 0" : where;
-  return "UPDATE OR REPLACE " + table + " SET " + column.substr(dot + 1) + " = " + oneOf(kValues, random) + which;
+  return {"UPDATE OR REPLACE " + table + " SET " + column.substr(dot + 1) + " = " + oneOf(kValues, random) + which,
+          table};
+}
+
+/// `changed`: the only table whose rows need new checksums; empty: all. Those of all depend on the table `images`.
+void repairChecksums(Editor& editor, const std::string& changed) {
+  const auto is_changed = [&changed](const char* table) {
+    return changed.empty() || changed == "images" || changed == table;
+  };
+  if (is_changed("features") || is_changed("globals") || is_changed("previews") || is_changed("landmarks")) {
+    editor.readSeeds();
+  }
+  if (is_changed("features")) {
+    editor.repairRows("SELECT image, keypoints, descriptors FROM features", 2,
+                      "UPDATE features SET crc32 = ? WHERE image = ?");
+  }
+  if (is_changed("globals")) {
+    editor.repairRows("SELECT image, wgoh, wgii FROM globals", 2, "UPDATE globals SET crc32 = ? WHERE image = ?");
+  }
+  if (is_changed("previews")) {
+    editor.repairRows("SELECT image, jpeg FROM previews", 1, "UPDATE previews SET crc32 = ? WHERE image = ?");
+  }
+  if (is_changed("landmarks")) {
+    editor.repairRows("SELECT image, pose, points FROM landmarks", 2, "UPDATE landmarks SET crc32 = ? WHERE image = ?");
+  }
+  if (is_changed("masks")) editor.repairMasks();
+  editor.repairChecksum();
 }
 
 void putBigEndian(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint64_t value) {
@@ -276,20 +308,11 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
   const bool by_sql = size >= 512 && random() % 2 == 0;
   if (!by_sql) mutateBytes(bytes, max_size, random);
   if (random() % 8 != 0) repairHeader(bytes);
-  if (bytes.size() >= 512 && (by_sql || random() % 2 == 0)) {
+  if (bytes.size() >= 512 && (by_sql || random() % 4 == 0)) {
     Editor editor(bytes.data(), bytes.size());
-    for (std::size_t i = 0; by_sql && i <= random() % 3; ++i) editor.execute(anySql(random));
-    if (random() % 8 != 0) {
-      editor.readSeeds();
-      editor.repairRows("SELECT image, keypoints, descriptors FROM features", 2,
-                        "UPDATE features SET crc32 = ? WHERE image = ?");
-      editor.repairRows("SELECT image, wgoh, wgii FROM globals", 2, "UPDATE globals SET crc32 = ? WHERE image = ?");
-      editor.repairRows("SELECT image, jpeg FROM previews", 1, "UPDATE previews SET crc32 = ? WHERE image = ?");
-      editor.repairMasks();
-      editor.repairRows("SELECT image, pose, points FROM landmarks", 2,
-                        "UPDATE landmarks SET crc32 = ? WHERE image = ?");
-      editor.repairChecksum();
-    }
+    const Sql sql = by_sql ? anySql(random) : Sql();
+    if (by_sql) editor.execute(sql.text);
+    if (random() % 8 != 0) repairChecksums(editor, sql.table);
     if (std::vector<std::uint8_t> changed = editor.bytes(); !changed.empty()) bytes = std::move(changed);
     if (random() % 8 != 0) repairHeader(bytes);
   }

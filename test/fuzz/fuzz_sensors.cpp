@@ -1,0 +1,51 @@
+/// What sensors send beside images and calibrations: odometry, fixes and static transforms. The first byte chooses.
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include <nav_msgs/Odometry.h>
+#include <sensor_msgs/NavSatFix.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include "bag/bag_messages.h"
+#include "ros/message_readers.h"
+#include "test/fuzz/fuzz_support.h"
+
+namespace visual_localization {
+namespace {
+
+void readOdometry(const nav_msgs::Odometry& message) {
+  fuzz::expect<std::invalid_argument>([&] {
+    const OdometryReading reading = toReading(message, 1, "base_link", "map");
+    if (!reading.position_m.allFinite()) fuzz::fail("odometry that is nowhere");
+  });
+}
+
+void readTransforms(const tf2_msgs::TFMessage& message) {
+  StaticTransforms transforms;
+  transforms.add(message);
+  const auto pose = transforms.pose("base_link", "camera");
+  if (pose && !pose->matrix().allFinite()) fuzz::fail("a camera that is nowhere");
+}
+
+}  // namespace
+}  // namespace visual_localization
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace visual_localization;
+  if (size == 0) return 0;
+  const std::string bytes = fuzz::Input(data + 1, size - 1).rest();
+  fuzz::expect<ImageError>([&] {
+    switch (data[0] % 3) {
+      case 0:
+        readOdometry(*deserialize<nav_msgs::Odometry>(bytes));
+        break;
+      case 1:
+        toFix(*deserialize<sensor_msgs::NavSatFix>(bytes), 1);
+        break;
+      default:
+        readTransforms(*deserialize<tf2_msgs::TFMessage>(bytes));
+    }
+  });
+  return 0;
+}
