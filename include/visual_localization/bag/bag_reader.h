@@ -23,7 +23,7 @@ namespace visual_localization {
 namespace bag {
 class BagFile;
 class Bytes;
-}
+}  // namespace bag
 
 /// A bag that cannot be read. The text is one line and begins with the path.
 class BagError : public std::runtime_error {
