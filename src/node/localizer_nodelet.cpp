@@ -228,7 +228,7 @@ bool LocalizerNodelet::onToLL(ToLL::Request& request, ToLL::Response& response) 
 void LocalizerNodelet::configure(const NodeParameters& parameters, const ParameterValues& changed) {
   localizer_->configure(parameters.localizer);
   diagnostics_->setImageTimeout(parameters.node.image_timeout_s);
-  publisher_->configure(parameters.node);
+  publisher_->configure(parameters);
   std::vector<std::string> settings;
   for (const auto& [name, value] : changed) settings.push_back(name + " = " + parameters::toString(value));
   NODELET_INFO_STREAM("Parameters changed: " << joined(settings));

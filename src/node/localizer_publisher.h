@@ -33,7 +33,7 @@ class LocalizerPublisher : public ImageOutput {
   /// What is known without an image: that there is no map, or that no image comes. Stamped with the present.
   void publishState(LocalizationState state, const ImageCounts& counts);
   /// What can change while it runs. From any thread.
-  void configure(const NodeConfig& config) { transform_.configure(config); }
+  void configure(const NodeParameters& parameters) { transform_.configure(parameters); }
 
   /// No pose and no transform after an image of a frozen camera.
   void publish(const LocalizedImage& image, const ImageCounts& counts) override;

@@ -74,10 +74,10 @@ tf2::Transform SlidingCorrection::after(double elapsed_s, const tf2::Transform& 
 
 TransformPublisher::TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node)
     : config_(parameters.node),
-      odometry_(parameters.localizer.odometry),
       between_images_(config_.tf_mode == "map_to_odom" && config_.tf_rate_hz > 0.0),
       tolerance_s_(config_.transform_tolerance_s),
       image_timeout_s_(config_.image_timeout_s),
+      odometry_(parameters.localizer.odometry),
       correction_(config_.tf_smoothing_s, odometry_) {
   if (config_.tf_mode == "map_to_odom") listener_ = std::make_unique<tf2_ros::TransformListener>(buffer_, node);
   if (!between_images_) return;
@@ -94,9 +94,12 @@ TransformPublisher::~TransformPublisher() {
   spinner_.reset();
 }
 
-void TransformPublisher::configure(const NodeConfig& config) {
-  tolerance_s_ = config.transform_tolerance_s;
-  image_timeout_s_ = config.image_timeout_s;
+void TransformPublisher::configure(const NodeParameters& parameters) {
+  tolerance_s_ = parameters.node.transform_tolerance_s;
+  image_timeout_s_ = parameters.node.image_timeout_s;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  odometry_ = parameters.localizer.odometry;
+  correction_.configure(odometry_);
 }
 
 void TransformPublisher::forget() {

@@ -38,6 +38,8 @@ class SlidingCorrection {
   SlidingCorrection(double smoothing_s, const OdometryConfig& odometry)
       : smoothing_s_(smoothing_s), odometry_(odometry) {}
 
+  /// What odometry drifts from now on.
+  void configure(const OdometryConfig& odometry) { odometry_ = odometry; }
   /// From now on towards this one. The standard deviations are those of the pose, of each axis and of the heading.
   /// Heights and tilts of the odometry are never a reason to be elsewhere.
   void aimAt(const tf2::Transform& odom_in_map, const tf2::Transform& base_in_odom, double sigma_m,
@@ -63,8 +65,8 @@ class TransformPublisher {
   TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node);
   ~TransformPublisher();
 
-  /// What can change while it runs: tolerance and timeout. From any thread.
-  void configure(const NodeConfig& config);
+  /// What can change while it runs: tolerance, timeout and what odometry drifts. From any thread.
+  void configure(const NodeParameters& parameters);
   /// Time has gone back: the odometry in the buffer lies in the future.
   void forget();
   /// Another map: nothing is known of the robot in it. From any thread.
@@ -83,7 +85,6 @@ class TransformPublisher {
   void broadcast(const tf2::Transform& child_in_map, const std::string& child, const ros::Time& stamp);
 
   const NodeConfig config_;
-  const OdometryConfig odometry_;
   const bool between_images_;  ///< instead of with them
   std::atomic<double> tolerance_s_;
   std::atomic<double> image_timeout_s_;
@@ -91,8 +92,9 @@ class TransformPublisher {
   std::unique_ptr<tf2_ros::TransformListener> listener_;  ///< only with odometry
   tf2_ros::TransformBroadcaster broadcaster_;
   ros::Time last_stamp_;
-  std::string last_reason_;                           ///< why nothing was broadcast for that stamp
-  std::mutex mutex_;                                  ///< of all that follows, until the next comment
+  std::string last_reason_;  ///< why nothing was broadcast for that stamp
+  std::mutex mutex_;         ///< of all that follows, until the next comment
+  OdometryConfig odometry_;
   std::optional<tf2::Transform> odom_in_map_;         ///< of the last estimate that moved the robot
   SlidingCorrection correction_;                      ///< where that is known
   ros::Time last_between_;                            ///< broadcast

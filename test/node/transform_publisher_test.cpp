@@ -122,6 +122,33 @@ TEST(SlidingCorrection, AfterALongWayByOdometryALargerOneSlidesIn) {
   }
 }
 
+TEST(SlidingCorrection, SlidesByWhatOdometryIsSaidToDrift) {
+  const auto slides = [](const OdometryConfig& odometry, const tf2::Transform& target) {
+    SlidingCorrection correction(0.5, {});
+    correction.configure(odometry);
+    const auto straight = transform(0.0, 0.0, 0.0);
+    correction.aimAt(straight, straight, kSigma_m, kSigma_rad);
+    for (double x_m = 0.0; x_m <= 20.0; x_m += 1.0) correction.after(0.02, transform(x_m, 0.0, 0.0));
+    const auto base_in_odom = transform(20.0, 0.0, 0.0);
+    const auto odom_in_map = odomInMap(target, base_in_odom);
+    correction.aimAt(odom_in_map, base_in_odom, kSigma_m, kSigma_rad);
+    const auto left = odom_in_map.inverseTimes(correction.after(0.02, base_in_odom));
+    return (left * base_in_odom).getOrigin().distance(base_in_odom.getOrigin()) > 1e-6 ||
+           left.getRotation().getAngleShortestPath() > 1e-6;
+  };
+  OdometryConfig wheels;
+  const auto aside = transform(20.0, 4.0, 0.0);
+  wheels.distance_sigma = 0.01;
+  EXPECT_FALSE(slides(wheels, aside));
+  wheels.distance_sigma = 0.5;
+  EXPECT_TRUE(slides(wheels, aside));
+  const auto turned = transform(20.0, 0.0, 0.8);
+  wheels.turn_sigma_rad_m = 0.001;
+  EXPECT_FALSE(slides(wheels, turned));
+  wheels.turn_sigma_rad_m = 0.1;
+  EXPECT_TRUE(slides(wheels, turned));
+}
+
 TEST(SlidingCorrection, WithoutSmoothingEachMovesItAtOnce) {
   SlidingCorrection correction(0.0, {});
   for (const double x_m : {10.0, 10.1, 50.0}) {
