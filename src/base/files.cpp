@@ -28,14 +28,23 @@ std::array<std::atomic<char*>, 32> unfinished{};
 std::atomic<bool> ending{false};    ///< a signal ends the process
 std::atomic<int> being_changed{0};  ///< threads that make a file and its entry in `unfinished`, or remove them
 
+/// Those that end a program and leave it time to remove its files.
+constexpr std::array<int, 4> kSignals{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
+
+sigset_t endingSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal_number : kSignals) sigaddset(&signals, signal_number);
+  return signals;
+}
+
 /// While one lives, no signal ends the process: its handler waits, so that it sees every file and no entry that is half
-/// there.
+/// there. Never one within another.
 class Change {
  public:
   Change() {
-    sigset_t all;
-    sigfillset(&all);
-    ::pthread_sigmask(SIG_SETMASK, &all, &before_);  // a handler in this thread would wait for itself
+    const sigset_t ending_signals = endingSignals();
+    ::pthread_sigmask(SIG_BLOCK, &ending_signals, &before_);  // a handler in this thread would wait for itself
     ++being_changed;
     if (!ending) return;
     --being_changed;
@@ -68,6 +77,7 @@ void strike(int slot) {
   if (slot >= 0) std::free(unfinished[static_cast<std::size_t>(slot)].exchange(nullptr));
 }
 
+/// For one thread, and by another signal for one more: both do the same.
 void removeUnfinishedAndDie(int signal_number) {
   ending = true;
   while (being_changed > 0) ::poll(nullptr, 0, 1);
@@ -75,7 +85,7 @@ void removeUnfinishedAndDie(int signal_number) {
     const char* name = slot.load();
     if (name != nullptr) ::unlink(name);
   }
-  // The handler was reset to the default on entry: whoever waits for this process sees how it ended.
+  ::signal(signal_number, SIG_DFL);  // whoever waits for this process sees how it ended
   ::raise(signal_number);
 }
 
@@ -207,9 +217,8 @@ void writeFile(const std::string& path, const std::string& content) {
 void removePartialFilesOnSignals() {
   struct sigaction action {};
   action.sa_handler = removeUnfinishedAndDie;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigemptyset(&action.sa_mask);
-  for (const int signal_number : {SIGHUP, SIGINT, SIGPIPE, SIGTERM}) {
+  action.sa_mask = endingSignals();
+  for (const int signal_number : kSignals) {
     struct sigaction current {};
     // What the caller chose to ignore (nohup) stays ignored.
     if (::sigaction(signal_number, nullptr, &current) == 0 && current.sa_handler == SIG_IGN) continue;

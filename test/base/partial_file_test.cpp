@@ -171,11 +171,15 @@ TEST(PartialFile, DisappearsWhenTheProcessIsInterruptedWhileAnotherThreadMakesIt
       removePartialFilesOnSignals();
       makeFilesWithoutEnd(folder / "a");
     }
-    ::usleep(static_cast<useconds_t>(5000 + 97 * i));
-    ::kill(child, i % 2 == 0 ? SIGINT : SIGTERM);
+    ASSERT_GT(child, 0);
+    while (folder.names().empty()) ::usleep(100);
+    ::usleep(static_cast<useconds_t>(97 * i));
+    const int signal_number = i % 2 == 0 ? SIGINT : SIGTERM;
+    ::kill(child, signal_number);
+    if (i % 3 == 0) ::kill(child, signal_number);  // somebody presses Ctrl-C twice
     int status = 0;
     ASSERT_EQ(::waitpid(child, &status, 0), child);
-    ASSERT_TRUE(WIFSIGNALED(status));
+    ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal_number) << status;
     ASSERT_TRUE(folder.names().empty()) << folder.names().front() << " after " << i;
   }
 }
