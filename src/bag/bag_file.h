@@ -66,7 +66,7 @@ class FileBytes : public Bytes {
   std::uint64_t size_ = 0;
 };
 
-/// Those of an unpacked chunk.
+/// Those of an unpacked chunk, or of a whole bag.
 class MemoryBytes : public Bytes {
  public:
   explicit MemoryBytes(std::string content) : content_(std::move(content)) {}

@@ -24,7 +24,7 @@ bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::Camera
 /// Reads a file of camera_calibration: YAML, or INI by its ending. Throws CameraError that begins with the path, also
 /// for a file that says the camera is not calibrated.
 CameraModel readCameraFile(const std::string& path);
-/// The same for its content.
+/// The same for its content; `path` still says whether it is YAML or INI.
 CameraModel parseCameraFile(const std::string& content, const std::string& path);
 
 /// Where a camera publishes its calibration by image_transport's naming: "/left/image_raw" and
