@@ -15,13 +15,11 @@ REPO = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 BUILD = os.path.join(REPO, 'build', 'fuzz-coverage')
 SEEDS = os.path.join(REPO, 'test', 'fuzz', 'corpus')
 READERS = (
-    'src/apps/region.cpp', 'src/bag/bag_file.cpp', 'src/bag/bag_messages.h', 'src/bag/bag_mount.cpp',
-    'src/bag/bag_reader.cpp', 'src/bag/bag_record.cpp', 'src/camera/camera_model.cpp', 'src/camera/camera_text.cpp',
-    'src/editing/map_usage.cpp', 'src/evaluation/experiment.cpp', 'src/evaluation/experiment_methods.cpp',
-    'src/evaluation/unit_text.cpp', 'src/map/map_meta.cpp', 'src/map/map_reader.cpp', 'src/map/map_rows.cpp',
-    'src/map/map_schema.cpp', 'src/map/packed_geometry.cpp', 'src/map/sqlite.cpp', 'src/parameters/yaml_map.cpp',
-    'src/ros/camera_info.cpp', 'src/ros/compressed_image.cpp', 'src/ros/image_conversion.cpp',
-    'src/ros/message_readers.cpp')
+    'src/apps/region.cpp', 'src/bag/bag_file.cpp', 'src/bag/bag_messages.h', 'src/bag/bag_reader.cpp',
+    'src/camera/camera_model.cpp', 'src/editing/map_selection.cpp', 'src/evaluation/experiment.cpp',
+    'src/evaluation/unit_result.cpp', 'src/map/map_meta.cpp', 'src/map/map_reader.cpp', 'src/map/map_rows.cpp',
+    'src/map/map_schema.cpp', 'src/node/reconfigure_server.cpp', 'src/parameters/yaml_map.cpp',
+    'src/ros/image_conversion.cpp', 'src/ros/message_readers.cpp')
 
 
 def run(command, **options):

@@ -74,7 +74,7 @@ class Area(NamedTuple):
 
 
 def read_sessions(path: Path) -> List[Session]:
-    """From the JSON file of map_builder (src/apps/map_plot.h)."""
+    """From the JSON file of map_builder (src/apps/map_export.h)."""
     def positions(rows: Sequence[Sequence[float]]) -> Positions:
         return np.array(rows, dtype=float).reshape(-1, 2)
 

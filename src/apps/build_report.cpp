@@ -8,7 +8,7 @@
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "base/text.h"
-#include "ros/camera_info.h"
+#include "ros/message_readers.h"
 #include "visual_localization/features/front_end.h"
 
 namespace visual_localization::apps {

@@ -18,7 +18,6 @@
 #include "base/text.h"
 #include "evaluation/evaluator.h"
 #include "evaluation/experiment.h"
-#include "evaluation/result_folder.h"
 #include "evaluation/round_recorder.h"
 #include "parameters/yaml_map.h"
 

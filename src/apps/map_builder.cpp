@@ -8,7 +8,7 @@
 
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
-#include "apps/map_plot.h"
+#include "apps/map_export.h"
 #include "base/files.h"
 #include "visual_localization/map/map_file.h"
 

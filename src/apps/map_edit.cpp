@@ -9,13 +9,11 @@
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/command_line.h"
-#include "apps/map_growth.h"
 #include "apps/region.h"
 #include "base/files.h"
 #include "base/text.h"
 #include "editing/map_merger.h"
 #include "editing/map_selection.h"
-#include "editing/map_usage.h"
 #include "map/map_writer.h"
 #include "visual_localization/map/map_file.h"
 

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <iosfwd>
 #include <string>
 
 #include "apps/map_export.h"
+#include "survey/map_survey.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::apps {

@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/text.h"
-#include "visual_localization/geo/local_frame.h"
+#include "visual_localization/geo/trajectory.h"
 
 namespace visual_localization::apps {
 namespace {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "visual_localization/geo/geodetic_point.h"
+#include "visual_localization/geo/trajectory.h"
 
 namespace visual_localization::apps {
 

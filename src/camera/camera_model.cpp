@@ -4,9 +4,97 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include <opencv2/calib3d.hpp>
+
+#include "base/numbers.h"
 #include "base/text.h"
-#include "camera/lens.h"
+
+/// The equations of the lens models (OpenCV's documentation of calib3d), on normalised coordinates.
+namespace visual_localization::lens {
+namespace {
+
+constexpr double kWidestAngle_rad = 85.0 / 180.0 * kPi;
+
+double at(const std::vector<double>& coefficients, std::size_t i) {
+  return i < coefficients.size() ? coefficients[i] : 0.0;
+}
+
+/// Angle on the sensor of a ray `theta` from the axis (Kannala and Brandt).
+double fisheyeAngle(const std::vector<double>& k, double theta) {
+  const double t2 = theta * theta;
+  return theta * (1.0 + t2 * (at(k, 0) + t2 * (at(k, 1) + t2 * (at(k, 2) + t2 * at(k, 3)))));
+}
+
+/// What a radius is multiplied with (Brown and Conrady, with the denominator of the rational model).
+double radialFactor(const std::vector<double>& k, double r2) {
+  const double numerator = 1.0 + r2 * (at(k, 0) + r2 * (at(k, 1) + r2 * at(k, 4)));
+  const double denominator = 1.0 + r2 * (at(k, 5) + r2 * (at(k, 6) + r2 * at(k, 7)));
+  return denominator > 0.0 ? numerator / denominator : -1.0;
+}
+
+double distortedRadius(Distortion model, const std::vector<double>& coefficients, double angle_rad) {
+  if (model == Distortion::kEquidistant) return fisheyeAngle(coefficients, angle_rad);
+  const double radius = std::tan(angle_rad);
+  return radius * radialFactor(coefficients, radius * radius);
+}
+
+/// Of an undistorted ray. Meaningless beyond widestRadius().
+Eigen::Vector2d distort(Distortion model, const std::vector<double>& k, const Eigen::Vector2d& normalised) {
+  const double r2 = normalised.squaredNorm();
+  if (model == Distortion::kEquidistant) {
+    const double r = std::sqrt(r2);
+    return r > 0.0 ? Eigen::Vector2d(normalised * (fisheyeAngle(k, std::atan(r)) / r)) : normalised;
+  }
+  const double x = normalised.x();
+  const double y = normalised.y();
+  const double p1 = at(k, 2);
+  const double p2 = at(k, 3);
+  const Eigen::Vector2d tangential(2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+                                   p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y);
+  return normalised * radialFactor(k, r2) + tangential;
+}
+
+/// Up to which length of normalised coordinates the distorted radius grows with the undistorted one, at most that of
+/// a ray 85 degrees from the axis. Tangential coefficients are left aside.
+double widestRadius(Distortion model, const std::vector<double>& coefficients) {
+  constexpr int kSteps = 1700;  // of a twentieth of a degree
+  double angle_rad = 0.0;
+  double radius = 0.0;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double next_rad = kWidestAngle_rad * i / kSteps;
+    const double next = distortedRadius(model, coefficients, next_rad);
+    if (!(next > radius)) break;
+    angle_rad = next_rad;
+    radius = next;
+  }
+  return std::tan(angle_rad);
+}
+
+/// By OpenCV, iteratively. Where it does not converge, anything; check by distort().
+std::vector<Eigen::Vector2d> undistort(Distortion model, const std::vector<double>& coefficients,
+                                       const std::vector<Eigen::Vector2d>& distorted) {
+  if (distorted.empty()) return {};
+  std::vector<Eigen::Vector2d> normalised(distorted.size());
+  static_assert(sizeof(Eigen::Vector2d) == 2 * sizeof(double), "OpenCV reads and writes these points in place");
+  const auto count = static_cast<int>(distorted.size());
+  const cv::Mat from(count, 1, CV_64FC2, const_cast<Eigen::Vector2d*>(distorted.data()));  // only read
+  cv::Mat to(count, 1, CV_64FC2, normalised.data());
+  const cv::Matx33d identity = cv::Matx33d::eye();
+  if (model == Distortion::kEquidistant) {
+    cv::fisheye::undistortPoints(from, to, identity, coefficients);
+  } else {
+    // Its own five iterations leave errors of pixels in the corners of a wide lens.
+    const cv::TermCriteria until(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-10);
+    cv::undistortPoints(from, to, identity, coefficients, cv::noArray(), cv::noArray(), until);
+  }
+  CV_Assert(to.ptr() == reinterpret_cast<const unsigned char*>(normalised.data()));  // not allocated anew
+  return normalised;
+}
+
+}  // namespace
+}  // namespace visual_localization::lens
 
 namespace visual_localization {
 namespace {
@@ -20,7 +108,7 @@ constexpr double kRounding = 1e-9;  ///< relative: a camera that was scaled is s
 /// How far distort() may miss what was undistorted, normalised: at 300 pixels of focal length 0.003 pixels.
 constexpr double kRoundTrip = 1e-5;
 
-std::string text(double value, int digits = 6) {
+std::string asText(double value, int digits = 6) {
   std::ostringstream out = numberStream(digits);
   out << value;
   return out.str();
@@ -29,7 +117,7 @@ std::string text(double value, int digits = 6) {
 void requireIn(const std::string& field, double value, double least, double most) {
   const double slack = kRounding * std::max(std::abs(least), std::abs(most));
   if (value >= least - slack && value <= most + slack) return;  // not so for NaN
-  throw CameraError(field + " = " + text(value) + " is not in [" + text(least) + ", " + text(most) + "]");
+  throw CameraError(field + " = " + asText(value) + " is not in [" + asText(least) + ", " + asText(most) + "]");
 }
 
 void requireSize(const cv::Size& size) {
@@ -97,7 +185,7 @@ void CameraModel::findUsableShare() {
         ++count;
       } else if (inner) {
         const Eigen::Vector2d& pixel = pixels[static_cast<std::size_t>(row * (kGrid + 1) + column)];
-        throw CameraError("the distortion cannot be undone at pixel (" + text(pixel.x()) + ", " + text(pixel.y()) +
+        throw CameraError("the distortion cannot be undone at pixel (" + asText(pixel.x()) + ", " + asText(pixel.y()) +
                           "), which is in the middle of the image: the coefficients do not describe this camera");
       }
     }
@@ -150,6 +238,139 @@ Eigen::Vector2d CameraModel::distort(const Eigen::Vector2d& normalised) const {
 
 Eigen::Vector2d CameraModel::distorted(const Eigen::Vector2d& normalised) const {
   return pinhole_ ? normalised : lens::distort(intrinsics_.distortion, intrinsics_.coefficients, normalised);
+}
+
+namespace {
+
+constexpr std::array<std::pair<Distortion, const char*>, 3> kNames = {
+    {{Distortion::kPlumbBob, "plumb_bob"},
+     {Distortion::kRationalPolynomial, "rational_polynomial"},
+     {Distortion::kEquidistant, "equidistant"}}};
+
+constexpr std::size_t kMostCoefficients = 8;
+
+using Number = std::pair<const char*, double Intrinsics::*>;
+constexpr std::array<Number, 4> kNumbers = {
+    {{"fx", &Intrinsics::fx}, {"fy", &Intrinsics::fy}, {"cx", &Intrinsics::cx}, {"cy", &Intrinsics::cy}}};
+
+std::string text(double value) {
+  std::ostringstream out = numberStream(6);
+  out << value;
+  return out.str();
+}
+
+std::string text(const cv::Size& size) { return std::to_string(size.width) + " x " + std::to_string(size.height); }
+
+/// Focal lengths to a tenth of a pixel.
+std::string tenths(double value) { return text(std::round(10.0 * value) / 10.0); }
+
+std::string coefficientsOf(const Intrinsics& camera) {
+  std::vector<std::string> numbers;
+  for (const double value : camera.coefficients) numbers.push_back(text(value));
+  return "(" + joined(numbers) + ")";
+}
+
+/// Removes `key` from `values` and returns its value.
+template <class T>
+T take(ParameterValues& values, const std::string& key) {
+  const auto found = values.find(key);
+  if (found == values.end()) throw CameraError("value '" + key + "' is missing");
+  const T* value = std::get_if<T>(&found->second);
+  if (value == nullptr) throw CameraError("value '" + key + "' is of the wrong type");
+  T taken = *value;
+  values.erase(found);
+  return taken;
+}
+
+int takeSide(ParameterValues& values, const std::string& key) {
+  const auto side = take<std::int64_t>(values, key);
+  if (side < 1 || side > std::numeric_limits<int>::max()) {
+    throw CameraError(key + " = " + std::to_string(side) + " is no image side");
+  }
+  return static_cast<int>(side);
+}
+
+}  // namespace
+
+std::string toString(Distortion distortion) {
+  for (const auto& [model, name] : kNames) {
+    if (model == distortion) return name;
+  }
+  throw CameraError("unknown distortion model " + std::to_string(static_cast<int>(distortion)));
+}
+
+Distortion distortionOf(const std::string& name) {
+  for (const auto& [model, known] : kNames) {
+    if (name == known) return model;
+  }
+  throw CameraError("unknown distortion model '" + oneLine(name, 60) +
+                    "', allowed: plumb_bob, rational_polynomial, equidistant");
+}
+
+bool operator==(const CameraModel& a, const CameraModel& b) {
+  const Intrinsics& first = a.intrinsics();
+  const Intrinsics& second = b.intrinsics();
+  for (const auto& [name, number] : kNumbers) {
+    if (first.*number != second.*number) return false;
+  }
+  return first.size == second.size && first.distortion == second.distortion &&
+         first.coefficients == second.coefficients;
+}
+
+std::string describe(const CameraModel& camera) {
+  const Intrinsics& values = camera.intrinsics();
+  std::string words = text(values.size) + " px, focal length " + tenths(values.fx) + " x " + tenths(values.fy) +
+                      " px, " + (camera.isPinhole() ? "no distortion" : toString(values.distortion));
+  if (camera.usableShare() < 1.0) {
+    words += ", " + text(std::floor(100.0 * camera.usableShare())) + " % of the image can be undistorted";
+  }
+  return words;
+}
+
+std::string differences(const CameraModel& camera, const CameraModel& reference) {
+  const Intrinsics& ours = camera.intrinsics();
+  const Intrinsics& theirs = reference.intrinsics();
+  std::vector<std::string> found;
+  const auto compare = [&found](const std::string& what, const std::string& value, const std::string& other) {
+    found.push_back(what + " " + value + " instead of " + other);
+  };
+  if (ours.size != theirs.size) compare("size", text(ours.size), text(theirs.size));
+  for (const auto& [name, number] : kNumbers) {
+    if (ours.*number != theirs.*number) compare(name, text(ours.*number), text(theirs.*number));
+  }
+  if (ours.distortion != theirs.distortion) {
+    compare("distortion", toString(ours.distortion), toString(theirs.distortion));
+  }
+  if (ours.coefficients != theirs.coefficients) {
+    compare("coefficients", coefficientsOf(ours), coefficientsOf(theirs));
+  }
+  return joined(found);
+}
+
+ParameterValues toValues(const CameraModel& camera) {
+  const Intrinsics& intrinsics = camera.intrinsics();
+  ParameterValues values;
+  values["width"] = static_cast<std::int64_t>(intrinsics.size.width);
+  values["height"] = static_cast<std::int64_t>(intrinsics.size.height);
+  for (const auto& [name, number] : kNumbers) values[name] = intrinsics.*number;
+  values["distortion"] = toString(intrinsics.distortion);
+  for (std::size_t i = 0; i < intrinsics.coefficients.size(); ++i) {
+    values["d" + std::to_string(i)] = intrinsics.coefficients[i];
+  }
+  return values;
+}
+
+CameraModel cameraOf(const ParameterValues& values) {
+  ParameterValues left = values;
+  Intrinsics intrinsics;
+  intrinsics.size = {takeSide(left, "width"), takeSide(left, "height")};
+  for (const auto& [name, number] : kNumbers) intrinsics.*number = take<double>(left, name);
+  intrinsics.distortion = distortionOf(take<std::string>(left, "distortion"));
+  for (std::size_t i = 0; i < kMostCoefficients && left.count("d" + std::to_string(i)) > 0; ++i) {
+    intrinsics.coefficients.push_back(take<double>(left, "d" + std::to_string(i)));
+  }
+  if (!left.empty()) throw CameraError("unknown value '" + oneLine(left.begin()->first, 60) + "'");
+  return CameraModel(intrinsics);
 }
 
 }  // namespace visual_localization

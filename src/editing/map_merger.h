@@ -2,15 +2,60 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "base/files.h"
+#include "geometry/bundle_adjustment.h"
 #include "visual_localization/base/progress.h"
+#include "visual_localization/geo/trajectory.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
+
+/// From the frame of one map to that of another. Both are flat, so that it is not the same everywhere.
+class FrameChange {
+ public:
+  FrameChange(const LocalFrame& from, const LocalFrame& to);
+
+  /// Of what is at this position, east and north in the first frame.
+  PoseCorrection at(const Eigen::Vector2d& position_m) const;
+
+ private:
+  LocalFrame from_;
+  LocalFrame to_;
+  bool same_;
+};
+
+/// A map whose images lie in the frame of the new map already.
+struct PlacedMap {
+  std::shared_ptr<const TrainingMap> map;
+  std::vector<PoseCorrection> corrections;  ///< of each image, from the map's own frame
+};
+
+/// How the images of a map come to lie beside those of the maps before it.
+struct MapAlignment {
+  using Covariance = Eigen::Matrix<double, 6, 6>;
+
+  std::vector<PoseCorrection> corrections;             ///< of each image, from the map's own frame
+  std::vector<std::optional<Covariance>> covariances;  ///< of each image's pose where another map decides it
+  std::size_t tied = 0;                                ///< images that landmarks of the maps before agree on
+  double apart_m = 0.0;  ///< horizontal distance from where these see it: median before the alignment
+  double left_m = 0.0;   ///< and after it
+};
+
+/// Lays `map` beside the `placed` ones, which stay, in `frame`: each of its images that is near one of theirs is
+/// located by their landmarks, as a live image is, and between these its own geometry holds. Where they overlap in
+/// fewer than kLeastTied images it lies where its own fixes have it. The result does not depend on the number of
+/// threads.
+MapAlignment align(const TrainingMap& map, const LocalFrame& frame, const std::vector<PlacedMap>& placed,
+                   std::size_t threads, const Progress& progress = {});
+
+constexpr std::size_t kLeastTied = 5;
 
 /// Maps that cannot become one. The text is one line and begins with the name of a map.
 class MergeError : public std::runtime_error {

@@ -1,13 +1,183 @@
 #include "evaluation/evaluator.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <filesystem>
 #include <set>
+#include <system_error>
 #include <utility>
 
+#include "base/files.h"
 #include "base/parallel.h"
-#include "evaluation/drive_order.h"
+#include "base/text.h"
+#include "base/time.h"
+#include "evaluation/run.h"
+#include "parameters/yaml_map.h"
 
 namespace visual_localization {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char* const kExperiment = "/experiment.yaml";
+const char* const kProvenance = "/provenance.csv";
+
+/// The part of an experiment's YAML that decides about results: no comments, no words for the report.
+std::string decisivePart(const std::string& yaml, const std::string& path) {
+  try {
+    return parameters::withoutKeys(yaml, {"title", "source", "discussion"});
+  } catch (const ParameterError&) {
+    throw ResultError(path + ": is damaged: not an experiment");
+  }
+}
+
+}  // namespace
+
+ResultFolder::ResultFolder(Existing, std::string path, const std::string& yaml, const std::string& provenance)
+    : path_(std::move(path)), yaml_(yaml), provenance_(provenance) {}
+
+ResultFolder::ResultFolder(std::string path, const std::string& yaml, const std::string& provenance)
+    : ResultFolder(Existing{}, std::move(path), yaml, provenance) {
+  if (path_.empty()) throw ResultError("'': is no name of a folder");
+  std::error_code error;
+  fs::create_directories(path_ + "/units", error);
+  if (error) throw ResultError(path_ + ": cannot be created: " + error.message());
+  if (isUnused()) {  // but for an attempt that failed, perhaps for a mistake that the YAML no longer has
+    writeFile(path_ + kProvenance, provenance_);
+  } else {
+    requireSameOrigin();
+  }
+  writeFile(path_ + kExperiment, yaml_);
+}
+
+ResultFolder ResultFolder::open(std::string path, const std::string& yaml, const std::string& provenance) {
+  ResultFolder folder(Existing{}, std::move(path), yaml, provenance);
+  folder.requireSameOrigin();
+  return folder;
+}
+
+bool ResultFolder::isUnused() const { return fs::is_empty(path_ + "/units"); }
+
+void ResultFolder::requireSameOrigin() const {
+  for (const char* name : {kExperiment, kProvenance}) {
+    if (fs::exists(path_ + name)) continue;
+    throw ResultError(path_ + ": is not a folder of results (" + (name + 1) + " is missing); choose another folder");
+  }
+  const std::string experiment = path_ + kExperiment;
+  if (decisivePart(readFile(experiment), experiment) != decisivePart(yaml_, experiment)) {
+    throw ResultError(path_ +
+                      ": holds results of another configuration (experiment.yaml differs); choose another folder");
+  }
+  if (readFile(path_ + kProvenance) != provenance_) {
+    throw ResultError(
+        path_ + ": holds results of other rounds or another version (provenance.csv differs); choose another folder");
+  }
+}
+
+std::string ResultFolder::unitPath(std::size_t pair, std::size_t method) const {
+  return path_ + "/units/pair" + std::to_string(pair) + "_method" + std::to_string(method) + ".csv";
+}
+
+bool ResultFolder::has(std::size_t pair, std::size_t method) const { return fs::exists(unitPath(pair, method)); }
+
+bool ResultFolder::hasWhole(std::size_t pair, std::size_t method) const {
+  if (!has(pair, method)) return false;
+  try {
+    load(pair, method);
+    return true;
+  } catch (const ResultError&) {
+    return false;
+  }
+}
+
+void ResultFolder::save(std::size_t pair, std::size_t method, const UnitResult& unit) const {
+  requireSameOrigin();
+  writeFile(unitPath(pair, method), serialise(unit));
+}
+
+UnitResult ResultFolder::load(std::size_t pair, std::size_t method) const {
+  const std::string path = unitPath(pair, method);
+  try {
+    return parseUnit(readFile(path));
+  } catch (const FileError& error) {
+    throw ResultError(error.what());
+  } catch (const std::runtime_error& error) {
+    throw ResultError(path + ": is damaged: " + error.what() + "; it is made anew when its shard is run again");
+  }
+}
+
+std::size_t mergeResults(const ResultFolder& from, const ResultFolder& to, const Experiment& experiment) {
+  std::size_t copied = 0;
+  for (std::size_t pair = 0; pair < experiment.pairs.size(); ++pair) {
+    for (std::size_t method = 0; method < experiment.methods.size(); ++method) {
+      if (to.hasWhole(pair, method) || !from.has(pair, method)) continue;
+      to.save(pair, method, from.load(pair, method));
+      ++copied;
+    }
+  }
+  return copied;
+}
+
+std::string trackCsvHeader() {
+  return "stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,extract_ms,"
+         "match_ms,update_ms,source,inliers,reprojection_px,sigma_m,sigma_yaw_rad,swept\n";
+}
+
+std::string trackCsvRow(const Estimate& estimate) {
+  std::ostringstream out = numberStream();
+  const PoseEstimate& pose = estimate.pose;
+  const std::optional<MetricPose>& metric = estimate.metric;
+  out << secondsText(estimate.stamp_ns) << ',' << pose.position_m.x() << ',' << pose.position_m.y() << ','
+      << pose.yaw_rad << ',' << pose.geodetic.latitude_deg << ',' << pose.geodetic.longitude_deg << ','
+      << toString(estimate.state) << ',' << estimate.tracked.best.similarity << ','
+      << toString(estimate.evidence.features) << ',' << estimate.comparisons << ',' << estimate.image.extract_ms << ','
+      << estimate.image.match_ms << ',' << estimate.update_ms << ',' << toString(estimate.source) << ','
+      << (metric ? metric->inliers : 0) << ',' << (metric ? metric->reprojection_px : 0.0) << ',' << estimate.sigma_m()
+      << ',' << estimate.sigmaYaw_rad() << ',' << estimate.swept << '\n';
+  return out.str();
+}
+
+namespace {
+
+constexpr std::size_t kLongestPart = 60;  ///< of a file name, which has at most 255 bytes
+
+/// A name as a part of a file name.
+std::string plain(std::string name) {
+  const auto isPlain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.';
+  };
+  for (char& c : name) c = isPlain(c) ? c : '_';
+  return name.substr(0, kLongestPart);
+}
+
+}  // namespace
+
+std::string TrajectoryFiles::nameFor(const std::string& method, const std::string& map, const std::string& drive,
+                                     const std::string& start) {
+  const std::string rest = "__" + plain(map) + "__" + plain(drive) + "__" + start;
+  std::string name = plain(method) + rest;
+  for (int count = 2; !taken_.insert(name).second; ++count) name = plain(method) + "_" + std::to_string(count) + rest;
+  return name;
+}
+
+void TrajectoryFiles::write(const std::string& method, const std::string& map, const std::string& drive,
+                            const UnitResult& unit) {
+  if (unit.trajectory.empty()) return;
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (error) throw FileError(folder_ + ": cannot be created: " + error.message());
+  const std::string& row = unit.trace.front();
+  const std::string path = folder_ + "/" + nameFor(method, map, drive, row.substr(0, row.find(',')));
+  std::string estimates;
+  std::string truths;
+  for (const TracedPose& pose : unit.trajectory) {
+    estimates += pose.estimate + '\n';
+    if (!pose.truth.empty()) truths += pose.truth + '\n';
+  }
+  writeFile(path + ".tum", estimates);
+  if (!truths.empty()) writeFile(path + ".truth.tum", truths);
+}
+
 namespace {
 
 std::string shown(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }

@@ -1,17 +1,207 @@
 #include "evaluation/experiment.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 #include <set>
+#include <utility>
 
 #include "base/text.h"
-#include "evaluation/experiment_methods.h"
-#include "localization/presets.h"
 #include "parameters/yaml_map.h"
+#include "visual_localization/localization/localizer_config.h"
 
 namespace visual_localization {
 namespace {
 
 using parameters::YamlMap;
+using Setting = std::pair<std::string, std::string>;
+
+constexpr std::size_t kMostCombinations = 10000;
+constexpr std::size_t kMostMethods = 10000;
+constexpr std::size_t kLongestName = 1000;
+
+/// A name for tables and messages. Throws ParameterError when it is none.
+std::string readName(YamlMap& yaml, const std::string& key) {
+  std::string name = yaml.text(key);
+  if (name.empty() || name.find('\n') != std::string::npos) yaml.refuse(key, "must be a name of one line");
+  return name;
+}
+
+/// A number of a method itself, not a parameter.
+struct MethodNumber {
+  const char* key;
+  double MethodSpec::*value;
+  double min;
+  double max;
+};
+constexpr std::array<MethodNumber, 2> kMethodNumbers{
+    {{"speed", &MethodSpec::speed, 1.0 / 64.0, 64.0}, {"map_spacing", &MethodSpec::map_spacing_m, 0.0, 1000.0}}};
+
+const MethodNumber* numberCalled(const std::string& key) {
+  const auto* found = std::find_if(kMethodNumbers.begin(), kMethodNumbers.end(),
+                                   [&key](const MethodNumber& number) { return key == number.key; });
+  return found == kMethodNumbers.end() ? nullptr : found;
+}
+
+using Sweep = std::vector<std::pair<std::string, std::vector<std::string>>>;
+
+/// What a method's entry sweeps over; not what it sets as well.
+Sweep readSweep(YamlMap& yaml, const ParameterValues& parameters) {
+  Sweep sweep = yaml.sweep("sweep");
+  std::size_t combinations = 1;
+  for (const auto& [key, values] : sweep) {
+    if (parameters.count(key) != 0 || (numberCalled(key) != nullptr && yaml.has(key))) {
+      yaml.refuse("sweep/" + key, "is set for this method already");
+    }
+    combinations *= values.size();
+    if (combinations > kMostCombinations) {
+      yaml.refuse("sweep", "has more than " + std::to_string(kMostCombinations) + " combinations");
+    }
+  }
+  return sweep;
+}
+
+/// All combinations of the sweep's values, the last key changing fastest; one empty combination without a sweep.
+std::vector<std::vector<Setting>> combinationsOf(const Sweep& sweep) {
+  std::vector<std::vector<Setting>> combinations{{}};
+  for (const auto& [key, values] : sweep) {
+    std::vector<std::vector<Setting>> longer;
+    for (const auto& combination : combinations) {
+      for (const std::string& value : values) {
+        longer.push_back(combination);
+        longer.back().emplace_back(key, value);
+      }
+    }
+    combinations = std::move(longer);
+  }
+  return combinations;
+}
+
+/// The name of a method with the sweep's values in it.
+std::string withValues(std::string name, const std::vector<Setting>& settings, const YamlMap& yaml) {
+  for (const auto& [key, value] : settings) {
+    const std::string placeholder = "{" + key + "}";
+    for (auto at = name.find(placeholder); at != std::string::npos; at = name.find(placeholder, at + value.size())) {
+      name.replace(at, placeholder.size(), value);
+      if (name.size() > kLongestName) yaml.refuse("name", "= '" + name.substr(0, 100) + "...' becomes too long");
+    }
+  }
+  return name;
+}
+
+bool concernsFrontEnd(const std::string& parameter) {
+  return parameter.rfind("match/", 0) == 0 || parameter == "prune" || parameter == "max_image_gap" ||
+         parameter == "sift_backend";
+}
+
+/// What the entry of one method says before the sweep's values are filled in.
+struct MethodEntry {
+  std::string name;
+  MethodSpec method;
+  ParameterValues parameters;
+};
+
+void applyParameters(MethodEntry& entry, const YamlMap& yaml) {
+  for (const auto& [key, value] : entry.parameters) {
+    if (concernsFrontEnd(key)) yaml.refuse("parameters", "'" + key + "' holds for all methods: set it at the top");
+    entry.method.settings.emplace_back(key, parameters::toString(value));
+  }
+  try {
+    if (entry.method.isTracker()) {
+      entry.parameters["tracker"] = entry.method.tracker;
+      assignParameters(entry.method.localizer, entry.parameters);
+    } else {
+      assignParameters(entry.method.recogniser, entry.parameters);
+    }
+  } catch (const ParameterError& error) {
+    yaml.refuse("parameters", std::string("of '") + entry.method.name + "': " + error.what());
+  }
+}
+
+double sweptNumber(const MethodNumber& number, const std::string& text, const YamlMap& yaml) {
+  const ParameterValue value = parameters::parseScalar(text);
+  const auto* whole = std::get_if<std::int64_t>(&value);
+  const auto* real = std::get_if<double>(&value);
+  const double swept = whole != nullptr  ? static_cast<double>(*whole)
+                       : real != nullptr ? *real
+                                         : std::numeric_limits<double>::quiet_NaN();
+  if (swept >= number.min && swept <= number.max) return swept;
+  yaml.refuse("sweep", std::string(number.key) + " = " + text + " must be a number in [" +
+                           parameters::toString(number.min) + ", " + parameters::toString(number.max) + "]");
+}
+
+MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const YamlMap& yaml) {
+  MethodSpec& method = entry.method;
+  method.name = withValues(entry.name, swept, yaml);
+  for (const auto& [key, value] : swept) {
+    if (const MethodNumber* number = numberCalled(key)) {
+      method.*number->value = sweptNumber(*number, value, yaml);
+    } else {
+      entry.parameters[key] = parameters::parseScalar(value);
+    }
+  }
+  method.settings = {{"tracker", method.tracker},
+                     {"features", method.localizer.features},
+                     {"speed", parameters::toString(method.speed)},
+                     {"kidnapped", method.kidnapped ? "true" : "false"},
+                     {"map_gap", parameters::toString(method.map_gap)},
+                     {"covered", parameters::toString(method.covered)}};
+  if (method.map_spacing_m > 0.0) {
+    method.settings.emplace_back("map_spacing", parameters::toString(method.map_spacing_m));
+  }
+  applyParameters(entry, yaml);
+  return method;
+}
+
+std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
+  MethodEntry entry;
+  entry.name = readName(yaml, "name");
+  entry.method.localizer = base;
+  entry.method.tracker = yaml.text("tracker", base.tracker);
+  const std::vector<std::string>& recognisers = placeRecogniserNames();
+  const bool is_recogniser =
+      std::find(recognisers.begin(), recognisers.end(), entry.method.tracker) != recognisers.end();
+  try {
+    ParameterValues chosen{{"features", yaml.text("features", base.features)}};
+    if (!is_recogniser) chosen["tracker"] = entry.method.tracker;
+    assignParameters(entry.method.localizer, chosen);
+  } catch (const ParameterError& error) {
+    yaml.refuse("name",
+                "'" + entry.name + "': " + error.what() + " (beside the trackers: " + joined(recognisers) + ")");
+  }
+  if (is_recogniser && entry.method.localizer.features == "hybrid") {
+    yaml.refuse("features", "= hybrid needs a tracker's cloud, and '" + entry.method.tracker + "' has none");
+  }
+  for (const MethodNumber& number : kMethodNumbers) {
+    entry.method.*number.value = yaml.real(number.key, entry.method.*number.value, number.min, number.max);
+  }
+  entry.method.kidnapped = yaml.flag("kidnapped", false);
+  entry.method.map_gap = yaml.real("map_gap", 0.0, 0.0, 0.6);
+  entry.method.covered = yaml.real("covered", 0.0, 0.0, 0.5);
+  entry.parameters = yaml.parameters("parameters");
+  std::vector<MethodSpec> methods;
+  for (const auto& swept : combinationsOf(readSweep(yaml, entry.parameters)))
+    methods.push_back(completed(entry, swept, yaml));
+  yaml.requireNoMore();
+  return methods;
+}
+
+/// The methods of an experiment, those that sweeps stand for included. `base`: what they have in common. Throws
+/// ParameterError that names the key.
+std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) {
+  std::vector<MethodSpec> methods;
+  std::set<std::string> names;
+  for (YamlMap& entry : yaml.maps("methods")) {
+    for (MethodSpec& method : readMethod(entry, base)) {
+      if (!names.insert(method.name).second) entry.refuse("name", "= '" + method.name + "' appears twice");
+      methods.push_back(std::move(method));
+    }
+    if (methods.size() > kMostMethods) {
+      yaml.refuse("methods", "and their sweeps are more than " + std::to_string(kMostMethods) + " methods");
+    }
+  }
+  return methods;
+}
 
 constexpr std::size_t kMostStarts = 1000000;
 

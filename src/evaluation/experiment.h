@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluation/place_recogniser.h"
+#include "parameters/yaml_map.h"
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/map/map_builder.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "base/statistics.h"
+#include "base/numbers.h"
 #include "base/text.h"
 #include "visual_localization/parameters/parameters.h"
 

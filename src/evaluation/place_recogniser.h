@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

@@ -5,10 +5,9 @@
 #include <utility>
 
 #include "base/files.h"
-#include "base/statistics.h"
+#include "base/numbers.h"
 #include "base/text.h"
-#include "evaluation/result_folder.h"
-#include "evaluation/track_files.h"
+#include "evaluation/evaluator.h"
 
 namespace visual_localization {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "base/files.h"
 #include "base/time.h"
-#include "ros/camera_info.h"
+#include "ros/message_readers.h"
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/features/front_end.h"
 

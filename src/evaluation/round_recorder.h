@@ -8,7 +8,6 @@
 #include "evaluation/experiment.h"
 #include "evaluation/score_table.h"
 #include "visual_localization/bag/bag_reader.h"
-#include "visual_localization/geo/local_frame.h"
 #include "visual_localization/geo/trajectory.h"
 
 namespace visual_localization {

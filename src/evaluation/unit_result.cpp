@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <locale>
 #include <sstream>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
-#include "base/statistics.h"
+#include "base/numbers.h"
 #include "base/text.h"
 #include "evaluation/metrics.h"
-#include "evaluation/pose_judge.h"
 
 namespace visual_localization {
 namespace {
@@ -122,6 +125,196 @@ UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& c
   unit.p95_relative_err_m = mostOf(std::move(relative_m));
   unit.median_err_m = summarise(std::move(errors_m)).median_m;
   unit.recall_at_p99 = recallAtPrecision(std::move(decisions), kPrecision);
+  return unit;
+}
+
+namespace {
+
+/// Reads lines of a section until an empty one.
+class SectionReader {
+ public:
+  explicit SectionReader(const std::string& text) : in_(text) {}
+
+  void expect(const std::string& title) {
+    std::string line;
+    if (!std::getline(in_, line) || line != title) throw std::runtime_error("section '" + title + "' is missing");
+  }
+  bool next(std::string& line) {
+    if (!std::getline(in_, line)) throw std::runtime_error("is cut off");
+    return !line.empty();
+  }
+  bool atEnd() { return in_.peek() == std::istringstream::traits_type::eof(); }
+
+ private:
+  std::istringstream in_;
+};
+
+/// The numbers of one line, in the order in which they were written.
+class NumberReader {
+ public:
+  explicit NumberReader(const std::string& line) : in_(line) { in_.imbue(std::locale::classic()); }
+
+  template <class Number>
+  NumberReader& operator>>(Number& number) {
+    const bool follows = first_ || in_.get() == ',';
+    first_ = false;
+    if (!follows || !(in_ >> number)) refuse();
+    return *this;
+  }
+  void finish() {
+    if (in_.get() != std::istringstream::traits_type::eof()) refuse();
+  }
+
+ private:
+  [[noreturn]] static void refuse() { throw std::runtime_error("has a line that is no list of numbers"); }
+
+  std::istringstream in_;
+  bool first_ = true;
+};
+
+void read(const std::string& line, RunFigures& run) {
+  NumberReader numbers(line);
+  numbers >> run.start >> run.images >> run.judged >> run.mean_err_m >> run.within_5m >> run.comparisons_per_image >>
+      run.sift_share >> run.steps_to_localise >> run.steps_to_relocalise >> run.extract_ms >> run.match_ms >>
+      run.update_ms;
+  numbers.finish();
+}
+
+void read(const std::string& line, StepSums& step) {
+  NumberReader numbers(line);
+  numbers >> step.runs >> step.judged >> step.err_m >> step.comparisons >> step.sift;
+  numbers.finish();
+}
+
+std::ptrdiff_t fieldsOf(const std::string& row) { return std::count(row.begin(), row.end(), ',') + 1; }
+
+/// Runs and steps count the same images, each in its own way: where a line is lost, they disagree.
+void requireConsistent(const UnitResult& unit) {
+  if (unit.runs.empty()) throw std::runtime_error("has no run");
+  std::size_t images = 0;
+  std::size_t judged = 0;
+  for (const RunFigures& run : unit.runs) {
+    images += run.images;
+    judged += run.judged;
+  }
+  for (const StepSums& step : unit.steps) {
+    images -= step.runs;
+    judged -= step.judged;
+  }
+  if (images != 0 || judged != 0) throw std::runtime_error("has runs and steps that do not fit together");
+  if (unit.trace.size() != unit.trajectory.size()) {
+    throw std::runtime_error("has a trace and a trajectory that do not fit together");
+  }
+}
+
+void write(const PoseErrors& errors, std::ostringstream& out) {
+  out << errors.positions << ',' << errors.position_m << ',' << errors.headings << ',' << errors.heading_deg;
+  for (const std::size_t recalled : errors.recalled) out << ',' << recalled;
+  out << ',' << errors.claims << ',' << errors.inside_95 << ',' << errors.nees << '\n';
+}
+
+void read(const std::string& line, PoseErrors& errors) {
+  NumberReader numbers(line);
+  numbers >> errors.positions >> errors.position_m >> errors.headings >> errors.heading_deg;
+  for (std::size_t& recalled : errors.recalled) numbers >> recalled;
+  numbers >> errors.claims >> errors.inside_95 >> errors.nees;
+  numbers.finish();
+}
+
+void write(const PoseFigures& poses, std::ostringstream& out) {
+  out << "\nposes\n" << poses.images << ',' << poses.metric << ',' << poses.wrong_1m << ',' << poses.wrong_5m << '\n';
+  for (const PoseErrors* errors : {&poses.absolute, &poses.relative, &poses.filtered, &poses.relative_filtered}) {
+    write(*errors, out);
+  }
+}
+
+void readPoses(SectionReader& sections, PoseFigures& poses) {
+  std::string line;
+  sections.next(line);
+  NumberReader counts(line);
+  counts >> poses.images >> poses.metric >> poses.wrong_1m >> poses.wrong_5m;
+  counts.finish();
+  for (PoseErrors* errors : {&poses.absolute, &poses.relative, &poses.filtered, &poses.relative_filtered}) {
+    sections.next(line);
+    read(line, *errors);
+  }
+  if (sections.next(line)) throw std::runtime_error("has more than five lines of poses");
+}
+
+/// One line of the trajectory and, behind it, of the true one.
+TracedPose readTracedPose(const std::string& line) {
+  constexpr std::ptrdiff_t kFields = 8;
+  std::size_t end = 0;
+  for (std::ptrdiff_t i = 0; i < kFields && end != std::string::npos; ++i) end = line.find(' ', end + 1);
+  const auto fields = std::count(line.begin(), line.end(), ' ') + 1;
+  if (fields == kFields) return {line, ""};
+  if (fields != 2 * kFields) throw std::runtime_error("has a line of a trajectory that is not whole");
+  return {line.substr(0, end), line.substr(end + 1)};
+}
+
+}  // namespace
+
+std::string serialise(const UnitResult& unit) {
+  std::ostringstream out = numberStream(std::numeric_limits<double>::digits10);
+  out << "runs\n";
+  for (const RunFigures& run : unit.runs) {
+    out << run.start << ',' << run.images << ',' << run.judged << ',' << run.mean_err_m << ',' << run.within_5m << ','
+        << run.comparisons_per_image << ',' << run.sift_share << ',' << run.steps_to_localise << ','
+        << run.steps_to_relocalise << ',' << run.extract_ms << ',' << run.match_ms << ',' << run.update_ms << '\n';
+  }
+  out << "\nsteps\n";
+  for (const StepSums& step : unit.steps) {
+    out << step.runs << ',' << step.judged << ',' << step.err_m << ',' << step.comparisons << ',' << step.sift << '\n';
+  }
+  out << "\ntrace\n";
+  for (const std::string& row : unit.trace) out << row << '\n';
+  out << "\ntrajectory\n";
+  for (const TracedPose& pose : unit.trajectory) {
+    out << pose.estimate << (pose.truth.empty() ? "" : " ") << pose.truth << '\n';
+  }
+  const Trust& trust = unit.trust;
+  out << "\ntrust\n"
+      << trust.tracking_right << ',' << trust.tracking_wrong << ',' << trust.lost_right << ',' << trust.lost_wrong
+      << ',' << trust.off_map_right << ',' << trust.off_map_wrong << ',' << trust.off_map_missed << '\n';
+  write(unit.poses, out);
+  out << "\nall\n"
+      << unit.median_err_m << ',' << unit.recall_at_p99 << ',' << unit.p95_err_m << ',' << unit.p95_relative_err_m
+      << "\n\n";
+  return out.str();
+}
+
+UnitResult parseUnit(const std::string& text) {
+  UnitResult unit;
+  SectionReader sections(text);
+  std::string line;
+  sections.expect("runs");
+  while (sections.next(line)) read(line, unit.runs.emplace_back());
+  sections.expect("steps");
+  while (sections.next(line)) read(line, unit.steps.emplace_back());
+  sections.expect("trace");
+  while (sections.next(line)) {
+    if (fieldsOf(line) != fieldsOf(kTraceColumns)) throw std::runtime_error("has a line of a trace that is not whole");
+    unit.trace.push_back(line);
+  }
+  sections.expect("trajectory");
+  while (sections.next(line)) unit.trajectory.push_back(readTracedPose(line));
+  sections.expect("trust");
+  sections.next(line);
+  Trust& trust = unit.trust;
+  NumberReader trusted(line);
+  trusted >> trust.tracking_right >> trust.tracking_wrong >> trust.lost_right >> trust.lost_wrong >>
+      trust.off_map_right >> trust.off_map_wrong >> trust.off_map_missed;
+  trusted.finish();
+  if (sections.next(line)) throw std::runtime_error("has more than one line of trust");
+  sections.expect("poses");
+  readPoses(sections, unit.poses);
+  sections.expect("all");
+  sections.next(line);
+  NumberReader all(line);
+  all >> unit.median_err_m >> unit.recall_at_p99 >> unit.p95_err_m >> unit.p95_relative_err_m;
+  all.finish();
+  if (sections.next(line) || !sections.atEnd()) throw std::runtime_error("goes on behind its end");
+  requireConsistent(unit);
   return unit;
 }
 

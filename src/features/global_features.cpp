@@ -9,9 +9,9 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "features/global_histograms.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 
 namespace visual_localization {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <numeric>
 
-#include "base/statistics.h"
+#include "base/numbers.h"
 #include "features/nearest_descriptors.h"
 
 namespace visual_localization {

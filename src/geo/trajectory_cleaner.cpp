@@ -5,10 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "base/angles.h"
-#include "base/statistics.h"
+#include "base/numbers.h"
 #include "base/time.h"
-#include "geo/consistent_path.h"
 #include "geo/path_smoother.h"
 
 namespace visual_localization {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -8,12 +9,26 @@
 #include <ceres/loss_function.h>
 #include <ceres/rotation.h>
 #include <ceres/sized_cost_function.h>
+#include <glog/logging.h>
 
 #include "geometry/bundle_adjustment.h"
-#include "geometry/vectors.h"
+#include "geometry/rays.h"
 
 /// What an adjustment makes small, as Ceres takes it.
 namespace visual_localization {
+
+/// A step that cannot be solved is tried again with more damping. Ceres warns of each on stderr, but not while one of
+/// these lives.
+class QuietCeres {
+ public:
+  QuietCeres() : before_(std::exchange(FLAGS_minloglevel, google::GLOG_ERROR)) {}
+  ~QuietCeres() { FLAGS_minloglevel = before_; }
+  QuietCeres(const QuietCeres&) = delete;
+  QuietCeres& operator=(const QuietCeres&) = delete;
+
+ private:
+  int before_;
+};
 
 /// w, x, y, z as Ceres takes them.
 inline Eigen::Vector4d ceresQuaternion(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }

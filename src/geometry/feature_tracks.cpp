@@ -1,10 +1,150 @@
 #include "geometry/feature_tracks.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+
+#include "base/numbers.h"
+
 namespace visual_localization {
+namespace {
+
+constexpr double kReach_m = 8.0;          ///< cleaned paths may be this far apart where they are one
+constexpr double kBetween_m = 30.0;       ///< the way from a position back to it is at least this long
+constexpr double kLargestTurn_rad = 0.8;  ///< between images that face alike
+constexpr std::size_t kMostVisits = 3;
+
+/// Images by squares of the map as wide as they may be apart.
+class Grid {
+ public:
+  void add(std::uint32_t image, const Eigen::Vector2d& position_m) { cells_[cellOf(position_m)].push_back(image); }
+
+  /// Calls `visit` with those in the square of a position and the eight around it.
+  template <class Visit>
+  void around(const Eigen::Vector2d& position_m, Visit visit) const {
+    const Cell at = cellOf(position_m);
+    for (std::int64_t x = at.first - 1; x <= at.first + 1; ++x) {
+      for (std::int64_t y = at.second - 1; y <= at.second + 1; ++y) {
+        const auto cell = cells_.find({x, y});
+        if (cell == cells_.end()) continue;
+        for (const std::uint32_t image : cell->second) visit(image);
+      }
+    }
+  }
+
+ private:
+  using Cell = std::pair<std::int64_t, std::int64_t>;
+
+  static Cell cellOf(const Eigen::Vector2d& position_m) {
+    const Eigen::Vector2d cell = position_m / kReach_m;
+    return {std::llround(std::floor(cell.x())), std::llround(std::floor(cell.y()))};
+  }
+
+  std::map<Cell, std::vector<std::uint32_t>> cells_;
+};
+
+/// Travelled since the first image of all, sessions one after the other.
+std::vector<double> waysOf_m(const std::vector<PathImage>& images) {
+  std::vector<double> ways_m(images.size(), 0.0);
+  for (std::size_t i = 1; i < images.size(); ++i) {
+    const double step_m = (images[i].at.position_m - images[i - 1].at.position_m).norm();
+    ways_m[i] = ways_m[i - 1] + (images[i].session == images[i - 1].session ? step_m : kBetween_m);
+  }
+  return ways_m;
+}
+
+struct Candidate {
+  double distance_m;
+  std::uint32_t image;
+};
+
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 5)
+constexpr int kRobustMethod = cv::USAC_MAGSAC;
+#else
+constexpr int kRobustMethod = cv::RANSAC;
+#endif
+constexpr double kConfidence = 0.999;
+constexpr std::size_t kMinimalSample = 5;
+
+Eigen::Quaterniond rotationOf(const cv::Mat& matrix) {
+  Eigen::Matrix3d rotation;
+  cv::cv2eigen(matrix, rotation);
+  return Eigen::Quaterniond(rotation).normalized();
+}
+
+double angle_rad(const Eigen::Quaterniond& rotation) {
+  return rotation.angularDistance(Eigen::Quaterniond::Identity());
+}
+
+}  // namespace
+
+std::vector<std::pair<std::uint32_t, std::uint32_t>> revisits(const std::vector<PathImage>& images) {
+  const std::vector<double> ways_m = waysOf_m(images);
+  Grid grid;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  for (std::uint32_t i = 0; i < images.size(); ++i) {
+    const TrajectoryPoint& here = images[i].at;
+    std::vector<Candidate> candidates;
+    grid.around(here.position_m, [&](std::uint32_t earlier) {
+      const TrajectoryPoint& there = images[earlier].at;
+      const double distance_m = (there.position_m - here.position_m).norm();
+      if (distance_m > kReach_m || ways_m[i] - ways_m[earlier] < kBetween_m) return;
+      if (std::abs(angleDifference(here.yaw_rad, there.yaw_rad)) > kLargestTurn_rad) return;
+      candidates.push_back({distance_m, earlier});
+    });
+    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+      return std::pair(a.distance_m, a.image) < std::pair(b.distance_m, b.image);
+    });
+    std::vector<std::uint32_t> visits;
+    for (const Candidate& candidate : candidates) {
+      if (visits.size() == kMostVisits) break;
+      const bool known = std::any_of(visits.begin(), visits.end(), [&](std::uint32_t other) {
+        return std::abs(ways_m[other] - ways_m[candidate.image]) < kBetween_m;
+      });
+      if (known) continue;
+      visits.push_back(candidate.image);
+      pairs.emplace_back(candidate.image, i);
+    }
+    grid.add(i, here.position_m);
+  }
+  return pairs;
+}
+
+std::optional<TwoView> verifyTwoViews(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
+                                      const std::vector<FeatureMatch>& matches, double tolerance,
+                                      std::size_t min_inliers, double max_rotation_rad) {
+  if (matches.size() < std::max(min_inliers, kMinimalSample + 1)) return std::nullopt;
+  std::vector<cv::Point2d> in_a;
+  std::vector<cv::Point2d> in_b;
+  for (const FeatureMatch& match : matches) {
+    in_a.emplace_back(a[match.a].x(), a[match.a].y());
+    in_b.emplace_back(b[match.b].x(), b[match.b].y());
+  }
+  cv::Mat mask;
+  const cv::Mat essential =
+      cv::findEssentialMat(in_a, in_b, cv::Mat::eye(3, 3, CV_64F), kRobustMethod, kConfidence, tolerance, mask);
+  if (essential.rows != 3 || essential.cols != 3 || !cv::checkRange(essential)) return std::nullopt;
+
+  TwoView view;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (mask.at<unsigned char>(static_cast<int>(i)) != 0) view.inliers.push_back(matches[i]);
+  }
+  cv::Mat one;
+  cv::Mat other;
+  cv::Mat direction;
+  cv::decomposeEssentialMat(essential, one, other, direction);
+  const Eigen::Quaterniond first = rotationOf(one);
+  const Eigen::Quaterniond second = rotationOf(other);
+  view.b_from_a = angle_rad(first) <= angle_rad(second) ? first : second;
+  if (view.inliers.size() < min_inliers || !(angle_rad(view.b_from_a) <= max_rotation_rad)) return std::nullopt;
+  return view;
+}
+
 namespace {
 
 /// Disjoint sets of features, numbered over all images.

@@ -10,8 +10,8 @@
 #include <Eigen/Eigenvalues>
 #include <opencv2/calib3d.hpp>
 
-#include "base/statistics.h"
-#include "geometry/vectors.h"
+#include "base/numbers.h"
+#include "geometry/rays.h"
 
 namespace visual_localization {
 namespace {

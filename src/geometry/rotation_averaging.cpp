@@ -6,9 +6,9 @@
 #include <ceres/rotation.h>
 #include <ceres/solver.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "geometry/bundle_residuals.h"
-#include "geometry/vectors.h"
+#include "geometry/rays.h"
 #include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {

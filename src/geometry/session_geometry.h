@@ -9,14 +9,14 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <opencv2/core.hpp>
 
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geo/trajectory.h"
+#include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/geometry/geometry_config.h"
 #include "visual_localization/geometry/image_geometry.h"
-#include "visual_localization/geometry/sensor_mount.h"
-#include "visual_localization/geometry/session_landmarks.h"
 
 namespace visual_localization {
 
@@ -55,5 +55,11 @@ std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>
 /// What the images of a session say the focal length is, as a share of its camera's. Where that is far off, so is this:
 /// ask again with what it says.
 double focalScaleOf(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads);
+
+/// The focal length that the images of a session ask for: a pinhole with square pixels and its principal point in the
+/// middle, for images of `size`. Two searches come from either side; only when they end at the same focal length the
+/// images say what it is, and nothing otherwise. The camera of `session` is not looked at.
+std::optional<CameraModel> calibrateByImages(UnadjustedSession session, const cv::Size& size,
+                                             const GeometryConfig& config, std::size_t threads);
 
 }  // namespace visual_localization

@@ -1,12 +1,71 @@
 #include "visual_localization/localization/estimate.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <optional>
 #include <sstream>
 
-#include "localization/covariance.h"
-
 namespace visual_localization {
+namespace {
+
+/// Of the horizontal position.
+double largerSigma_m(const MetricPose::Covariance& covariance) { return largerSigma(covariance.topLeftCorner<2, 2>()); }
+
+double yawSigma_rad(const MetricPose::Covariance& covariance) { return std::sqrt(std::max(0.0, covariance(5, 5))); }
+
+}  // namespace
+
+std::string toString(PoseSource source) {
+  switch (source) {
+    case PoseSource::kNone:
+      return "NONE";
+    case PoseSource::kPlace:
+      return "PLACE";
+    case PoseSource::kMetric:
+      return "METRIC";
+  }
+  return "NONE";
+}
+
+void MetricConfig::declare(ParameterVisitor& visitor) {
+  visitor.choice({"pose_source", "",
+                  "metric: solve the pose from landmarks where the map has them; place: that of "
+                  "training images, as in the papers"},
+                 pose_source, {"metric", "place"});
+  visitor.integer({"metric/training_images", "1", "landmarks are taken from this number of training images"},
+                  training_images, 1, 50);
+  visitor.real({"metric/match_ratio", "1", "largest ratio of the angles to the nearest and second nearest"},
+               match_ratio, 0.1, 1.0);
+  visitor.real({"metric/tolerance", "px", "farthest of an inlier from the projection of its landmark"}, tolerance_px,
+               0.1, 100.0);
+  visitor.real({"metric/keypoint_sigma", "px", "standard deviation of the position of a small SIFT feature"},
+               keypoint_sigma_px, 0.01, 100.0);
+  visitor.integer({"metric/min_inliers", "1", "a pose on fewer landmarks is not believed"}, min_inliers, 6, 10000);
+  visitor.integer({"metric/min_inliers_predicted", "1", "the same where the motion since the last pose predicts it"},
+                  min_inliers_predicted, 6, 10000);
+  visitor.real({"metric/sigma_factor", "1",
+                "landmarks err alike: this multiple of the standard deviations that they would give a pose one by one"},
+               sigma_factor, 0.1, 100.0);
+  visitor.real({"metric/max_sigma", "m", "a pose with a larger standard deviation is not believed"}, max_sigma_m, 0.01,
+               100.0);
+  visitor.real({"metric/max_gap", "s", "the motion predicts poses at most this long after the last one"}, max_gap_s,
+               0.0, 3600.0);
+  visitor.real(
+      {"metric/max_prediction_error", "m", "farthest of a pose from the predicted one, plus half the way since"},
+      max_prediction_error_m, 0.01, 1000.0);
+  visitor.real({"metric/max_focal_error", "1",
+                "no pose is believed while the last images ask for a focal length farther from the calibration's"},
+               max_focal_error, 0.001, 1.0);
+}
+
+double MetricPose::sigma_m() const { return largerSigma_m(covariance); }
+
+double MetricPose::sigmaYaw_rad() const { return yawSigma_rad(covariance); }
+
+double MetricPose::mapSigma_m() const { return largerSigma_m(map_covariance); }
+
+double MetricPose::mapSigmaYaw_rad() const { return yawSigma_rad(map_covariance); }
 
 double Estimate::sigma_m() const { return metric ? metric->sigma_m() : largerSigma(pose.covariance_m2); }
 
@@ -18,6 +77,48 @@ std::string Estimate::cameraTrouble() const {
   text << "the images ask for " << std::fixed << std::setprecision(1) << 100.0 * focal_scale
        << " % of the calibration's focal length: no metric poses";
   return text.str();
+}
+
+namespace {
+
+constexpr std::size_t kMostSteps = 10;
+constexpr double kFarthest_m = 10.0;      ///< between neighbours on a path; beyond a gap another one begins
+constexpr std::size_t kLeastMatches = 8;  ///< for a median of their ratios
+
+/// The next image of the session, ahead or behind.
+std::optional<std::size_t> neighbourOf(const TrainingMap& map, std::size_t image, bool ahead) {
+  if (ahead ? image + 1 >= map.size() : image == 0) return std::nullopt;
+  const std::size_t next = ahead ? image + 1 : image - 1;
+  if (map.pose(next).session != map.pose(image).session) return std::nullopt;
+  if ((map.position_m(next) - map.position_m(image)).norm() > kFarthest_m) return std::nullopt;
+  return next;
+}
+
+/// Positive when the image was taken ahead of the training image.
+std::optional<double> leadOf(const Score& score) {
+  if (!score.recognised || score.matches < kLeastMatches || !(score.scale > 0.0)) return std::nullopt;
+  return std::log(score.scale);
+}
+
+}  // namespace
+
+Eigen::Vector2d interpolateOnPath(const TrainingMap& map, Scores& scores, std::size_t image) {
+  std::optional<double> lead = leadOf(scores[image]);
+  const bool ahead = lead.value_or(0.0) > 0.0;
+  std::size_t nearest = image;
+  for (std::size_t step = 0; lead && *lead != 0.0 && step < kMostSteps; ++step) {
+    const auto next = neighbourOf(map, nearest, ahead);
+    const auto next_lead = next ? leadOf(scores[*next]) : std::nullopt;
+    if (!next_lead) break;
+    if ((*next_lead > 0.0) != ahead) {
+      const double share = *lead / (*lead - *next_lead);
+      return map.position_m(nearest) + share * (map.position_m(*next) - map.position_m(nearest));
+    }
+    if (std::abs(*next_lead) >= std::abs(*lead)) break;
+    nearest = *next;
+    lead = next_lead;
+  }
+  return map.position_m(nearest);
 }
 
 }  // namespace visual_localization

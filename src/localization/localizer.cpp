@@ -5,13 +5,12 @@
 #include <utility>
 
 #include "base/time.h"
-#include "localization/path_interpolation.h"
 #include "localization/pose_verifier.h"
 #include "localization/session_choice.h"
+#include "visual_localization/localization/estimate.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
-
 namespace {
 
 constexpr std::size_t kSweptImages = 20;  ///< those of the whole map that look most alike: a few positions
@@ -281,6 +280,72 @@ LocalizationState Localizer::doubt() {
     if (!last_->metric) last_->pose = poseOf(last_->tracked, state);
   }
   return state;
+}
+
+void Localizer::configure(const LocalizerConfig& config) {
+  const LocalizerConfig before = std::exchange(config_, LocalizerConfig(requireValid(config)));
+  image_->configure(frontEndConfig(), config_.similarity);
+  if (config_.sweep_images != before.sweep_images) sweep_.configure(static_cast<std::size_t>(config_.sweep_images));
+  choice_.configure(config_.features, config_.hybrid);
+  sessions_->configure(config_.choose_session);
+  assessor_.configure(config_.state);
+  verifier_->configure(config_.metric);
+  odometry_.configure(config_.odometry);
+  verifier_->useOdometry(odometry_, config_.odometry);
+  configureTracker(before.tracker);
+  last_.reset();
+}
+
+void Localizer::setCamera(const CameraModel& camera) {
+  camera_ = camera.scaledTo(map_->header().image_size);
+  verifier_->resetCamera();
+  last_.reset();
+}
+
+void Localizer::setMount(const SensorMount& mount) {
+  requireMount(mount);
+  mount_ = mount;
+  verifier_->reset();
+  last_.reset();
+}
+
+void Localizer::setMask(const Mask& mask) {
+  mask_ = mask.scaledTo(map_->header().image_size);
+  image_->configure(frontEndConfig(), config_.similarity);
+  last_.reset();
+}
+
+FrontEndConfig Localizer::frontEndConfig() const {
+  FrontEndConfig config = frontEndConfigOf(config_, map_->header());
+  config.mask = mask_;
+  return config;
+}
+
+void Localizer::configureTracker(const std::string& tracker_before) {
+  if (config_.tracker == tracker_before && config_.particles() == tracker_->particles().size()) {
+    tracker_->configure(config_);
+    return;
+  }
+  auto successor = makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed));
+  successor->reset(drawnFrom(tracker_->particles()));
+  tracker_ = std::move(successor);
+}
+
+void Localizer::relocalize() {
+  tracker_->reset();
+  forgetEvidence();
+}
+
+void Localizer::relocalize(const Prior& prior) {
+  tracker_->reset(prior);
+  forgetEvidence();
+}
+
+void Localizer::forgetEvidence() {
+  choice_.reset();
+  assessor_.reset();
+  verifier_->reset();
+  last_.reset();
 }
 
 }  // namespace visual_localization

@@ -2,6 +2,10 @@
 
 #include <limits>
 
+#include "base/text.h"
+#include "localization/paper_yaml.h"
+#include "parameters/yaml_map.h"
+
 namespace visual_localization {
 namespace {
 
@@ -55,6 +59,18 @@ FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& 
                            config.max_image_gap_s, config.sift_backend};
   if (!map.sessions.empty()) front_end.mask = map.sessions.front().mask;  // until somebody gives another camera's
   return front_end;
+}
+
+const std::vector<std::string>& presetNames() {
+  static const std::vector<std::string> names{"paper"};
+  return names;
+}
+
+ParameterValues presetValues(const std::string& name) {
+  if (name != presetNames().front()) {
+    throw ParameterError("preset '" + oneLine(name, 60) + "' is not allowed: must be one of " + joined(presetNames()));
+  }
+  return parameters::YamlMap::parse(kPaperYaml, "config/paper.yaml").parameters();
 }
 
 }  // namespace visual_localization

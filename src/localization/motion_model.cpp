@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 
 namespace visual_localization {
 

@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "base/time.h"
 
 namespace visual_localization {

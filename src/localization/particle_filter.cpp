@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "visual_localization/localization/particles.h"
 
 namespace visual_localization {

@@ -8,7 +8,7 @@
 #include "localization/motion_model.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/tracker.h"
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

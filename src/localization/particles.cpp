@@ -7,8 +7,8 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "base/angles.h"
-#include "visual_localization/geo/local_frame.h"
+#include "base/numbers.h"
+#include "visual_localization/geo/trajectory.h"
 
 namespace visual_localization {
 namespace {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <memory>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "base/time.h"
-#include "geometry/vectors.h"
-#include "localization/covariance.h"
+#include "geometry/rays.h"
+#include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
 namespace {
@@ -253,6 +253,109 @@ MetricPose PoseVerifier::accepted(MetricPose pose) {
   last_ = known;
   images_since_ = 0;
   return pose;
+}
+
+namespace {
+
+constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way
+constexpr double kTurn_rad_per_m = 0.1;  ///< standard deviation of how much it turns on the way
+constexpr double kSlipped_m = 0.3;       ///< odometry that is off by more, beside its own uncertainty, is wrong
+constexpr double kSlipped_rad = 0.3;
+constexpr std::size_t kImagesOfDistrust = 10;
+
+/// Where odometry leads from `last`. A wrong heading moves it aside, the more the farther it goes.
+PoseVerifier::Prediction predictedBy(const MetricPose& last, const OdometryIncrement& way,
+                                     const OdometryConfig& config) {
+  const MetricPose::Covariance covariance = last.covariance + last.map_covariance;
+  const double turn_rad = config.turn_sigma_rad_m * way.distance_m;
+  const Eigen::Vector2d way_m = Eigen::Rotation2Dd(yawOf(last.base)) * way.translation_m;
+  const Eigen::Vector2d aside_m(-way_m.y(), way_m.x());
+  const double yaw_variance = covariance(5, 5) + 0.25 * turn_rad * turn_rad;
+  PoseVerifier::Prediction prediction;
+  prediction.position_m = last.base.translation().head<2>() + way_m;
+  prediction.yaw_rad = std::remainder(yawOf(last.base) + way.rotation_rad, 2.0 * kPi);
+  prediction.sigma_m = config.distance_sigma * way.distance_m;
+  prediction.covariance_m2 = covariance.topLeftCorner<2, 2>() +
+                             prediction.sigma_m * prediction.sigma_m * Eigen::Matrix2d::Identity() +
+                             yaw_variance * aside_m * aside_m.transpose();
+  prediction.yaw_variance_rad2 = covariance(5, 5) + turn_rad * turn_rad;
+  prediction.by_odometry = true;
+  return prediction;
+}
+
+}  // namespace
+
+std::optional<PoseVerifier::Prediction> PoseVerifier::predicted() const {
+  const std::optional<Prediction> prediction = byOdometry();
+  return prediction ? prediction : byVelocity();
+}
+
+std::optional<PoseVerifier::Prediction> PoseVerifier::byOdometry() const {
+  if (!last_ || odometry_ == nullptr || distrust_ > 0) return std::nullopt;
+  const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
+  if (!way || way->distance_m > odometry_config_.max_distance_m) return std::nullopt;
+  return predictedBy(last_->pose, *way, odometry_config_);
+}
+
+std::optional<PoseVerifier::Prediction> PoseVerifier::byVelocity() const {
+  if (!last_ || !last_->velocity_holds) return std::nullopt;
+  const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
+  if (!(elapsed_s >= 0.0 && elapsed_s <= config_.max_gap_s)) return std::nullopt;
+  const MetricPose& last = last_->pose;
+  const Eigen::Vector2d way_m = last_->velocity_mps.value_or(Eigen::Vector2d::Zero()) * elapsed_s;
+  const MetricPose::Covariance covariance = last.covariance + last.map_covariance;
+  Prediction prediction;
+  prediction.position_m = last.base.translation().head<2>() + way_m;
+  prediction.yaw_rad = yawOf(last.base);
+  prediction.sigma_m = kTurn * way_m.norm();
+  prediction.covariance_m2 =
+      covariance.topLeftCorner<2, 2>() + prediction.sigma_m * prediction.sigma_m * Eigen::Matrix2d::Identity();
+  const double turn_rad = kTurn_rad_per_m * way_m.norm();
+  prediction.yaw_variance_rad2 = covariance(5, 5) + turn_rad * turn_rad;
+  return prediction;
+}
+
+/// By odometry or by the velocity before.
+bool PoseVerifier::isPredicted(const MetricPose& pose) const {
+  const auto agrees = [&](const std::optional<Prediction>& expected) {
+    return expected && (pose.base.translation().head<2>() - expected->position_m).norm() <=
+                           config_.max_prediction_error_m + expected->sigma_m;
+  };
+  return agrees(byOdometry()) || agrees(byVelocity());
+}
+
+/// Whether odometry since the last verified pose leads to this one; nothing when it does not know.
+std::optional<bool> PoseVerifier::odometryAgrees(const MetricPose& pose) const {
+  if (!last_ || odometry_ == nullptr) return std::nullopt;
+  const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
+  if (!way) return std::nullopt;
+  const Prediction expected = predictedBy(last_->pose, *way, odometry_config_);
+  const double off_m = (pose.base.translation().head<2>() - expected.position_m).norm();
+  const double turned_rad = std::abs(angleDifference(expected.yaw_rad, yawOf(pose.base)));
+  return off_m <= kSlipped_m + 3.0 * largerSigma(expected.covariance_m2) && turned_rad <= kSlipped_rad;
+}
+
+/// Wheels that slip or a robot that was carried: what odometry says is worth nothing until it agrees again for a while.
+void PoseVerifier::judgeOdometry(bool agrees) {
+  if (!agrees) {
+    distrust_ = kImagesOfDistrust;
+  } else if (distrust_ > 0) {
+    --distrust_;
+  }
+}
+
+/// Odometry that is believed leads elsewhere: the robot was carried, the wheels have slipped while nothing was seen, or
+/// this is the twin of the place. The first two stay, and a few more poses along the motion tell.
+bool PoseVerifier::isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees) {
+  const bool predicted = isPredicted(pose);
+  if (byOdometry() && !odometry_agrees.value_or(true) && !predicted) {
+    elsewhere_ = kImagesOfDistrust;
+  } else if (!odometry_agrees && !byVelocity()) {
+    elsewhere_ = 0;  // nobody knows any more how it came here
+  } else if (elsewhere_ > 0 && (predicted || odometry_agrees.value_or(false))) {
+    --elsewhere_;
+  }
+  return elsewhere_ > 0;
 }
 
 }  // namespace visual_localization

@@ -10,9 +10,8 @@
 #include "geometry/rays.h"
 #include "localization/session_choice.h"
 #include "visual_localization/camera/camera_model.h"
-#include "visual_localization/geometry/sensor_mount.h"
-#include "visual_localization/localization/matched_landmarks.h"
-#include "visual_localization/localization/metric_pose.h"
+#include "visual_localization/geometry/camera_pose.h"
+#include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/odometry.h"
 #include "visual_localization/map/training_map.h"
 

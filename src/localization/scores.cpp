@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "base/statistics.h"
+#include "base/numbers.h"
 #include "base/time.h"
 
 namespace visual_localization {

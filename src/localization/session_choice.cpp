@@ -5,9 +5,9 @@
 #include <limits>
 #include <utility>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "base/time.h"
-#include "map/sessions.h"
+#include "map/map_geometry.h"
 
 namespace visual_localization {
 namespace {

@@ -7,7 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "base/parallel.h"
 #include "visual_localization/features/front_end.h"
 

@@ -9,10 +9,10 @@
 #include <opencv2/core.hpp>
 
 #include "base/files.h"
+#include "map/map_geometry.h"
 #include "map/map_writer.h"
-#include "map/sessions.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 

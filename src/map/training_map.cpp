@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "map/feature_store.h"
 #include "map/map_geometry.h"
 #include "map/position_index.h"

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "ros/camera_info.h"
+#include "ros/message_readers.h"
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/parameters/parameters.h"
 

@@ -14,7 +14,7 @@
 #include "node/shared_localizer.h"
 #include "ros/message_readers.h"
 #include "visual_localization/camera/camera_model.h"
-#include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {

@@ -28,7 +28,6 @@
 #include "node/session_recorder.h"
 #include "node/shared_localizer.h"
 #include "node/throttled_log.h"
-#include "node/usage_recorder.h"
 
 namespace visual_localization {
 

@@ -1,9 +1,13 @@
 #include "node/map_recorder.h"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
+#include <geometry_msgs/Point.h>
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
@@ -14,8 +18,8 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "base/time.h"
 #include "node/node_config.h"
-#include "ros/camera_info.h"
 #include "ros/message_readers.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
@@ -23,6 +27,127 @@
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
+namespace {
+
+constexpr std::size_t kImagesOfSpacing = 10;  ///< noise of fixes, or their low rate, must not look like speed
+constexpr double kSameLine_m = 2.0;
+constexpr std::size_t kNeighbours = 32;  ///< one of each session should be among them
+
+}  // namespace
+
+void WatchConfig::declare(ParameterVisitor& visitor) {
+  visitor.real({"max_spacing", "m", "images farther apart than this are called weak"}, max_spacing_m, 0.1, 100.0);
+  visitor.real({"max_fix_sigma", "m", "a fix whose receiver claims a larger standard deviation is called poor"},
+               max_fix_sigma_m, 0.01, 1000.0);
+  visitor.real({"max_fix_age", "s", "without a usable fix for longer than this an image has no position"},
+               max_fix_age_s, 0.1, 60.0);
+  visitor.integer({"few_features", "1", "an image with fewer SIFT features is called weak"}, few_features, 0, 100000);
+}
+
+void RecorderConfig::declare(ParameterVisitor& visitor) {
+  visitor.text({"folder", "", "where the recording and its map go, an absolute path"}, folder);
+  visitor.text({"map", "", "a map that this session will be added to; empty: it makes a map of its own"}, map);
+  visitor.choice({"image_transport", "", "raw: the topic image; compressed: image/compressed"}, image_transport,
+                 {"raw", "compressed"});
+  visitor.text({"builder_config", "", "YAML file of the map builder's parameters; empty: its defaults"},
+               builder_config);
+  visitor.real({"sync_period", "s",
+                "how often the recording is put on the disk; less often where its index is larger than what waits"},
+               sync_period_s, 0.5, 60.0);
+  visitor.text({"global_frame_id", "", "frame of the way in rviz"}, global_frame_id);
+  watch.declare(visitor);
+  visitor.require(!folder.empty() && folder.front() == '/', "folder", "'" + folder + "'", "an absolute path");
+}
+
+const char* describe(Weakness weakness) {
+  switch (weakness) {
+    case Weakness::kNone:
+      return "good";
+    case Weakness::kNoFix:
+      return "no usable fix";
+    case Weakness::kPoorFix:
+      return "poor fixes";
+    case Weakness::kFewFeatures:
+      return "few features";
+    case Weakness::kFarApart:
+      return "images too far apart";
+  }
+  return "";
+}
+
+RecordingWatch::RecordingWatch(const WatchConfig& config, std::shared_ptr<const TrainingMap> map)
+    : config_(config), map_(std::move(map)) {
+  if (map_) frame_.emplace(map_->frame());
+}
+
+void RecordingWatch::addFix(const Fix& fix) {
+  ++summary_.fixes;
+  if (!hasPosition(fix)) return;
+  if (!frame_) frame_.emplace(GeodeticPoint{fix.position.latitude_deg, fix.position.longitude_deg, 0.0});
+  ++summary_.usable_fixes;
+  summary_.fix_sigma_m = fix.sigma_m;
+  last_fix_ = fix;
+  position_m_ = frame_->toEastNorth(fix.position);
+}
+
+bool RecordingWatch::hasPositionAt(std::int64_t stamp_ns) const {
+  return last_fix_ && std::abs(secondsBetween(last_fix_->stamp_ns, stamp_ns)) <= config_.max_fix_age_s;
+}
+
+void RecordingWatch::addImage(std::int64_t stamp_ns) {
+  if (!hasPositionAt(stamp_ns)) {
+    last_images_.clear();
+    return;
+  }
+  last_images_.push_back(position_m_);
+  if (last_images_.size() > kImagesOfSpacing) last_images_.pop_front();
+  const auto steps = static_cast<double>(last_images_.size() - 1);
+  summary_.spacing_m = steps > 0.0 ? (last_images_.back() - last_images_.front()).norm() / steps : 0.0;
+  addWay();
+}
+
+void RecordingWatch::addLook(std::int64_t stamp_ns, std::size_t features) {
+  const Weakness weakness = weaknessOf(stamp_ns, features);
+  if (last_fix_) spots_.push_back({position_m_, weakness});
+  if (hasPositionAt(stamp_ns)) {
+    ++placed_;
+    known_ += isKnown(stamp_ns) ? 1 : 0;
+    summary_.known_way_share = static_cast<double>(known_) / static_cast<double>(placed_);
+  }
+  ++summary_.images;
+  ++summary_.weak[static_cast<std::size_t>(weakness)];
+  summary_.now = weakness;
+  summary_.features = features;
+}
+
+/// In steps that the noise of fixes does not lengthen much.
+void RecordingWatch::addWay() {
+  constexpr double kStep_m = 3.0;
+  if (!way_from_m_) way_from_m_ = position_m_;
+  const double step_m = (position_m_ - *way_from_m_).norm();
+  if (step_m < kStep_m) return;
+  summary_.way_m += step_m;
+  way_from_m_ = position_m_;
+}
+
+Weakness RecordingWatch::weaknessOf(std::int64_t stamp_ns, std::size_t features) const {
+  if (!hasPositionAt(stamp_ns)) return Weakness::kNoFix;
+  if (last_fix_->sigma_m > config_.max_fix_sigma_m) return Weakness::kPoorFix;
+  if (features < static_cast<std::size_t>(config_.few_features)) return Weakness::kFewFeatures;
+  return summary_.spacing_m > config_.max_spacing_m ? Weakness::kFarApart : Weakness::kNone;
+}
+
+/// The same line in the same light shows what the map has already.
+bool RecordingWatch::isKnown(std::int64_t stamp_ns) const {
+  if (!map_) return false;
+  const std::vector<Neighbour> neighbours = map_->nearest(position_m_, kNeighbours);
+  return std::any_of(neighbours.begin(), neighbours.end(), [&](const Neighbour& neighbour) {
+    constexpr std::int64_t kSameLight_ns = 2 * 3'600'000'000'000;
+    return neighbour.distance_m <= kSameLine_m &&
+           apartInDay_ns(map_->pose(neighbour.image).stamp_ns, stamp_ns) <= kSameLight_ns;
+  });
+}
+
 namespace {
 
 const char* const kStaticTransforms = "/tf_static";
@@ -220,6 +345,99 @@ bool MapRecorder::onWriteMap(WriteMap::Request& request, WriteMap::Response& res
 void MapRecorder::onTimer(const ros::WallTimerEvent&) {
   publishWay();
   updater_.force_update();
+}
+
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+constexpr std::size_t kMostSpots = 20000;  ///< of a longer way every k-th is shown
+
+std_msgs::ColorRGBA colourOf(Weakness weakness) {
+  std_msgs::ColorRGBA colour;
+  colour.a = 1.0F;
+  colour.r = weakness == Weakness::kNone ? 0.0F : weakness == Weakness::kNoFix ? 0.84F : 0.90F;
+  colour.g = weakness == Weakness::kNone ? 0.62F : weakness == Weakness::kNoFix ? 0.10F : 0.62F;
+  colour.b = weakness == Weakness::kNone ? 0.45F : 0.0F;
+  return colour;
+}
+
+}  // namespace
+
+/// A line along the images, coloured by what is weak there.
+void MapRecorder::publishWay() {
+  visualization_msgs::Marker line;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::vector<RecordingWatch::Spot>& spots = watch_->spots();
+    if (spots.size() == published_ || spots.size() < 2) return;
+    published_ = spots.size();
+    const std::size_t step = 1 + spots.size() / kMostSpots;
+    for (std::size_t i = 0; i < spots.size(); i += step) {
+      geometry_msgs::Point point;
+      point.x = spots[i].position_m.x();
+      point.y = spots[i].position_m.y();
+      line.points.push_back(point);
+      line.colors.push_back(colourOf(spots[i].weakness));
+    }
+  }
+  line.header.frame_id = config_.global_frame_id;
+  line.header.stamp = ros::Time::now();
+  line.ns = "way";
+  line.type = visualization_msgs::Marker::LINE_STRIP;
+  line.action = visualization_msgs::Marker::ADD;
+  line.pose.orientation.w = 1.0;
+  line.scale.x = 0.4;
+  way_.publish(line);
+}
+
+void MapRecorder::reportRecording(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!disk_trouble_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, "Nothing is recorded: " + disk_trouble_);
+  } else if (images_.rate_hz() == 0.0) {
+    status.summary(DiagnosticStatus::ERROR, "No images on " + image_topic_);
+  } else if (!image_trouble_.empty()) {
+    status.summary(DiagnosticStatus::WARN, "Unusable image: " + image_trouble_);
+  } else if (lost_ > 0) {
+    status.summary(DiagnosticStatus::WARN,
+                   std::to_string(lost_) + " messages lost so far: more came than could be kept");
+  } else {
+    status.summary(DiagnosticStatus::OK, "Recording");
+  }
+  status.add("Bag", bag_->path());
+  status.addf("Size (MB)", "%.1f", static_cast<double>(bag_->size()) * 1e-6);
+  std::error_code none;
+  const auto space = std::filesystem::space(config_.folder, none);
+  if (!none) status.addf("Free (MB)", "%.0f", static_cast<double>(space.available) * 1e-6);
+  status.add("Messages", recorded_);
+  status.add("Messages lost", lost_);
+  status.addf("Images (Hz)", "%.2f", images_.rate_hz());
+}
+
+void MapRecorder::reportSession(Wrapper& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const RecordingWatch::Summary seen = watch_->summary();
+  constexpr double kMostlyKnown = 0.5;
+  if (seen.images == 0) {
+    status.summary(DiagnosticStatus::WARN, "No image yet");
+  } else if (seen.now != Weakness::kNone) {
+    status.summary(DiagnosticStatus::WARN, std::string("Weak here: ") + describe(seen.now));
+  } else if (seen.known_way_share > kMostlyKnown) {
+    status.summary(DiagnosticStatus::OK, "The map has this way at this time of day: another hour would add more");
+  } else {
+    status.summary(DiagnosticStatus::OK, "Good");
+  }
+  status.add("Images looked at", seen.images);
+  for (std::size_t i = 1; i < kWeaknesses; ++i) {
+    status.add(std::string("Weak: ") + describe(static_cast<Weakness>(i)), seen.weak[i]);
+  }
+  status.addf("Fixes, usable", "%zu, %zu", seen.fixes, seen.usable_fixes);
+  status.addf("Sigma of the fix (m)", "%.2f", seen.fix_sigma_m);
+  status.addf("Way (m)", "%.0f", seen.way_m);
+  status.addf("Spacing (m)", "%.2f", seen.spacing_m);
+  status.add("Features", seen.features);
+  if (!config_.map.empty()) status.addf("Way that the map has (%)", "%.0f", 100.0 * seen.known_way_share);
 }
 
 }  // namespace visual_localization

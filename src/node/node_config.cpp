@@ -9,8 +9,8 @@
 #include <ros/master.h>
 
 #include "base/text.h"
-#include "node/recording_watch.h"
-#include "visual_localization/geometry/sensor_mount.h"
+#include "node/map_recorder.h"
+#include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"

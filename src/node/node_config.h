@@ -9,7 +9,6 @@
 
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/map/map_file.h"
-#include "visual_localization/parameters/parameter_visitor.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {

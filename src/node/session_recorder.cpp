@@ -1,6 +1,7 @@
 #include "node/session_recorder.h"
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
@@ -13,16 +14,66 @@
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include "base/angles.h"
 #include "base/files.h"
+#include "base/numbers.h"
 #include "base/text.h"
 #include "node/message_conversions.h"
 #include "node/node_config.h"
-#include "node/usage_recorder.h"
-#include "ros/camera_info.h"
+#include "ros/message_readers.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
+namespace {
+
+constexpr std::chrono::seconds kSavePeriod{60};
+constexpr std::size_t kLargestUsage_bytes = std::size_t{256} << 20U;
+
+MapUsage readUsage(const std::string& path) {
+  const PartialFile attempt(path);  // what cannot be written is said now
+  if (!std::filesystem::exists(path)) return {};
+  try {
+    return MapUsage::fromCsv(readFile(path, kLargestUsage_bytes));
+  } catch (const UsageFileError& error) {
+    throw UsageFileError(oneLine(path) + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+void writeUsage(const std::string& path, const MapUsage& usage) {
+  PartialFile file(path);
+  file.write(usage.toCsv());
+  file.commit();
+}
+
+UsageRecorder::UsageRecorder(std::string path, ThrottledLog& log)
+    : path_(std::move(path)), log_(log), lock_(path_), usage_(readUsage(path_)) {}
+
+UsageRecorder::~UsageRecorder() {
+  if (saving_.valid()) saving_.wait();
+  if (changed_) save();
+}
+
+void UsageRecorder::publish(const LocalizedImage& image, const ImageCounts&) {
+  const SharedLocalizer::Result& result = image.result;
+  if (result.estimate.source != PoseSource::kMetric || result.estimate.repeats > 0) return;
+  usage_.add(*result.map, result.landmarks);
+  changed_ = true;
+  if (std::chrono::steady_clock::now() - saved_ >= kSavePeriod) save();
+}
+
+void UsageRecorder::save() {
+  saved_ = std::chrono::steady_clock::now();
+  changed_ = false;
+  saving_ = std::async(std::launch::async, [this, usage = usage_] {
+    try {
+      writeUsage(path_, usage);
+    } catch (const FileError& error) {
+      log_.error("usage", std::string("Usage of the map is not saved: ") + error.what());
+    }
+  });
+}
+
 namespace {
 
 constexpr std::chrono::seconds kSyncPeriod{5};
@@ -39,7 +90,7 @@ const char* const kPoses = "/session/verified_pose";
 const char* const kCameraFrame = "session_camera";
 const char* const kRobotFrame = "base_link";
 
-std::string besideBag(const std::string& bag, const char* ending) {
+std::string withEnding(const std::string& bag, const char* ending) {
   return std::filesystem::path(bag).replace_extension(ending).string();
 }
 
@@ -190,9 +241,9 @@ std::unique_ptr<SessionRecorder::Session> SessionRecorder::take() {
 
 SessionExtension SessionRecorder::saved(const Session& session, const std::string& output) const {
   const std::string& bag = session.bag->path();
-  SessionExtension extension{session.map_path, bag, kImages, kPoses, "", besideBag(bag, ".usage.csv"), output};
-  if (session.has_mask) extension.mask = besideBag(bag, ".mask.png");
-  if (extension.output.empty()) extension.output = besideBag(bag, ".map");
+  SessionExtension extension{session.map_path, bag, kImages, kPoses, "", withEnding(bag, ".usage.csv"), output};
+  if (session.has_mask) extension.mask = withEnding(bag, ".mask.png");
+  if (extension.output.empty()) extension.output = withEnding(bag, ".map");
   writeUsage(extension.usage, session.usage);
   return extension;
 }
@@ -271,7 +322,7 @@ void SessionRecorder::record(Session& session, const LocalizedImage& image) cons
     constexpr bool kLatched = true;
     if (!bag.write("/tf_static", stamp, mountMessage(image.result.mount, stamp), kLatched)) return;
     session.has_mask = !image.result.mask.empty();
-    if (session.has_mask) writeMask(besideBag(bag.path(), ".mask.png"), image.result.mask);
+    if (session.has_mask) writeMask(withEnding(bag.path(), ".mask.png"), image.result.mask);
   }
   const bool kept = bag.write(cameraInfoTopic(kImages), stamp, camera) &&
                     bag.write(std::string(kImages) + "/compressed", stamp, compressed) &&

@@ -1,15 +1,223 @@
 #include "ros/message_readers.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <exception>
+#include <sstream>
 #include <stdexcept>
 
 #include <Eigen/Geometry>
+#include <camera_calibration_parsers/parse_ini.h>
+#include <camera_calibration_parsers/parse_yml.h>
+#include <image_transport/camera_common.h>
 #include <tf2/exceptions.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include "base/files.h"
 #include "base/text.h"
+#include "parameters/yaml_map.h"
 
 namespace visual_localization {
+namespace {
+
+constexpr std::size_t kLargestFile_bytes = 65536;  ///< a calibration has one or two thousand
+constexpr std::size_t kMostCoefficients = 14;      ///< of any of OpenCV's models
+constexpr std::uint32_t kMostBinned = 64;
+constexpr std::uint32_t kLargestSide_px = 32768;
+
+template <class Matrix>
+bool isZero(const Matrix& matrix) {
+  return std::all_of(matrix.begin(), matrix.end(), [](double value) { return value == 0.0; });
+}
+
+void requireValue(bool condition, const std::string& what) {
+  if (!condition) throw CameraError(what);
+}
+
+std::string text(double value) {
+  std::ostringstream out = numberStream(6);
+  out << value;
+  return out.str();
+}
+
+/// Element (row, column) of a matrix with `columns` must be `value`; its name is for the message.
+template <class Matrix>
+void requireElement(const Matrix& matrix, const char* name, std::size_t columns, std::size_t row, std::size_t column,
+                    double value) {
+  const double found = matrix[row * columns + column];
+  requireValue(found == value, std::string(name) + "[" + std::to_string(row * columns + column) + "] = " + text(found) +
+                                   ", must be " + text(value) + ": no camera matrix");
+}
+
+/// Reads focal lengths and principal point from K (3 columns) or P (4), whose other elements must be a camera's.
+template <class Matrix>
+void readMatrix(const Matrix& matrix, const char* name, std::size_t columns, Intrinsics& camera) {
+  requireElement(matrix, name, columns, 0, 1, 0.0);
+  requireElement(matrix, name, columns, 1, 0, 0.0);
+  requireElement(matrix, name, columns, 2, 0, 0.0);
+  requireElement(matrix, name, columns, 2, 1, 0.0);
+  requireElement(matrix, name, columns, 2, 2, 1.0);
+  camera.fx = matrix[0];
+  camera.cx = matrix[2];
+  camera.fy = matrix[columns + 1];
+  camera.cy = matrix[columns + 2];
+}
+
+/// A camera without a lens model has no distortion; its name may be left empty then.
+void readDistortion(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
+  if (info.distortion_model.empty() && isZero(info.D)) return;
+  camera.distortion = distortionOf(info.distortion_model);
+  camera.coefficients = info.D;
+}
+
+void requireFull(const sensor_msgs::CameraInfo& info) {
+  requireValue(info.width >= 1 && info.width <= kLargestSide_px && info.height >= 1 && info.height <= kLargestSide_px,
+               "the image size " + std::to_string(info.width) + " x " + std::to_string(info.height) +
+                   " is not in [1, " + std::to_string(kLargestSide_px) + "]");
+}
+
+/// Cuts the region of interest out of the camera's images. One of no size is the whole image.
+void cutOut(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
+  const auto& roi = info.roi;
+  if (roi.width == 0 && roi.height == 0) return;
+  const bool inside = roi.width >= 1 && roi.height >= 1 && roi.x_offset <= info.width && roi.y_offset <= info.height &&
+                      roi.width <= info.width - roi.x_offset && roi.height <= info.height - roi.y_offset;
+  requireValue(inside, "the region of interest " + std::to_string(roi.width) + " x " + std::to_string(roi.height) +
+                           " at (" + std::to_string(roi.x_offset) + ", " + std::to_string(roi.y_offset) +
+                           ") is not in the image of " + std::to_string(info.width) + " x " +
+                           std::to_string(info.height));
+  camera.size = {static_cast<int>(roi.width), static_cast<int>(roi.height)};
+  camera.cx -= roi.x_offset;
+  camera.cy -= roi.y_offset;
+}
+
+/// Pixels that are read together along one axis; 0 means the same as 1.
+void bin(std::uint32_t binning, int& side_px, double& focal_length, double& centre) {
+  if (binning <= 1) return;
+  requireValue(binning <= kMostBinned, "binning " + std::to_string(binning) + " is not in [0, 64]");
+  side_px /= static_cast<int>(binning);
+  focal_length /= binning;
+  centre = (centre + 0.5) / binning - 0.5;
+}
+
+using parameters::YamlMap;
+
+/// What camera_calibration_parsers takes for granted and does not check.
+void requireMatrix(YamlMap& file, const std::string& key, std::size_t rows, std::size_t columns) {
+  YamlMap matrix = file.map(key);
+  const auto side = [&matrix](const char* name, std::size_t most) {
+    if (!matrix.has(name)) matrix.refuse(name, "is missing");
+    return matrix.count(name, 0, 0, most);
+  };
+  const bool any_size = rows == 0;
+  const std::size_t found_rows = side("rows", kMostCoefficients);
+  const std::size_t found_columns = side("cols", kMostCoefficients);
+  if (!any_size && (found_rows != rows || found_columns != columns)) {
+    file.refuse(key, "must have " + std::to_string(rows) + " rows and " + std::to_string(columns) + " columns");
+  }
+  if (matrix.numbers("data", found_rows * found_columns) != found_rows * found_columns) {
+    file.refuse(key, "must have as many values in 'data' as 'rows' times 'cols'");
+  }
+}
+
+void requireCalibrationYaml(const std::string& text, const std::string& path) {
+  YamlMap file = YamlMap::parse(text, path);
+  for (const char* side : {"image_width", "image_height"}) {
+    if (!file.has(side)) file.refuse(side, "is missing");
+    file.count(side, 0, 1, kLargestSide_px);
+  }
+  for (const char* name : {"camera_name", "distortion_model"}) file.text(name, "");
+  requireMatrix(file, "camera_matrix", 3, 3);
+  requireMatrix(file, "distortion_coefficients", 0, 0);
+  requireMatrix(file, "rectification_matrix", 3, 3);
+  requireMatrix(file, "projection_matrix", 3, 4);
+}
+
+bool endsIn(const std::string& text, const std::string& ending) {
+  return text.size() > ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+sensor_msgs::CameraInfo parse(const std::string& content, const std::string& path) {
+  const bool yaml = endsIn(path, ".yaml") || endsIn(path, ".yml");
+  requireValue(yaml || endsIn(path, ".ini"), "must end in .yaml, .yml or .ini");
+  if (yaml) requireCalibrationYaml(content, path);
+  sensor_msgs::CameraInfo info;
+  std::string name;
+  std::istringstream in(content);
+  const bool parsed = yaml ? camera_calibration_parsers::readCalibrationYml(in, name, info)
+                           : camera_calibration_parsers::parseCalibrationIni(content, name, info);
+  requireValue(parsed, "is no camera calibration");
+  return info;
+}
+
+}  // namespace
+
+std::optional<CameraModel> toCamera(const sensor_msgs::CameraInfo& info, bool rectified) {
+  if (rectified ? isZero(info.P) : isZero(info.K)) return std::nullopt;
+  requireFull(info);
+  Intrinsics camera;
+  camera.size = {static_cast<int>(info.width), static_cast<int>(info.height)};
+  if (rectified) {
+    readMatrix(info.P, "P", 4, camera);
+  } else {
+    readMatrix(info.K, "K", 3, camera);
+    readDistortion(info, camera);
+  }
+  cutOut(info, camera);
+  bin(info.binning_x, camera.size.width, camera.fx, camera.cx);
+  bin(info.binning_y, camera.size.height, camera.fy, camera.cy);
+  return CameraModel(camera);
+}
+
+sensor_msgs::CameraInfo toMessage(const CameraModel& camera) {
+  const Intrinsics& intrinsics = camera.intrinsics();
+  sensor_msgs::CameraInfo info;
+  info.width = static_cast<std::uint32_t>(intrinsics.size.width);
+  info.height = static_cast<std::uint32_t>(intrinsics.size.height);
+  info.distortion_model = toString(intrinsics.distortion);
+  info.D = intrinsics.coefficients;
+  info.K = {intrinsics.fx, 0.0, intrinsics.cx, 0.0, intrinsics.fy, intrinsics.cy, 0.0, 0.0, 1.0};
+  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  info.P = {intrinsics.fx, 0.0, intrinsics.cx, 0.0, 0.0, intrinsics.fy, intrinsics.cy, 0.0, 0.0, 0.0, 1.0, 0.0};
+  return info;
+}
+
+bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
+  return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model && a.D == b.D &&
+         a.K == b.K && a.P == b.P && a.binning_x == b.binning_x && a.binning_y == b.binning_y &&
+         a.roi.x_offset == b.roi.x_offset && a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&
+         a.roi.height == b.roi.height;
+}
+
+CameraModel readCameraFile(const std::string& path) {
+  try {
+    return parseCameraFile(readFile(path, kLargestFile_bytes), path);
+  } catch (const FileError& error) {
+    throw CameraError(oneLine(error.what()));
+  }
+}
+
+CameraModel parseCameraFile(const std::string& content, const std::string& path) {
+  try {
+    const std::optional<CameraModel> camera = toCamera(parse(content, path));
+    if (!camera) throw CameraError("is not calibrated: its camera matrix is zero");
+    return *camera;
+  } catch (const ParameterError& error) {
+    throw CameraError(oneLine(error.what()));
+  } catch (const std::exception& error) {
+    throw CameraError(path + ": " + oneLine(error.what()));
+  }
+}
+
+std::string cameraInfoTopic(const std::string& image_topic) {
+  const std::string compressed = "/compressed";
+  const std::size_t kept = image_topic.size() - (endsIn(image_topic, compressed) ? compressed.size() : 0);
+  return image_transport::getCameraInfoTopic(image_topic.substr(0, kept));
+}
+
+bool isRectified(const std::string& image_topic) { return image_topic.find("/image_rect") != std::string::npos; }
+
 namespace {
 
 /// Of a variance that the receiver claims; 0 when it claims none, or what cannot be.

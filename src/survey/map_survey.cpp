@@ -2,10 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <unordered_set>
+#include <utility>
+#include <vector>
 
-#include "base/angles.h"
-#include "base/statistics.h"
+#include "base/numbers.h"
+#include "map/map_rows.h"
+#include "visual_localization/localization/scores.h"
 
 namespace visual_localization {
 namespace {
@@ -180,6 +186,224 @@ MapSurvey survey(const TrainingMap& map, const SurveyConfig& config) {
     return sound.otherSession(map.position_m(i), map.yaw_rad(i), map.pose(i).session);
   });
   return result;
+}
+
+namespace {
+
+std::vector<LandmarkPoint> everyOf(const std::vector<LandmarkPoint>& points, std::size_t stride) {
+  std::vector<LandmarkPoint> some;
+  for (std::size_t i = 0; i < points.size(); i += stride) some.push_back(points[i]);
+  return some;
+}
+
+/// Counts different numbers in memory for no more than twice as many.
+class DifferentNumbers {
+ public:
+  void add(std::uint32_t number) {
+    if (numbers_.size() >= most_) most_ = std::max(most_, 2 * count());
+    numbers_.push_back(number);
+  }
+
+  std::size_t count() {
+    std::sort(numbers_.begin(), numbers_.end());
+    numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
+    return numbers_.size();
+  }
+
+ private:
+  std::vector<std::uint32_t> numbers_;
+  std::size_t most_ = std::size_t{1} << 20U;
+};
+
+}  // namespace
+
+std::vector<LandmarkPoint> landmarkPoints(const TrainingMap& map, std::size_t most_images, std::size_t most_points) {
+  std::vector<LandmarkPoint> points;
+  if (!map.hasGeometry()) return points;
+  std::unordered_set<std::uint32_t> known;
+  for (std::size_t i = 0; i < map.size(); i += strideFor(map.size(), most_images)) {
+    const auto geometry = map.geometry(i);
+    if (!geometry) continue;
+    for (const SeenLandmark& landmark : geometry->landmarks) {
+      if (!known.insert(landmark.id).second) continue;
+      points.push_back({geometry->camera.position_m + landmark.offset_m.cast<double>(), map.pose(i).session});
+    }
+  }
+  return points.size() > most_points ? everyOf(points, strideFor(points.size(), most_points)) : points;
+}
+
+LandmarkSurvey landmarkSurvey(const TrainingMap& map, std::size_t most_images) {
+  LandmarkSurvey survey;
+  survey.images = map.geometryCount();
+  if (survey.images == 0) return survey;
+  const std::size_t stride = strideFor(map.size(), most_images);
+  std::vector<std::size_t> counts;
+  DifferentNumbers ids;
+  for (std::size_t i = 0; i < map.size(); i += stride) {
+    const auto geometry = map.geometry(i);
+    if (!geometry) continue;
+    counts.push_back(geometry->landmarks.size());
+    survey.bytes += map_schema::kPoseBytes + counts.back() * map_schema::landmarkBytes(map.featureCount(i));
+    for (const SeenLandmark& landmark : geometry->landmarks) ids.add(landmark.id);
+  }
+  survey.images_read = counts.size();
+  if (!counts.empty()) survey.median = upperMedian(counts);
+  if (stride == 1) survey.landmarks = ids.count();
+  return survey;
+}
+
+namespace {
+
+constexpr std::size_t kNearImages = 16;  ///< looked at
+constexpr std::size_t kNearCompared = 4;
+
+struct Alike {
+  std::size_t image = 0;
+  double similarity = 0.0;
+};
+
+bool isMoreAlike(const Alike& a, const Alike& b) {
+  return a.similarity != b.similarity ? a.similarity > b.similarity : a.image < b.image;
+}
+
+/// Keeps the `count` most alike, best first.
+void keepBest(std::size_t count, std::vector<Alike>& images) {
+  const auto end = images.begin() + static_cast<std::ptrdiff_t>(std::min(count, images.size()));
+  std::partial_sort(images.begin(), end, images.end(), isMoreAlike);
+  images.erase(end, images.end());
+}
+
+class Search {
+ public:
+  Search(const TrainingMap& map, const AmbiguityConfig& config)
+      : map_(map),
+        config_(config),
+        global_(config.similarity),
+        sift_(config.match, config.similarity),
+        work_left_(config.most_work) {
+    result_.stride = strideFor(map.size(), config.most_images);
+    for (std::size_t i = 0; i < map.size(); i += result_.stride) globals_.push_back(map.global(i));
+  }
+
+  std::size_t images() const { return globals_.size(); }
+
+  /// Asks about the image `number` of images().
+  void ask(std::size_t number) {
+    const std::size_t image = number * result_.stride;
+    const std::vector<Alike> near = nearImages(image);
+    if (near.empty()) {
+      ++result_.unjudged;
+      return;
+    }
+    const std::vector<Alike> far = farImages(number);
+    if (!far.empty() && near.front().similarity > 0.0 &&
+        far.front().similarity >= config_.global_nearly_as_good * near.front().similarity) {
+      ++result_.global_only;
+    }
+    if (!takeWork(image, near, far)) {
+      ++result_.unasked;
+      return;
+    }
+    ++result_.asked;
+    AmbiguousImage answer{image, image, 0.0, 0.0};
+    for (const Alike& other : near)
+      answer.near_similarity = std::max(answer.near_similarity, bySift(image, other.image));
+    for (const Alike& other : far) {
+      const double similarity = bySift(image, other.image);
+      if (similarity > answer.similarity) {
+        answer.twin = other.image;
+        answer.similarity = similarity;
+      }
+    }
+    if (isAmbiguous(answer)) result_.images.push_back(answer);
+  }
+
+  AmbiguousPlaces result() && {
+    const auto belongs = [this](std::size_t image) { return wasAmbiguous(image); };
+    result_.stretches = stretchesOf(map_, config_.far_m, belongs);
+    return std::move(result_);
+  }
+
+ private:
+  std::vector<Alike> nearImages(std::size_t image) {
+    std::vector<Alike> near;
+    const auto global = map_.global(image);
+    map_.nearestFacing(image, kNearImages, config_.near_m, neighbours_);
+    for (const Neighbour& neighbour : neighbours_) {
+      near.push_back({neighbour.image, globally(*global, *map_.global(neighbour.image))});
+    }
+    keepBest(kNearCompared, near);
+    return near;
+  }
+
+  std::vector<Alike> farImages(std::size_t number) {
+    std::vector<Alike> far;
+    const Eigen::Vector2d here_m = map_.position_m(number * result_.stride);
+    for (std::size_t other = 0; other < globals_.size(); ++other) {
+      const std::size_t image = other * result_.stride;
+      if ((map_.position_m(image) - here_m).norm() <= config_.far_m) continue;
+      far.push_back({image, globally(*globals_[number], *globals_[other])});
+    }
+    keepBest(config_.shortlist, far);
+    return far;
+  }
+
+  double globally(const GlobalFeatures& a, const GlobalFeatures& b) const { return global_.compare(a, b).similarity; }
+  double bySift(std::size_t a, std::size_t b) const { return sift_.compare(*map_.sift(a), *map_.sift(b)).similarity; }
+
+  /// The feature counts of the map save reading what is too much; the features themselves are what counts.
+  bool takeWork(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far) {
+    const auto said = [this](std::size_t i) { return map_.featureCount(i); };
+    if (workOf(image, near, far, said) > work_left_) return false;
+    const std::uint64_t work = workOf(image, near, far, [this](std::size_t i) { return map_.sift(i)->size(); });
+    if (work > work_left_) return false;
+    work_left_ -= work;
+    return true;
+  }
+
+  /// Pairs of descriptors.
+  template <class SizeOf>
+  static std::uint64_t workOf(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far,
+                              SizeOf sizeOf) {
+    std::uint64_t others = 0;
+    for (const Alike& other : near) others += sizeOf(other.image);
+    for (const Alike& other : far) others += sizeOf(other.image);
+    return others * sizeOf(image);
+  }
+
+  bool isAmbiguous(const AmbiguousImage& answer) const {
+    return answer.similarity >= config_.least_similarity && answer.similarity > 0.0 &&
+           answer.similarity >= config_.nearly_as_good * answer.near_similarity;
+  }
+
+  /// Images in between that were not asked about do not end a stretch, but for those of another session.
+  bool wasAmbiguous(std::size_t image) const {
+    const std::size_t asked = image - image % result_.stride;
+    const auto found = std::lower_bound(result_.images.begin(), result_.images.end(), asked,
+                                        [](const AmbiguousImage& a, std::size_t b) { return a.image < b; });
+    return found != result_.images.end() && found->image == asked &&
+           map_.pose(asked).session == map_.pose(image).session;
+  }
+
+  const TrainingMap& map_;
+  AmbiguityConfig config_;
+  GlobalSimilarity global_;
+  SiftSimilarity sift_;
+  std::uint64_t work_left_;
+  std::vector<std::shared_ptr<const GlobalFeatures>> globals_;  ///< of every stride_-th image
+  std::vector<Neighbour> neighbours_;
+  AmbiguousPlaces result_;
+};
+
+}  // namespace
+
+AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfig& config, const Progress& progress) {
+  Search search(map, config);
+  for (std::size_t number = 0; number < search.images(); ++number) {
+    search.ask(number);
+    if (progress) progress(number + 1, search.images());
+  }
+  return std::move(search).result();
 }
 
 }  // namespace visual_localization

@@ -1,11 +1,10 @@
-#include "apps/map_plot.h"
-
 #include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "apps/map_export.h"
 #include "test/support/example_map.h"
 #include "test/support/temporary_folder.h"
 

@@ -1,5 +1,3 @@
-#include "ros/camera_info.h"
-
 #include <cmath>
 #include <limits>
 
@@ -8,6 +6,7 @@
 #include <rosbag/bag.h>
 #include <sensor_msgs/Image.h>
 
+#include "ros/message_readers.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/bag/bag_reader.h"
 

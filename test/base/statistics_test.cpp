@@ -1,9 +1,9 @@
-#include "base/statistics.h"
-
 #include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
+
+#include "base/numbers.h"
 
 namespace visual_localization {
 namespace {

@@ -17,7 +17,7 @@
 #include "features/sift/descriptor.h"
 #include "features/sift/extrema.h"
 #include "features/sift/scale_space.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 
 namespace visual_localization {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "features/global_histograms.h"
 #include "visual_localization/map/training_map.h"
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
-#include "editing/map_alignment.h"
+#include "base/numbers.h"
+#include "editing/map_merger.h"
 
 namespace visual_localization {
 namespace {

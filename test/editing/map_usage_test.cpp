@@ -1,10 +1,9 @@
-#include "editing/map_usage.h"
-
 #include <algorithm>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "editing/map_selection.h"
 #include "test/support/example_map.h"
 
 namespace visual_localization {

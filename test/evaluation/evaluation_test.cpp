@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "evaluation/evaluator.h"
 #include "evaluation/metrics.h"
-#include "evaluation/track_files.h"
 
 namespace visual_localization {
 namespace {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "evaluation/drive_order.h"
+#include "evaluation/run.h"
 
 namespace visual_localization {
 namespace {

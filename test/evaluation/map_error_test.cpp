@@ -1,8 +1,7 @@
-#include "evaluation/map_error.h"
-
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
+#include "evaluation/run.h"
 #include "test/support/synthetic.h"
 
 namespace visual_localization {

@@ -1,10 +1,9 @@
-#include "evaluation/pose_judge.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
+#include "evaluation/metrics.h"
 
 namespace visual_localization {
 namespace {

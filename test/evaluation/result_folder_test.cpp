@@ -1,5 +1,3 @@
-#include "evaluation/result_folder.h"
-
 #include <filesystem>
 #include <functional>
 
@@ -7,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/files.h"
+#include "evaluation/evaluator.h"
 #include "test/evaluation/small_experiment.h"
 
 namespace visual_localization {

@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "evaluation/result_folder.h"
-#include "evaluation/track_files.h"
+#include "evaluation/evaluator.h"
 #include "test/evaluation/small_experiment.h"
 
 namespace visual_localization {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "evaluation/evaluator.h"
-#include "evaluation/result_folder.h"
 #include "test/support/synthetic.h"
 #include "test/support/temporary_folder.h"
 

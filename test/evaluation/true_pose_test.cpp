@@ -1,11 +1,10 @@
-#include "evaluation/true_pose.h"
-
 #include <stdexcept>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/files.h"
+#include "evaluation/score_table.h"
 #include "test/support/temporary_folder.h"
 
 namespace visual_localization {

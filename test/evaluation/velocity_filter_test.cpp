@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "evaluation/pose_judge.h"
+#include "evaluation/metrics.h"
 
 namespace visual_localization {
 namespace {

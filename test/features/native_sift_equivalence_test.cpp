@@ -10,7 +10,7 @@
 
 #include "features/sift/native_sift_extractor.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 
 namespace visual_localization {
 namespace {

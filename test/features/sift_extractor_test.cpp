@@ -1,11 +1,10 @@
-#include "visual_localization/features/sift_extractor.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
 #include "test/support/synthetic.h"
+#include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
 
 namespace visual_localization {

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "test/support/synthetic.h"
 
 namespace visual_localization {

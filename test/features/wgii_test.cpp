@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "features/global_histograms.h"
 #include "test/support/pixel_place.h"
 #include "test/support/synthetic.h"

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "features/global_histograms.h"
 #include "test/support/pixel_place.h"
 #include "test/support/synthetic.h"

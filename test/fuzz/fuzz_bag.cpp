@@ -7,7 +7,7 @@
 #include "bag/bag_file.h"
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/bag/bag_reader.h"
-#include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {

@@ -6,7 +6,7 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include "bag/bag_messages.h"
-#include "ros/camera_info.h"
+#include "ros/message_readers.h"
 #include "test/fuzz/fuzz_support.h"
 
 namespace visual_localization {

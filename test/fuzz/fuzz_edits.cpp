@@ -3,7 +3,7 @@
 #include <string>
 
 #include "apps/region.h"
-#include "editing/map_usage.h"
+#include "editing/map_selection.h"
 #include "test/fuzz/fuzz_support.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

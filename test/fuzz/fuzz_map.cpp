@@ -12,7 +12,7 @@
 #include "editing/map_selection.h"
 #include "map/map_schema.h"
 #include "test/fuzz/fuzz_support.h"
-#include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/map/map_file.h"
 
 #if defined(__has_feature)

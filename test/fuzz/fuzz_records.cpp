@@ -7,11 +7,11 @@
 #include <opencv2/core.hpp>
 
 #include "bag/bag_file.h"
+#include "map/map_rows.h"
 #include "map/map_schema.h"
-#include "map/packed_geometry.h"
-#include "ros/compressed_image.h"
+#include "visual_localization/ros/image_conversion.h"
 #include "test/fuzz/fuzz_support.h"
-#include "visual_localization/ros/image_error.h"
+#include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
 namespace {

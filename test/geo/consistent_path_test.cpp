@@ -1,9 +1,9 @@
-#include "geo/consistent_path.h"
-
 #include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "geo/path_smoother.h"
 
 namespace visual_localization {
 namespace {

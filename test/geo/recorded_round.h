@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "base/time.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
 

@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
-#include "visual_localization/geo/local_frame.h"
+#include "base/numbers.h"
 
 namespace visual_localization {
 namespace {

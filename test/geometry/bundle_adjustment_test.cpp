@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "test/support/landmark_world.h"
 
 namespace visual_localization {

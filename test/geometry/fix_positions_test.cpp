@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "geometry/path_evidence.h"
+#include "geometry/reconstruction.h"
 
 namespace visual_localization {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
-#include "geometry/path_evidence.h"
+#include "base/numbers.h"
+#include "geometry/reconstruction.h"
 
 namespace visual_localization {
 namespace {

@@ -1,6 +1,6 @@
-#include "geometry/pose_corrections.h"
-
 #include <gtest/gtest.h>
+
+#include "geometry/bundle_adjustment.h"
 
 namespace visual_localization {
 namespace {

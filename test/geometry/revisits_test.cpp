@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
-#include "geometry/image_pairs.h"
+#include "base/numbers.h"
+#include "geometry/feature_tracks.h"
 
 namespace visual_localization {
 namespace {

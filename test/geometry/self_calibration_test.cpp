@@ -1,7 +1,6 @@
-#include "geometry/self_calibration.h"
-
 #include <gtest/gtest.h>
 
+#include "geometry/session_geometry.h"
 #include "test/geometry/recorded_street.h"
 
 namespace visual_localization {

@@ -1,11 +1,10 @@
-#include "visual_localization/geometry/sensor_mount.h"
-
 #include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
+#include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
-#include "geometry/image_pairs.h"
+#include "base/numbers.h"
+#include "geometry/feature_tracks.h"
 #include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "localization/dpso.h"
 #include "test/support/world.h"
 

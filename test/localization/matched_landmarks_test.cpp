@@ -1,5 +1,3 @@
-#include "visual_localization/localization/matched_landmarks.h"
-
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -9,6 +7,7 @@
 
 #include "localization/pose_verifier.h"
 #include "test/support/landmark_world.h"
+#include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
 namespace {

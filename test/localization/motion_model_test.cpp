@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "localization/particle_filter.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"

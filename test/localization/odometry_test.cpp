@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 
 namespace visual_localization {
 namespace {

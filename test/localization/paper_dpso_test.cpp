@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "localization/dpso.h"
-#include "localization/presets.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
 #include "visual_localization/localization/localizer_config.h"

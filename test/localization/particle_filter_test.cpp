@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
 #include "visual_localization/localization/particles.h"

@@ -1,9 +1,9 @@
-#include "localization/path_interpolation.h"
-
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
 namespace {

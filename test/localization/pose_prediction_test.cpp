@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
-#include "localization/covariance.h"
+#include "base/numbers.h"
 #include "test/localization/pose_verifier_fixture.h"
+#include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
 namespace {

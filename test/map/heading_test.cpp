@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/map/training_map.h"
 

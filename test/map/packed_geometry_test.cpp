@@ -1,10 +1,9 @@
-#include "map/packed_geometry.h"
-
 #include <cmath>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "map/map_rows.h"
 #include "test/map/stored_geometry.h"
 
 namespace visual_localization {

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "map/map_rows.h"
 #include "map/map_schema.h"
-#include "map/packed_geometry.h"
 #include "test/support/example_map.h"
 
 namespace visual_localization::test {

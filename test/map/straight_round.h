@@ -5,8 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "visual_localization/geo/geodetic_point.h"
-#include "visual_localization/geo/local_frame.h"
+#include "visual_localization/geo/trajectory.h"
 
 namespace visual_localization::test {
 

@@ -1,8 +1,8 @@
-#include "node/dashboard.h"
-
 #include <limits>
 
 #include <gtest/gtest.h>
+
+#include "node/drawings.h"
 
 namespace visual_localization {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "node/rviz_messages.h"
+#include "node/message_conversions.h"
 #include "test/node/small_map.h"
 
 namespace visual_localization {

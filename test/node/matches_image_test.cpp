@@ -1,5 +1,3 @@
-#include "node/matches_image.h"
-
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -9,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "node/drawings.h"
 #include "test/node/small_map.h"
 
 namespace visual_localization {

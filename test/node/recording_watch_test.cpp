@@ -1,9 +1,8 @@
-#include "node/recording_watch.h"
-
 #include <limits>
 
 #include <gtest/gtest.h>
 
+#include "node/map_recorder.h"
 #include "test/support/synthetic.h"
 
 namespace visual_localization {

@@ -1,9 +1,9 @@
-#include "node/transform_publisher.h"
-
 #include <cmath>
 #include <tuple>
 
 #include <gtest/gtest.h>
+
+#include "node/localizer_publisher.h"
 
 namespace visual_localization {
 namespace {

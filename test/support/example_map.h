@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "map/packed_geometry.h"
+#include "map/map_rows.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {

@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
 
 namespace visual_localization::test {

@@ -5,7 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 
 namespace visual_localization::test {
 

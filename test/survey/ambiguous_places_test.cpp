@@ -1,9 +1,8 @@
-#include "survey/ambiguous_places.h"
-
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "map/feature_store.h"
+#include "survey/map_survey.h"
 #include "test/support/example_map.h"
 
 namespace visual_localization {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "survey/landmark_survey.h"
+#include "survey/map_survey.h"
 #include "test/support/example_map.h"
 
 namespace visual_localization {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "test/support/example_map.h"
 
 namespace visual_localization {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 #include "survey/map_survey.h"
 
 namespace visual_localization {

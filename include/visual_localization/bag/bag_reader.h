@@ -13,10 +13,10 @@
 #include <opencv2/core.hpp>
 
 #include "visual_localization/camera/camera_model.h"
-#include "visual_localization/geo/geodetic_point.h"
-#include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/geo/trajectory.h"
+#include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/localization/odometry.h"
-#include "visual_localization/ros/image_error.h"
+#include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
 

@@ -11,7 +11,7 @@
 
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
 
 namespace visual_localization {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "visual_localization/features/sift_features.h"
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

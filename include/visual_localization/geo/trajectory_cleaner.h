@@ -4,10 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "visual_localization/geo/geodetic_point.h"
-#include "visual_localization/geo/local_frame.h"
 #include "visual_localization/geo/trajectory.h"
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

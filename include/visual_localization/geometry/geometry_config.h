@@ -1,6 +1,6 @@
 #pragma once
 
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

@@ -12,7 +12,6 @@
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/localizer_config.h"
-#include "visual_localization/localization/matched_landmarks.h"
 #include "visual_localization/localization/odometry.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"

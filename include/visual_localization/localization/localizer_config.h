@@ -1,16 +1,17 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "visual_localization/features/front_end.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
-#include "visual_localization/localization/metric_pose.h"
-#include "visual_localization/localization/score.h"
+#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/map/training_map.h"
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 
@@ -38,5 +39,12 @@ struct LocalizerConfig : TrackerConfig {
 
 /// How images are prepared for comparison with a map.
 FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map);
+
+/// Names of the presets: sets of parameters of a localizer that belong together.
+const std::vector<std::string>& presetNames();
+
+/// The parameters of a preset; those that it does not name stay what they are. Throws ParameterError unless it is one
+/// of presetNames().
+ParameterValues presetValues(const std::string& name);
 
 }  // namespace visual_localization

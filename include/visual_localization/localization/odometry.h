@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

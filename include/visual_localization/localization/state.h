@@ -8,9 +8,9 @@
 
 #include <Eigen/Core>
 
-#include "visual_localization/localization/score.h"
+#include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker.h"
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

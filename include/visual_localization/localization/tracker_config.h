@@ -4,7 +4,7 @@
 #include <string>
 
 #include "visual_localization/localization/odometry.h"
-#include "visual_localization/parameters/parameter_visitor.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 

@@ -13,11 +13,11 @@
 #include <opencv2/core.hpp>
 
 #include "visual_localization/base/progress.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
 #include "visual_localization/geometry/geometry_config.h"
-#include "visual_localization/geometry/session_landmarks.h"
+#include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {

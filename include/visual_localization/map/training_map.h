@@ -13,11 +13,10 @@
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_extractor.h"
 #include "visual_localization/features/sift_features.h"
-#include "visual_localization/geo/local_frame.h"
+#include "visual_localization/geo/trajectory.h"
+#include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/geometry/image_geometry.h"
-#include "visual_localization/geometry/sensor_mount.h"
 
 namespace visual_localization {
 

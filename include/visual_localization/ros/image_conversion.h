@@ -1,12 +1,20 @@
 #pragma once
 
+#include <cstdint>
+#include <stdexcept>
+#include <vector>
+
 #include <opencv2/core.hpp>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
-#include "visual_localization/ros/image_error.h"
-
 namespace visual_localization {
+
+/// An image message that cannot be used. The text is the reason, in one line.
+class ImageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// 8-bit grey image of a message with encoding mono8, mono16, bgr8, rgb8, bgra8, rgba8 or bayer_*8. Sixteen bits
 /// become eight by the full range (divided by 257) and not by the brightest pixel, so that the same scene has the
@@ -22,5 +30,16 @@ cv::Mat toGrey(const sensor_msgs::CompressedImage& message);
 /// unusable without decoding it.
 cv::Size sizeOf(const sensor_msgs::Image& message);
 cv::Size sizeOf(const sensor_msgs::CompressedImage& message);
+
+/// The size itself. Throws ImageError when an image of this size, pixels, is empty or too large to be taken.
+cv::Size requireImageSize(std::uint64_t width, std::uint64_t height);
+
+/// Size of a JPEG or a PNG by its header, pixels; nothing is decoded. Throws ImageError when it is neither, empty or
+/// too large, and a JPEG that is cut off.
+cv::Size compressedSize(const std::vector<std::uint8_t>& file);
+
+/// 8-bit grey image of a JPEG or a PNG. Throws ImageError when it is neither, broken, cut off or too large. It takes no
+/// memory for pixels before the decoder itself has read how many there are, and none for texts in the file.
+cv::Mat decodedToGrey(const std::vector<std::uint8_t>& file);
 
 }  // namespace visual_localization

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "features/sift/extrema.h"
-#include "features/sift/float_plane.h"
+#include "features/sift/scale_space.h"
 
 namespace visual_localization {
 

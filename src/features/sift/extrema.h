@@ -3,9 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "features/sift/float_plane.h"
 #include "features/sift/scale_space.h"
-#include "visual_localization/features/sift_extractor.h"
+#include "visual_localization/features/sift_features.h"
 
 namespace visual_localization {
 

@@ -1,10 +1,15 @@
 #pragma once
 
+#include <cstddef>
+#include <deque>
+#include <mutex>
+
 #include <opencv2/core.hpp>
+#include <visual_localization/LocalizationStatus.h>
 
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
-#include "visual_localization/localization/matched_landmarks.h"
+#include "visual_localization/localization/estimate.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -19,5 +24,23 @@ cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const Trainin
 /// The same with the landmarks of a metric pose beside the training image that shares most of them: green those that
 /// agree with the pose, red those that do not.
 cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, const TrainingMap& map);
+
+/// The status as a picture for people: the state in colour, the figures that explain it, and their history over the
+/// last images. Thread-safe.
+class Dashboard {
+ public:
+  static constexpr std::size_t kShown = 120;  ///< number of images that are remembered
+
+  void add(const LocalizationStatus& status);
+  /// 8-bit BGR, always of the same size; dark when nothing has been added.
+  cv::Mat draw() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::deque<LocalizationStatus> statuses_;  ///< newest at the back
+};
+
+/// BGR; the same in the plots of scripts/.
+cv::Scalar colourOfState(std::uint8_t state);
 
 }  // namespace visual_localization

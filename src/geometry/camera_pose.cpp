@@ -1,4 +1,4 @@
-#include "visual_localization/geometry/sensor_mount.h"
+#include "visual_localization/geometry/camera_pose.h"
 
 #include <cmath>
 #include <iomanip>
@@ -6,7 +6,7 @@
 #include <sstream>
 #include <vector>
 
-#include "base/angles.h"
+#include "base/numbers.h"
 
 namespace visual_localization {
 namespace {

@@ -1,4 +1,4 @@
-#include "base/statistics.h"
+#include "base/numbers.h"
 
 #include <cmath>
 
