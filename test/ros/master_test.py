@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """A roscore that dies and comes back. It only introduces nodes to each other: connections that exist live on. This test
 has a roscore of its own for that."""
+import itertools
 import os
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import unittest
 
@@ -25,6 +27,12 @@ def free_port():
     with socket.socket() as probe:
         probe.bind(('127.0.0.1', 0))
         return probe.getsockname()[1]
+
+
+def stamped_now(images):
+    for image in images:
+        image.header.stamp = rospy.Time.now()
+        yield image
 
 
 class Master:
@@ -48,19 +56,50 @@ class Master:
         self._process.wait()
 
 
+class Repeated:
+    """Does something again and again in a thread of its own until it is ended."""
+
+    def __init__(self, action):
+        self.count = 0
+        self.error = None
+        self._action = action
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self):
+        while not self._ended.is_set() and self.error is None:
+            try:
+                self._action()
+                self.count += 1
+            except Exception as error:
+                self.error = error
+
+    def end(self):
+        self._ended.set()
+        self._thread.join()
+
+
 class MasterTest(unittest.TestCase):
-    def setUp(self):
-        self.images = iter(fixture.images_of(BAG, count=60))
+    """One node through all of it, in this order."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.images = stamped_now(itertools.cycle(fixture.images_of(BAG, count=60)))
         rospy.set_param('/localizer', {'map': MAP, 'image_transport': 'compressed'})
-        self.node = subprocess.Popen([roslib.packages.find_node('visual_localization', 'localizer_node')[0],
-                                      '__name:=localizer', 'image:=/stereo/left/image_raw'])
-        self.addCleanup(self.node.kill)
-        self.localizer = fixture.Localizer()
-        self.localizer.wait_until_up()
-        self.camera = fixture.Camera(self.localizer)
+        cls.node = subprocess.Popen([roslib.packages.find_node('visual_localization', 'localizer_node')[0],
+                                     '__name:=localizer', 'image:=/stereo/left/image_raw'])
+        cls.localizer = fixture.Localizer()
+        cls.localizer.wait_until_up()
+        cls.camera = fixture.Camera(cls.localizer)
         rospy.wait_for_service('/localizer/set_parameters', DEADLINE_S)
         # Persistent, since nobody can be asked for the address while there is no master.
-        self.set_parameters = rospy.ServiceProxy('/localizer/set_parameters', Reconfigure, persistent=True)
+        cls.set_parameters = rospy.ServiceProxy('/localizer/set_parameters', Reconfigure, persistent=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.node.kill()
+        cls.node.wait()
 
     def set_particles(self, count):
         """The number of particles that holds afterwards, and how long the answer took."""
@@ -74,7 +113,7 @@ class MasterTest(unittest.TestCase):
         for _ in range(count):
             self.camera.show(next(self.images))
 
-    def test_images_flow_without_and_with_a_new_master(self):
+    def test_1_images_flow_without_and_with_a_new_master(self):
         self.show(5)
         self.assertEqual(self.set_particles(81)[0], 81)
         master.kill()
@@ -87,6 +126,40 @@ class MasterTest(unittest.TestCase):
         self.show(10)
         self.assertEqual(self.set_particles(83)[0], 83)
         self.assertEqual(rospy.get_param('/localizer/dpso/particles'), 83)
+
+    def test_2_killed_under_load(self):
+        def publish():
+            self.camera.publish(next(self.images))
+            time.sleep(0.02)
+
+        numbers = itertools.cycle(range(60, 100))
+
+        def set_particles():
+            asked = next(numbers)
+            particles, _ = self.set_particles(asked)
+            if particles != asked:
+                raise AssertionError('%d particles instead of %d' % (particles, asked))
+
+        # Images come faster than one by one, and parameters change between them.
+        load = [Repeated(publish), Repeated(set_particles)]
+        try:
+            for _ in range(5):
+                for change in (master.kill, master.start):
+                    change()
+                    statuses, settings = len(self.localizer.status.messages()), load[1].count
+                    fixture.wait_for(lambda: len(self.localizer.status.messages()) >= statuses + 10, DEADLINE_S,
+                                     '10 images after ' + change.__name__)
+                    fixture.wait_for(lambda: load[1].count > settings or load[1].error, DEADLINE_S,
+                                     'an answer after ' + change.__name__)
+        finally:
+            for one in load:
+                one.end()
+        self.assertEqual([one.error for one in load], [None, None])
+        self.assertIsNone(self.node.poll())
+        print('5 masters killed while %d images were published and parameters set %d times'
+              % tuple(one.count for one in load))
+
+    def test_3_ends_without_a_master(self):
         master.kill()
         self.show(5)
         begin = time.monotonic()
