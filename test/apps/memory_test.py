@@ -129,7 +129,7 @@ class MemoryTest(ProgramTest):
     def test_maps_of_others(self):
         whole = MAP.read_bytes()
         wrong = self.folder / 'wrong.map'
-        cases = {path.name: path.read_bytes() for path in sorted(CORPUS.glob('*.map'))}
+        cases = {path.name: path.read_bytes() for path in sorted(CORPUS.rglob('*.map'))}
         for place in range(20, len(whole) - 8, len(whole) // 8):
             cases[f'a map overwritten at {place}'] = whole[:place] + 64 * b'\xff' + whole[place + 64:]
         cache = mib(len(whole))
@@ -174,7 +174,7 @@ methods:
         other, merged = self.folder / 'other.map', self.folder / 'merged.map'
         self.check('a recording', builder_bound(THREADS, 320 * 240, DRIVE_IMAGES, 2500), 'map_builder', '--bag', DRIVE,
                    '--threads', THREADS, '--output', other, codes=(0,))
-        for name, path in [('a map of another day', other)] + [(path.name, path) for path in CORPUS.glob('*.map')]:
+        for name, path in [('a map of another day', other)] + [(path.name, path) for path in CORPUS.rglob('*.map')]:
             sizes = mib(MAP.stat().st_size + path.stat().st_size)
             self.check(name, merge_bound(THREADS, sizes, MAP_IMAGES + DRIVE_IMAGES), 'map_edit', 'merge', MAP, path,
                        '--threads', THREADS, '--output', merged, codes=(0,) if path == other else (0, 1))

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "evaluation/experiment.h"
 #include "parameters/yaml_map.h"
@@ -13,17 +14,33 @@
 namespace visual_localization {
 namespace {
 
+template <class Config>
+ParameterValues valuesOf(Config& config) {
+  return parameters::values([&config](ParameterVisitor& visitor) { config.declare(visitor); });
+}
+
+/// What is accepted is valid, and its values are accepted again.
+template <class Config>
+void assign(const ParameterValues& values) {
+  fuzz::expect<ParameterError>([&] {
+    Config config;
+    assignParameters(config, values);
+    const std::vector<std::string> violations = violationsOf(config);
+    if (!violations.empty()) fuzz::fail(violations.front());
+    Config again;
+    assignParameters(again, valuesOf(config));
+    if (valuesOf(again) != valuesOf(config)) fuzz::fail("parameters that do not read back");
+  });
+}
+
 void readParameters(const std::string& text) {
-  try {
-    const ParameterValues values = parameters::YamlMap::parse(text, "parameters.yaml").parameters();
-    MapBuilderConfig builder;
-    fuzz::expect<ParameterError>([&] { assignParameters(builder, values); });
-    LocalizerConfig localizer;
-    assignParameters(localizer, values);
-    for (const auto& violation : violationsOf(localizer)) fuzz::requireOneLine(violation);
-  } catch (const ParameterError& error) {
-    fuzz::requireOneLine(error.what());
+  ParameterValues values;
+  if (!fuzz::expect<ParameterError>(
+          [&] { values = parameters::YamlMap::parse(text, "parameters.yaml").parameters(); })) {
+    return;
   }
+  assign<MapBuilderConfig>(values);
+  assign<LocalizerConfig>(values);
 }
 
 }  // namespace

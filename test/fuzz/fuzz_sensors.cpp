@@ -1,4 +1,5 @@
 /// What sensors send beside images and calibrations: odometry, fixes and static transforms. The first byte chooses.
+#include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -21,6 +22,13 @@ void readOdometry(const nav_msgs::Odometry& message) {
   });
 }
 
+void readFix(const sensor_msgs::NavSatFix& message) {
+  const Fix fix = toFix(message, 1);
+  if (hasPosition(fix) && !isValid(fix.position)) fuzz::fail("a fix beyond the earth");
+  if (!(fix.sigma_m >= 0.0) || !(fix.sigma_up_m >= 0.0)) fuzz::fail("a fix without a standard deviation");
+  if (std::isinf(fix.sigma_m) || std::isinf(fix.sigma_up_m)) fuzz::fail("a fix that knows nothing");
+}
+
 void readTransforms(const tf2_msgs::TFMessage& message) {
   StaticTransforms transforms;
   transforms.add(message);
@@ -41,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         readOdometry(*deserialize<nav_msgs::Odometry>(bytes));
         break;
       case 1:
-        toFix(*deserialize<sensor_msgs::NavSatFix>(bytes), 1);
+        readFix(*deserialize<sensor_msgs::NavSatFix>(bytes));
         break;
       default:
         readTransforms(*deserialize<tf2_msgs::TFMessage>(bytes));

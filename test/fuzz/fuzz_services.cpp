@@ -30,7 +30,9 @@ bool isSearched(const std::string& bytes) { return !bytes.empty() && bytes.back(
 
 void relocalize(fuzz::Input input) {
   const bool searched = isSearched(input.rest());
-  const Eigen::Vector2d centre_m(input.number<double>(), input.number<double>());
+  const auto east_m = input.number<double>();
+  const auto north_m = input.number<double>();
+  const Eigen::Vector2d centre_m(east_m, north_m);
   const auto radius_m = input.number<double>();
   fuzz::expect<std::invalid_argument>([&] {
     around(centre_m, radius_m);
@@ -62,9 +64,11 @@ void loadMapBelow(fuzz::Input input) {
   });
 }
 
-void requireAnswer(bool success, const std::string& message, double a, double b) {
-  if (!success) return fuzz::requireOneLine(message);
-  if (!std::isfinite(a) || !std::isfinite(b)) fuzz::fail("a position that is nowhere");
+void requireAnswer(std::uint8_t success, const std::string& message, double a, double b) {
+  fuzz::expect<std::runtime_error>([&] {
+    if (success == 0) throw std::runtime_error(message);
+    if (!std::isfinite(a) || !std::isfinite(b)) fuzz::fail("a position that is nowhere");
+  });
 }
 
 void convert(fuzz::Input input) {
@@ -72,12 +76,12 @@ void convert(fuzz::Input input) {
   on_earth.latitude = input.number<double>();
   on_earth.longitude = input.number<double>();
   const FromLL::Response in_map = fromLL(exampleMap().get(), on_earth);
-  requireAnswer(in_map.success != 0, in_map.message, in_map.map_point.x, in_map.map_point.y);
+  requireAnswer(in_map.success, in_map.message, in_map.map_point.x, in_map.map_point.y);
   ToLL::Request point;
   point.map_point.x = input.number<double>();
   point.map_point.y = input.number<double>();
   const ToLL::Response answer = toLL(exampleMap().get(), point);
-  requireAnswer(answer.success != 0, answer.message, answer.latitude, answer.longitude);
+  requireAnswer(answer.success, answer.message, answer.latitude, answer.longitude);
 }
 
 }  // namespace

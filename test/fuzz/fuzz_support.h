@@ -30,13 +30,26 @@ inline void requireOneLine(const std::string& text) {
   }
 }
 
+/// What expect() has seen so far.
+struct Outcomes {
+  std::size_t accepted = 0;  ///< with nothing refused on the way
+  std::size_t refused = 0;
+};
+inline Outcomes& outcomes() {
+  static Outcomes so_far;
+  return so_far;
+}
+
 /// Runs `read`. It may refuse its input by throwing a `Refusal`, and in no other way.
 template <class Refusal, class Read>
 bool expect(Read read) {
+  const std::size_t refused_before = outcomes().refused;
   try {
     read();
+    if (outcomes().refused == refused_before) ++outcomes().accepted;
     return true;
   } catch (const Refusal& refusal) {
+    ++outcomes().refused;
     requireOneLine(refusal.what());
     return false;
   }

@@ -1,4 +1,6 @@
-/// Runs a fuzz target over the files of folders, without libFuzzer: what once went wrong must not come back.
+/// Runs a fuzz target over the files of folders, without libFuzzer: what once went wrong must not come back. In a
+/// folder `accepted` nothing may be refused any more, and in `accepted_by_one` one reader of several must accept:
+/// otherwise the target tests nothing behind the first check.
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
@@ -6,20 +8,46 @@
 #include <string>
 #include <vector>
 
+#include "test/fuzz/fuzz_support.h"
 #include "test/support/temporary_folder.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
-int main(int argc, char** argv) {
+namespace visual_localization {
+namespace {
+
+/// The regular files in these folders and below, in order.
+std::vector<std::string> filesIn(const std::vector<std::string>& folders) {
   std::vector<std::string> paths;
-  for (int i = 1; i < argc; ++i) {
-    for (const auto& entry : std::filesystem::directory_iterator(argv[i])) paths.push_back(entry.path().string());
+  for (const std::string& folder : folders) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+      if (entry.is_regular_file()) paths.push_back(entry.path().string());
+    }
   }
   std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+void replay(const std::string& path) {
+  const std::string bytes = test::readAll(path);
+  const fuzz::Outcomes before = fuzz::outcomes();
+  LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+  const std::size_t accepted = fuzz::outcomes().accepted - before.accepted;
+  const std::size_t refused = fuzz::outcomes().refused - before.refused;
+  std::cout << "  " << accepted << " accept, " << refused << " refuse" << std::endl;
+  const std::string folder = std::filesystem::path(path).parent_path().filename();
+  if (folder == "accepted" && (accepted == 0 || refused > 0)) fuzz::fail("refused, and was made to be accepted");
+  if (folder == "accepted_by_one" && accepted == 0) fuzz::fail("no reader accepts what one was made for");
+}
+
+}  // namespace
+}  // namespace visual_localization
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> paths = visual_localization::filesIn({argv + 1, argv + argc});
   for (const std::string& path : paths) {
     std::cout << path << std::endl;  // flushed: the last line names the file that ended the program
-    const std::string bytes = visual_localization::test::readAll(path);
-    LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+    visual_localization::replay(path);
   }
   std::cout << paths.size() << " files\n";
   return paths.empty() ? 1 : 0;

@@ -68,7 +68,7 @@ TEST_F(MapStore, SaysWhyAFileIsNoMap) {
 }
 
 TEST_F(MapStore, MapsOfVersion3HaveNoCamerasAndNoLandmarks) {
-  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/pages_of_2048.map";
+  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/accepted/pages_of_2048.map";
   EXPECT_EQ(originOf(old).schema_version, 3);
   const auto map = loadMap(old);
   ASSERT_FALSE(map->header().sessions.empty());
@@ -88,7 +88,7 @@ TEST_F(MapStore, MapsOfVersion3HaveNoCamerasAndNoLandmarks) {
 }
 
 TEST_F(MapStore, MapsOfVersion4HaveLandmarks) {
-  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/landmarks_and_mount.map";
+  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/accepted/landmarks_and_mount.map";
   EXPECT_EQ(originOf(old).schema_version, 4);
   const auto map = loadMap(old);
   EXPECT_TRUE(map->hasGeometry());
