@@ -17,18 +17,26 @@ void readImages(const BagReader& bag, const std::string& topic) {
   constexpr std::size_t kMost = 8;
   const BagImages images = bag.images(topic);
   for (std::size_t i = 0; i < images.size() && i < kMost; ++i) {
-    fuzz::expect<ImageError>([&] { images.read(i).decode(); });
+    fuzz::expect<ImageError>([&] { images.read(i).decode(), fuzz::countRead(); });
   }
 }
 
 void readCamera(const BagReader& bag, const std::string& topic) {
   const std::optional<CameraModel> camera = bag.camera(topic);
   if (camera && !camera->project(Eigen::Vector3d::UnitZ()).allFinite()) fuzz::fail("a camera that does not see ahead");
+  if (camera) fuzz::countRead();
 }
 
 void readMount(const BagReader& bag, const std::string& topic) {
   const std::optional<SensorMount> mount = bag.mount(topic, "/fix", "base_link");
-  if (mount) requireMount(*mount);
+  if (!mount) return;
+  requireMount(*mount);
+  fuzz::countRead();
+}
+
+template <class Readings>
+void countUnlessEmpty(const Readings& readings) {
+  if (!readings.empty()) fuzz::countRead();
 }
 
 void readTopic(const BagReader& bag, const std::string& topic) {
@@ -44,8 +52,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace visual_localization;
   fuzz::expect<BagError>([&] {
     const BagReader bag("fuzz.bag", std::make_unique<bag::MemoryBytes>(fuzz::Input(data, size).rest()));
-    fuzz::expect<BagError>([&] { bag.fixes("/fix"); });
-    fuzz::expect<BagError>([&] { bag.odometry("/odom", "base_link", "map"); });
+    fuzz::expect<BagError>([&] { countUnlessEmpty(bag.fixes("/fix")); });
+    fuzz::expect<BagError>([&] { countUnlessEmpty(bag.odometry("/odom", "base_link", "map")); });
     for (const char* topic : {"/raw", "/jpeg"}) readTopic(bag, topic);
   });
   return 0;

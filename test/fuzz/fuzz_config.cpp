@@ -27,9 +27,12 @@ void assign(const ParameterValues& values) {
     assignParameters(config, values);
     const std::vector<std::string> violations = violationsOf(config);
     if (!violations.empty()) fuzz::fail(violations.front());
-    Config again;
-    assignParameters(again, valuesOf(config));
-    if (valuesOf(again) != valuesOf(config)) fuzz::fail("parameters that do not read back");
+    fuzz::mustNotThrow([&] {
+      Config again;
+      assignParameters(again, valuesOf(config));
+      if (valuesOf(again) != valuesOf(config)) fuzz::fail("parameters that do not read back");
+    });
+    fuzz::countRead();
   });
 }
 
@@ -49,7 +52,10 @@ void readParameters(const std::string& text) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace visual_localization;
   const std::string text(reinterpret_cast<const char*>(data), size);
-  fuzz::expect<ParameterError>([&] { parseExperiment(text, "experiment.yaml"); });
+  fuzz::expect<ParameterError>([&] {
+    parseExperiment(text, "experiment.yaml");
+    fuzz::countRead();
+  });
   readParameters(text);
   return 0;
 }

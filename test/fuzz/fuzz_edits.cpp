@@ -10,12 +10,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace visual_localization;
   const std::string text(reinterpret_cast<const char*>(data), size);
   fuzz::expect<UsageFileError>([&] {
-    const std::string written = MapUsage::fromCsv(text).toCsv();
-    if (MapUsage::fromCsv(written).toCsv() != written) fuzz::fail("a record of use that does not read back");
+    const MapUsage usage = MapUsage::fromCsv(text);
+    const std::string written = usage.toCsv();
+    fuzz::mustNotThrow([&] {
+      if (MapUsage::fromCsv(written).toCsv() != written) fuzz::fail("a record of use that does not read back");
+    });
+    if (!usage.empty()) fuzz::countRead();
   });
   fuzz::expect<apps::RegionError>([&] {
     const apps::Region region(text);
     region.contains({48.5, 9.05, 0.0});
+    fuzz::countRead();
   });
   return 0;
 }

@@ -18,6 +18,7 @@ void requireImage(const cv::Mat& grey, const cv::Size& size) {
   if (grey.empty() || grey.type() != CV_8UC1) fuzz::fail("no grey image");
   if (whyTooLarge(grey.size())) fuzz::fail("an image that is too large");
   if (grey.size() != size) fuzz::fail("an image of another size than its header says");
+  fuzz::countRead();
 }
 
 template <class Message>

@@ -84,6 +84,7 @@ void use(const TrainingMap& map) {
   for (const Session& session : map.header().sessions) {
     if (session.mount) requireMount(*session.mount);
   }
+  fuzz::countRead();
   if (map.geometryCount() > map.size()) fuzz::fail("more images with landmarks than there are");
   map.nearest(map.area().min_m, 3);
   spaced(map, 5.0);

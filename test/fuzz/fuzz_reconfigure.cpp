@@ -43,7 +43,11 @@ void reconfigure(const fuzz::Input& input) {
   const parameters::Declaration declare = [&parameters](ParameterVisitor& visitor) { parameters.declare(visitor); };
   static const dynamic_reconfigure::Config present = toConfig(declare);
   const dynamic_reconfigure::Config config = configOf(input, present);
-  fuzz::expect<ParameterError>([&] { assignParameters(parameters, toValues(config, declare)); });
+  fuzz::expect<ParameterError>([&] {
+    const ParameterValues values = toValues(config, declare);
+    assignParameters(parameters, values);
+    if (!values.empty()) fuzz::countRead();
+  });
   if (!violationsOf(parameters).empty()) fuzz::fail("parameters that are not allowed are in force");
 }
 

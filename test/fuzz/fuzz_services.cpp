@@ -37,6 +37,7 @@ void relocalize(fuzz::Input input) {
   fuzz::expect<std::invalid_argument>([&] {
     around(centre_m, radius_m);
     if (searched) localizer().relocalizeAround(centre_m, radius_m);
+    fuzz::countRead();
   });
 }
 
@@ -52,6 +53,7 @@ void guessPose(fuzz::Input input) {
     if (!guess.mean_m.allFinite() || !guess.covariance_m2.allFinite()) fuzz::fail("a guess that is not finite");
     normallyDistributed(guess.mean_m, guess.covariance_m2);
     if (searched) localizer().relocalizeAt(guess);
+    fuzz::countRead();
   });
 }
 
@@ -61,6 +63,7 @@ void loadMapBelow(fuzz::Input input) {
   fuzz::expect<MapStoreError>([&] {
     const std::string file = mapFileBelow(anywhere ? "" : "/usr/share", path);
     if (!anywhere && file.rfind("/usr/share/", 0) != 0) fuzz::fail("a map outside its folder: " + file);
+    fuzz::countRead();
   });
 }
 
@@ -68,6 +71,7 @@ void requireAnswer(std::uint8_t success, const std::string& message, double a, d
   fuzz::expect<std::runtime_error>([&] {
     if (success == 0) throw std::runtime_error(message);
     if (!std::isfinite(a) || !std::isfinite(b)) fuzz::fail("a position that is nowhere");
+    fuzz::countRead();
   });
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -30,26 +32,39 @@ inline void requireOneLine(const std::string& text) {
   }
 }
 
-/// What expect() has seen so far.
+/// What a target has done so far; replay.cpp compares.
 struct Outcomes {
-  std::size_t accepted = 0;  ///< with nothing refused on the way
-  std::size_t refused = 0;
+  std::size_t read = 0;     ///< parts of inputs that the target could make something of
+  std::size_t refused = 0;  ///< by expect()
+  std::string refusal;      ///< the last one
 };
 inline Outcomes& outcomes() {
   static Outcomes so_far;
   return so_far;
 }
 
+/// The target has read something and checked it.
+inline void countRead() { ++outcomes().read; }
+
+/// What was accepted must not be refused by what follows.
+template <class Then>
+void mustNotThrow(Then then) {
+  try {
+    then();
+  } catch (const std::exception& error) {
+    fail(std::string("accepted, and refused afterwards: ") + error.what());
+  }
+}
+
 /// Runs `read`. It may refuse its input by throwing a `Refusal`, and in no other way.
 template <class Refusal, class Read>
 bool expect(Read read) {
-  const std::size_t refused_before = outcomes().refused;
   try {
     read();
-    if (outcomes().refused == refused_before) ++outcomes().accepted;
     return true;
   } catch (const Refusal& refusal) {
     ++outcomes().refused;
+    outcomes().refusal = refusal.what();
     requireOneLine(refusal.what());
     return false;
   }

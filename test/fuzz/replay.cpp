@@ -1,6 +1,6 @@
 /// Runs a fuzz target over the files of folders, without libFuzzer: what once went wrong must not come back. In a
-/// folder `accepted` nothing may be refused any more, and in `accepted_by_one` one reader of several must accept:
-/// otherwise the target tests nothing behind the first check.
+/// folder `accepted` something must be read and nothing refused, and in `accepted_by_one` one reader of several must
+/// read something: otherwise the target tests nothing behind the first check.
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
@@ -32,12 +32,13 @@ void replay(const std::string& path) {
   const std::string bytes = test::readAll(path);
   const fuzz::Outcomes before = fuzz::outcomes();
   LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
-  const std::size_t accepted = fuzz::outcomes().accepted - before.accepted;
+  const std::size_t read = fuzz::outcomes().read - before.read;
   const std::size_t refused = fuzz::outcomes().refused - before.refused;
-  std::cout << "  " << accepted << " accept, " << refused << " refuse" << std::endl;
+  std::cout << "  " << read << " read, " << refused << " refused" << std::endl;
+  const std::string why = refused > 0 ? ": " + fuzz::outcomes().refusal : "";
   const std::string folder = std::filesystem::path(path).parent_path().filename();
-  if (folder == "accepted" && (accepted == 0 || refused > 0)) fuzz::fail("refused, and was made to be accepted");
-  if (folder == "accepted_by_one" && accepted == 0) fuzz::fail("no reader accepts what one was made for");
+  if (folder == "accepted" && (read == 0 || refused > 0)) fuzz::fail("must be read as a whole, but is not" + why);
+  if (folder == "accepted_by_one" && read == 0) fuzz::fail("no reader accepts it, one must" + why);
 }
 
 }  // namespace
