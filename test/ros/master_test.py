@@ -64,7 +64,7 @@ class Repeated:
         self.error = None
         self._action = action
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run)
+        self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self):
@@ -76,8 +76,10 @@ class Repeated:
                 self.error = error
 
     def end(self):
+        """False when it does not come back."""
         self._ended.set()
-        self._thread.join()
+        self._thread.join(DEADLINE_S)
+        return not self._thread.is_alive()
 
 
 class MasterTest(unittest.TestCase):
@@ -89,17 +91,14 @@ class MasterTest(unittest.TestCase):
         rospy.set_param('/localizer', {'map': MAP, 'image_transport': 'compressed'})
         cls.node = subprocess.Popen([roslib.packages.find_node('visual_localization', 'localizer_node')[0],
                                      '__name:=localizer', 'image:=/stereo/left/image_raw'])
+        cls.addClassCleanup(cls.node.wait)
+        cls.addClassCleanup(cls.node.kill)
         cls.localizer = fixture.Localizer()
         cls.localizer.wait_until_up()
         cls.camera = fixture.Camera(cls.localizer)
         rospy.wait_for_service('/localizer/set_parameters', DEADLINE_S)
         # Persistent, since nobody can be asked for the address while there is no master.
         cls.set_parameters = rospy.ServiceProxy('/localizer/set_parameters', Reconfigure, persistent=True)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.node.kill()
-        cls.node.wait()
 
     def set_particles(self, count):
         """The number of particles that holds afterwards, and how long the answer took."""
@@ -141,19 +140,23 @@ class MasterTest(unittest.TestCase):
                 raise AssertionError('%d particles instead of %d' % (particles, asked))
 
         # Images come faster than one by one, and parameters change between them.
-        load = [Repeated(publish), Repeated(set_particles)]
+        load = images, settings = Repeated(publish), Repeated(set_particles)
+
+        def goes_on(answered, set_before):
+            """10 more images are answered, and parameters set by a call that began after the change."""
+            return any(one.error for one in load) or (
+                len(self.localizer.status.messages()) >= answered + 10 and settings.count >= set_before + 2)
+
         try:
             for _ in range(5):
                 for change in (master.kill, master.start):
                     change()
-                    statuses, settings = len(self.localizer.status.messages()), load[1].count
-                    fixture.wait_for(lambda: len(self.localizer.status.messages()) >= statuses + 10, DEADLINE_S,
-                                     '10 images after ' + change.__name__)
-                    fixture.wait_for(lambda: load[1].count > settings or load[1].error, DEADLINE_S,
-                                     'an answer after ' + change.__name__)
+                    before = len(self.localizer.status.messages()), settings.count
+                    fixture.wait_for(lambda: goes_on(*before), DEADLINE_S, 'answers after ' + change.__name__)
+                    self.assertEqual([one.error for one in load], [None, None])
         finally:
-            for one in load:
-                one.end()
+            ended = [one.end() for one in load]
+        self.assertEqual(ended, [True, True])
         self.assertEqual([one.error for one in load], [None, None])
         self.assertIsNone(self.node.poll())
         print('5 masters killed while %d images were published and parameters set %d times'
