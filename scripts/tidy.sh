@@ -9,7 +9,8 @@ usage() {
 Usage: tidy.sh [--changed [COMMIT]] [--build DIR] [FILE ...]
 Checks the given files, or all of src/ and test/.
   --changed [COMMIT]  only files that differ from COMMIT (default: HEAD)
-  --build DIR         a configured build folder (default: build/test, configured when it is not there)
+  --build DIR         a configured build folder (default: build/tidy, made when it is not there, without precompiled
+                      headers and with each file alone)
 USAGE
 }
 
@@ -26,7 +27,7 @@ select_files() {
 }
 
 main() {
-  local build=$repo/build/test changed_since='' files=()
+  local build=$repo/build/tidy changed_since='' files=()
   while (($#)); do
     case $1 in
       --changed)
@@ -45,15 +46,19 @@ main() {
   export PATH=/usr/bin:$PATH
   "$repo/scripts/install_dependencies.sh" --with-lint
   if [[ ! -f $build/compile_commands.json ]]; then
-    (cd "$repo" && cmake --preset test >/dev/null)
-    build=$repo/build/test
+    (cd "$repo" && cmake --preset debug -B "$build" -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null)
   fi
+  cmake --build "$build" --target visual_localization_generate_messages_cpp >/dev/null
   # A file that the build does not know has no compiler options to check it with.
-  local known=() file
+  local known=() unknown=() file
   for file in "${files[@]}"; do
-    if grep -qF "\"$repo/$file\"" "$build/compile_commands.json"; then known+=("$repo/$file"); fi
+    if grep -qF "\"$repo/$file\"" "$build/compile_commands.json"; then known+=("$repo/$file"); else unknown+=("$file"); fi
   done
   echo "clang-tidy: ${#known[@]} of ${#files[@]} files are part of the build"
+  if [[ " ${unknown[*]-}" == *" src/"* ]]; then
+    echo "clang-tidy: $build does not build each file of src/ alone: ${unknown[*]}" >&2
+    exit 1
+  fi
   ((${#known[@]})) || exit 0
   printf '%s\0' "${known[@]}" | xargs -0 -n 1 -P "$(nproc)" clang-tidy -p "$build" --quiet
   echo "clang-tidy: clean"
