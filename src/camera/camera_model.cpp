@@ -108,8 +108,8 @@ constexpr double kRounding = 1e-9;  ///< relative: a camera that was scaled is s
 /// How far distort() may miss what was undistorted, normalised: at 300 pixels of focal length 0.003 pixels.
 constexpr double kRoundTrip = 1e-5;
 
-std::string asText(double value, int digits = 6) {
-  std::ostringstream out = numberStream(digits);
+std::string text(double value) {
+  std::ostringstream out = numberStream(6);
   out << value;
   return out.str();
 }
@@ -117,7 +117,7 @@ std::string asText(double value, int digits = 6) {
 void requireIn(const std::string& field, double value, double least, double most) {
   const double slack = kRounding * std::max(std::abs(least), std::abs(most));
   if (value >= least - slack && value <= most + slack) return;  // not so for NaN
-  throw CameraError(field + " = " + asText(value) + " is not in [" + asText(least) + ", " + asText(most) + "]");
+  throw CameraError(field + " = " + text(value) + " is not in [" + text(least) + ", " + text(most) + "]");
 }
 
 void requireSize(const cv::Size& size) {
@@ -148,6 +148,30 @@ void requireCoefficients(Distortion distortion, const std::vector<double>& coeff
   }
 }
 
+constexpr int kGrid = 16;  ///< cells along each side of the image
+
+/// Corners of the grid's cells from `first` to `last` along both sides, row by row.
+std::vector<Eigen::Vector2d> pixelGrid(const cv::Size& size, int first, int last) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (int row = first; row <= last; ++row) {
+    for (int column = first; column <= last; ++column) {
+      pixels.emplace_back(size.width * column / double{kGrid} - 0.5, size.height * row / double{kGrid} - 0.5);
+    }
+  }
+  return pixels;
+}
+
+/// In the middle half of the image's width and height.
+void requireUndistortion(const CameraModel& camera) {
+  const std::vector<Eigen::Vector2d> pixels = pixelGrid(camera.size(), kGrid / 4, 3 * kGrid / 4);
+  const std::vector<Eigen::Vector2d> rays = camera.undistort(pixels);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (rays[i].allFinite()) continue;
+    throw CameraError("the distortion cannot be undone at pixel (" + text(pixels[i].x()) + ", " + text(pixels[i].y()) +
+                      "), which is in the middle of the image: the coefficients do not describe this camera");
+  }
+}
+
 Eigen::Vector2d nothing() { return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()); }
 
 }  // namespace
@@ -160,37 +184,16 @@ CameraModel::CameraModel(const Intrinsics& intrinsics) : intrinsics_(intrinsics)
   const std::vector<double>& coefficients = intrinsics_.coefficients;
   pinhole_ = intrinsics_.distortion != Distortion::kEquidistant &&
              std::all_of(coefficients.begin(), coefficients.end(), [](double value) { return value == 0.0; });
-  widest_ = lens::widestRadius(intrinsics_.distortion, coefficients);
-  findUsableShare();
+  widest_ = pinhole_ ? std::tan(lens::kWidestAngle_rad) : lens::widestRadius(intrinsics_.distortion, coefficients);
+  if (!pinhole_) requireUndistortion(*this);
 }
 
-/// Undistorts a grid over the whole image. Throws CameraError when that fails in its middle.
-void CameraModel::findUsableShare() {
-  constexpr int kGrid = 16;
-  std::vector<Eigen::Vector2d> pixels;
-  for (int row = 0; row <= kGrid; ++row) {
-    for (int column = 0; column <= kGrid; ++column) {
-      pixels.emplace_back(size().width * column / double{kGrid} - 0.5, size().height * row / double{kGrid} - 0.5);
-    }
-  }
-  const std::vector<Eigen::Vector2d> rays = undistort(pixels);
-  const auto usable = [&rays](int row, int column) {
-    return rays[static_cast<std::size_t>(row * (kGrid + 1) + column)].allFinite();
-  };
-  int count = 0;
-  for (int row = 0; row <= kGrid; ++row) {
-    for (int column = 0; column <= kGrid; ++column) {
-      const bool inner = std::abs(2 * row - kGrid) <= kGrid / 2 && std::abs(2 * column - kGrid) <= kGrid / 2;
-      if (usable(row, column)) {
-        ++count;
-      } else if (inner) {
-        const Eigen::Vector2d& pixel = pixels[static_cast<std::size_t>(row * (kGrid + 1) + column)];
-        throw CameraError("the distortion cannot be undone at pixel (" + asText(pixel.x()) + ", " + asText(pixel.y()) +
-                          "), which is in the middle of the image: the coefficients do not describe this camera");
-      }
-    }
-  }
-  usable_share_ = static_cast<double>(count) / static_cast<double>(pixels.size());
+double CameraModel::usableShare() const {
+  if (pinhole_) return 1.0;
+  const std::vector<Eigen::Vector2d> rays = undistort(pixelGrid(size(), 0, kGrid));
+  const auto usable =
+      std::count_if(rays.begin(), rays.end(), [](const Eigen::Vector2d& ray) { return ray.allFinite(); });
+  return static_cast<double>(usable) / static_cast<double>(rays.size());
 }
 
 CameraModel CameraModel::scaledTo(const cv::Size& size) const {
@@ -240,6 +243,8 @@ Eigen::Vector2d CameraModel::distorted(const Eigen::Vector2d& normalised) const 
   return pinhole_ ? normalised : lens::distort(intrinsics_.distortion, intrinsics_.coefficients, normalised);
 }
 
+// Cameras as words and as named values.
+
 namespace {
 
 constexpr std::array<std::pair<Distortion, const char*>, 3> kNames = {
@@ -252,12 +257,6 @@ constexpr std::size_t kMostCoefficients = 8;
 using Number = std::pair<const char*, double Intrinsics::*>;
 constexpr std::array<Number, 4> kNumbers = {
     {{"fx", &Intrinsics::fx}, {"fy", &Intrinsics::fy}, {"cx", &Intrinsics::cx}, {"cy", &Intrinsics::cy}}};
-
-std::string text(double value) {
-  std::ostringstream out = numberStream(6);
-  out << value;
-  return out.str();
-}
 
 std::string text(const cv::Size& size) { return std::to_string(size.width) + " x " + std::to_string(size.height); }
 

@@ -59,7 +59,7 @@ class CameraModel {
   /// Whether all coefficients of a model without further effect are zero: normalised coordinates are linear in pixels.
   bool isPinhole() const { return pinhole_; }
   /// Share of the image that can be undistorted, (0, 1], found on a grid.
-  double usableShare() const { return usable_share_; }
+  double usableShare() const;
 
   /// The same camera with its images resized to `size`, by the convention of cv::resize:
   /// x' = (x + 0.5) * size.width / width - 0.5. Throws CameraError when a side of `size` is not 1 to 32768.
@@ -76,12 +76,10 @@ class CameraModel {
  private:
   Eigen::Vector2d distorted(const Eigen::Vector2d& normalised) const;
   std::vector<Eigen::Vector2d> undistorted(const std::vector<Eigen::Vector2d>& distorted) const;
-  void findUsableShare();
 
   Intrinsics intrinsics_;
   bool pinhole_ = true;
   double widest_ = 0.0;  ///< largest length of normalised coordinates of a usable ray
-  double usable_share_ = 1.0;
 };
 
 /// Equal to the last bit.
