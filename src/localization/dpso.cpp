@@ -98,10 +98,10 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
   if (input.verified_m) attract(*input.verified_m);
   TrackerEstimate result = estimate();
-  adaptSpeed();
+  adaptSpeed(input.travel);
   if (!input.verified_m) adaptDiversity(result.best);
   assignKinds();
-  centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
+  centre_of_mass_m_ = last_centre_m_ = centreOfMass();  // of the particles that count from now on
   result.tuning = tuning_;
   return result;
 }
@@ -243,13 +243,19 @@ Eigen::Vector2d Dpso::centreOfMass() const {
 }
 
 /// Holds v0 at about twice the speed of the swarm (journal, section 5, "Self-adaptive parameters").
-void Dpso::adaptSpeed() {
+void Dpso::adaptSpeed(const Travel& travel) {
   const Eigen::Vector2d centre = centreOfMass();
   if (centre_of_mass_m_) {
-    const double speed = relativeLength(centre - *centre_of_mass_m_, range_m());
+    const auto smoothed = [this](bool known, double average, double speed) {
+      return known ? (1.0 - config_.ema_alpha) * average + config_.ema_alpha * speed : speed;
+    };
     tuning_.speed_ema =
-        speed_known_ ? (1.0 - config_.ema_alpha) * tuning_.speed_ema + config_.ema_alpha * speed : speed;
+        smoothed(speed_known_, tuning_.speed_ema, relativeLength(centre - *centre_of_mass_m_, range_m()));
     speed_known_ = true;
+    if (travel.seconds > 0.0) {
+      const double speed_mps = (centre - last_centre_m_).norm() / travel.seconds;
+      tuning_.speed_mps = smoothed(tuning_.speed_mps > 0.0, tuning_.speed_mps, speed_mps);
+    }
   }
   if (!config_.adapt_speed || tuning_.recovering || !speed_known_) return;
   const double ratio = tuning_.speed_ema / tuning_.v0;
@@ -280,6 +286,8 @@ void Dpso::endRecovery() {
   speed_known_ = false;
   bad_images_ = 0;
 }
+
+// Where the particles of the swarm may go.
 
 namespace {
 

@@ -37,7 +37,7 @@ class Dpso final : public Tracker {
   TrackerEstimate estimate() const;
   Eigen::Vector2d positionOf_m(const CloudMoments& cloud) const;
   Eigen::Vector2d centreOfBest_m() const;
-  void adaptSpeed();
+  void adaptSpeed(const Travel& travel);
   void adaptDiversity(const Score& best);
   void endRecovery();
   Eigen::Vector2d centreOfMass() const;
@@ -53,9 +53,10 @@ class Dpso final : public Tracker {
   TrackerTuning tuning_;
   std::vector<Particle> particles_;
   std::vector<Fitness> fitness_;
-  std::optional<Eigen::Vector2d> attractor_m_;       ///< p^n: the best particle of the last image
-  std::optional<Eigen::Vector2d> centre_of_mass_m_;  ///< after the last image
-  bool seen_an_image_ = false;                       ///< since the last reset
+  std::optional<Eigen::Vector2d> attractor_m_;               ///< p^n: the best particle of the last image
+  std::optional<Eigen::Vector2d> centre_of_mass_m_;          ///< after the last image, shifted by the odometry since
+  Eigen::Vector2d last_centre_m_ = Eigen::Vector2d::Zero();  ///< the same, not shifted
+  bool seen_an_image_ = false;                               ///< since the last reset
   bool speed_known_ = false;
   bool position_unknown_ = true;  ///< nothing was recognised since a reset without a prior
   int bad_images_ = 0;

@@ -187,7 +187,8 @@ std::optional<MetricPose> Localizer::poseNearProposal(const TrackerEstimate& tra
 
 /// A verified pose takes the place of all comparisons but one: that with the training image whose landmarks agree most.
 TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric) {
-  const Travel travel{tracked_ns_ ? odometry_.between(*tracked_ns_, stamp_ns) : std::nullopt};
+  Travel travel;
+  if (tracked_ns_) travel = {odometry_.between(*tracked_ns_, stamp_ns), secondsBetween(*tracked_ns_, stamp_ns)};
   tracked_ns_ = stamp_ns;
   if (!metric) return tracker_->update({scores_, sweep_, travel, {}, sessions_.get()});
   const Eigen::Vector2d position_m = metric->base.translation().head<2>();

@@ -323,6 +323,7 @@ TEST(Dpso, AShareOfTheParticlesMovesWithTheOdometryAndTheSpeedIsWithoutIt) {
     const std::vector<Particle> before = swarm.particles();
     TrackerInput input = world.inTheDark();
     input.travel.odometry = OdometryIncrement{{3.0, 0.0}, 0.0, 3.0};
+    input.travel.seconds = 2.0;
     swarm.update(input);
     int moved = 0;
     for (std::size_t i = 0; i < before.size(); ++i) {
@@ -332,6 +333,7 @@ TEST(Dpso, AShareOfTheParticlesMovesWithTheOdometryAndTheSpeedIsWithoutIt) {
     }
     EXPECT_NEAR(moved, share * 80.0, share == 0.5 ? 10.0 : 0.0);
     EXPECT_NEAR(swarm.tuning().speed_ema, 0.0, 1e-12) << "the swarm itself did not move";
+    EXPECT_NEAR(swarm.tuning().speed_mps, 1.5 * share, share == 0.5 ? 0.3 : 1e-9) << "over the ground it did";
   }
 }
 

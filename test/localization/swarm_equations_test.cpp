@@ -280,12 +280,16 @@ Adaptations follow(World& world, int images, const Way& way) {
   Dpso swarm(world.map(), config, FitnessConfig(), 3);
   Adaptations seen;
   double ema = 0.0;
+  double ema_mps = 0.0;
   Eigen::Vector2d before_m = Eigen::Vector2d::Zero();
   for (int image = 0; image < images; ++image) {
     const double v0 = swarm.tuning().v0;
-    swarm.update(world.from(way(image)));
+    TrackerInput input = world.from(way(image));
+    if (image > 0) input.travel.seconds = 0.25;
+    swarm.update(input);
     const Eigen::Vector2d centre_m = centreOfTravellers(swarm);
     const double speed = (centre_m - before_m).cwiseQuotient(range_m).norm();
+    const double speed_mps = (centre_m - before_m).norm() / 0.25;
     before_m = centre_m;
     if (image == 0) {
       EXPECT_EQ(swarm.tuning().v0, v0) << "one image has no speed";
@@ -293,6 +297,8 @@ Adaptations follow(World& world, int images, const Way& way) {
     }
     ema = image == 1 ? speed : 0.875 * ema + 0.125 * speed;
     EXPECT_NEAR(swarm.tuning().speed_ema, ema, 1e-12) << image;
+    ema_mps = image == 1 ? speed_mps : 0.875 * ema_mps + 0.125 * speed_mps;
+    EXPECT_NEAR(swarm.tuning().speed_mps, ema_mps, 1e-9) << image;
     EXPECT_NEAR(swarm.tuning().v0, adapted(v0, ema, config), 1e-12) << image;
     const double change = swarm.tuning().v0 / v0;
     seen.faster += change > 1.0999 ? 1 : 0;

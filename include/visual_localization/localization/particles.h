@@ -30,6 +30,7 @@ struct Particle {
 /// What is known about the way from the last image to this one.
 struct Travel {
   std::optional<OdometryIncrement> odometry = {};  ///< the papers' models do without
+  double seconds = 0.0;                            ///< 0: unknown
 };
 
 /// Mean and covariance of a weighted cloud, metres.

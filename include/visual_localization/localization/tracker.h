@@ -23,6 +23,7 @@ struct TrackerTuning {
   double phi2 = 0.0;           ///< attraction of the best particle
   double phi0 = 0.0;           ///< random perturbation
   bool recovering = false;     ///< the position is taken to be lost
+  double speed_mps = 0.0;      ///< smoothed speed of the swarm (v_sw), metres per second; 0: not known yet
 };
 
 /// What a tracker believes after an image.
