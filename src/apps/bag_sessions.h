@@ -11,7 +11,7 @@
 #include "visual_localization/geometry/geometry_config.h"
 #include "visual_localization/map/map_builder.h"
 
-/// How recordings become sessions of a map, and what the programs say of them.
+/// How recordings become sessions of a map, how maps grow, and what the programs say of it.
 namespace visual_localization::apps {
 
 /// Which sessions will be calibrated by their images: nothing moves on the screen meanwhile.

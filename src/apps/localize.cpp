@@ -11,7 +11,6 @@
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/command_line.h"
-#include "apps/odometry_feed.h"
 #include "base/files.h"
 #include "editing/map_selection.h"
 #include "evaluation/evaluator.h"
@@ -30,6 +29,36 @@
 
 namespace visual_localization::apps {
 namespace {
+
+/// Odometry of the drive, as the robot would get it: up to the stamp of an image before the image. What lies between
+/// two images that do not follow each other was not driven.
+class OdometryFeed {
+ public:
+  explicit OdometryFeed(std::vector<OdometryReading> readings) : readings_(std::move(readings)) {
+    std::stable_sort(readings_.begin(), readings_.end(), isBefore);
+  }
+
+  void feed(std::int64_t stamp_ns, bool follows, Localizer& localizer) {
+    if (!follows) next_ = first(stamp_ns - kBefore_ns);
+    for (; next_ < readings_.size() && readings_[next_].stamp_ns <= stamp_ns; ++next_) {
+      localizer.addOdometry(readings_[next_]);
+    }
+  }
+
+ private:
+  static constexpr std::int64_t kBefore_ns = 500'000'000;
+
+  static bool isBefore(const OdometryReading& a, const OdometryReading& b) { return a.stamp_ns < b.stamp_ns; }
+
+  std::size_t first(std::int64_t stamp_ns) const {
+    const auto found =
+        std::lower_bound(readings_.begin(), readings_.end(), OdometryReading{stamp_ns, {}, 0.0}, isBefore);
+    return static_cast<std::size_t>(found - readings_.begin());
+  }
+
+  std::vector<OdometryReading> readings_;
+  std::size_t next_ = 0;
+};
 
 NodeParameters configOf(const LocalizeOptions& options) {
   // The file is the node's: most of what only the node needs is checked, but of no use here.

@@ -18,6 +18,8 @@
 namespace visual_localization::apps {
 namespace {
 
+// How map_info writes names, times, lengths and positions.
+
 constexpr std::size_t kLongestName = 40;
 constexpr int kKeyWidth = 13;
 

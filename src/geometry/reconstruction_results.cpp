@@ -1,4 +1,4 @@
-// What a reconstruction came to, as the map takes it.
+// What a reconstruction came to, as the map takes it, and how the next session is laid beside it.
 
 #include <algorithm>
 #include <cmath>

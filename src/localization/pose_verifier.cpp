@@ -255,6 +255,8 @@ MetricPose PoseVerifier::accepted(MetricPose pose) {
   return pose;
 }
 
+// Where the motion since the last verified pose leads, and what a pose says about it.
+
 namespace {
 
 constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way

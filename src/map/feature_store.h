@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "map/map_schema.h"
+#include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geometry/image_geometry.h"

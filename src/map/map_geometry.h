@@ -28,7 +28,8 @@ inline std::string unusedName(const std::string& name, const std::set<std::strin
   return unused;
 }
 
-// Fixes of a session. What is refused is a std::runtime_error in one line.
+// Where the sessions of a map lie. What is refused is a std::runtime_error in one line.
+
 /// A frame around the first believable fix.
 LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config);
 /// On the earth, since a tangent plane shows its far side near the datum again.

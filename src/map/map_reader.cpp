@@ -10,6 +10,7 @@
 #include "map/feature_store.h"
 #include "map/map_rows.h"
 #include "map/map_schema.h"
+#include "map/sqlite.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {

@@ -2,104 +2,19 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <initializer_list>
 #include <map>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
+#include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/parameters/parameters.h"
-
-struct sqlite3;
-struct sqlite3_stmt;
-
-/// The few parts of SQLite that a map needs, as objects that clean up after themselves.
-namespace visual_localization::sqlite {
-
-/// What SQLite reports, without the path: whoever catches it knows that.
-class Error : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-/// A file that SQLite does not even open.
-class OpenError : public Error {
- public:
-  using Error::Error;
-};
-
-/// Bytes inside a row; valid until the statement steps on.
-struct Bytes {
-  const std::uint8_t* data = nullptr;
-  std::size_t size = 0;
-};
-
-/// An open database file.
-class Database {
- public:
-  /// For files that may come from anyone: nothing is written beside or into the file, nothing in its schema is
-  /// executed, and neither a large schema nor a value longer than `max_value_bytes` is read.
-  static Database openUntrusted(const std::string& path, std::int64_t max_value_bytes);
-  /// For filling a new file as fast as the disk takes it: without journal, so only for a file that is thrown
-  /// away when anything fails. `path` is an empty file.
-  static Database create(const std::string& path);
-
-  ~Database();
-  Database(Database&& other) noexcept;
-  Database(const Database&) = delete;
-  Database& operator=(const Database&) = delete;
-
-  void execute(const std::string& sql);
-  /// Closes the file and reports what the destructor could not.
-  void close();
-  sqlite3* handle() const { return handle_; }
-
- private:
-  explicit Database(sqlite3* handle) : handle_(handle) {}
-  sqlite3* handle_ = nullptr;
-};
-
-/// One prepared statement. Parameters and columns count from 0.
-class Statement {
- public:
-  Statement(const Database& database, const std::string& sql);
-  ~Statement();
-  Statement(const Statement&) = delete;
-  Statement& operator=(const Statement&) = delete;
-
-  void bind(int parameter, std::int64_t value);
-  void bind(int parameter, double value);
-  void bind(int parameter, const std::string& value);
-  /// The bytes must outlive the next run().
-  void bind(int parameter, Bytes value);
-
-  /// Goes to the next row; false when there is none.
-  bool step();
-  /// Executes a statement that has no rows and makes it ready for the next values.
-  void run();
-  /// Ready to be executed anew; whatever went wrong before is forgotten.
-  void reset();
-
-  enum class Type { kInteger, kReal, kText, kBlob, kNull };
-  Type type(int column) const;
-  // Each throws Error when the column holds another type, so that nothing is converted silently.
-  std::int64_t integer(int column) const;
-  double real(int column) const;
-  std::string text(int column) const;
-  Bytes blob(int column) const;
-
- private:
-  void require(int column, Type type) const;
-
-  sqlite3* database_;
-  sqlite3_stmt* statement_ = nullptr;
-};
-
-}  // namespace visual_localization::sqlite
 
 /// What is where in a map file; shared by its reader and its writer.
 namespace visual_localization::map_schema {
@@ -203,5 +118,73 @@ using MaskBits = std::map<std::int64_t, std::vector<std::uint8_t>>;
 /// when a value or a mask is missing, unknown, of the wrong type or out of range, and when a mask does not agree with
 /// its checksum.
 MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks);
+
+// Geometry as bytes, in one order on every machine.
+
+template <class Unsigned>
+void putLittleEndian(Unsigned value, std::uint8_t* to) {
+  for (std::size_t i = 0; i < sizeof(value); ++i) to[i] = static_cast<std::uint8_t>(value >> (8 * i));
+}
+
+template <class Unsigned>
+Unsigned getLittleEndian(const std::uint8_t* from) {
+  Unsigned value = 0;
+  for (std::size_t i = 0; i < sizeof(value); ++i) value = static_cast<Unsigned>(value | Unsigned{from[i]} << (8 * i));
+  return value;
+}
+
+inline void putFloat(float value, std::uint8_t* to) {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(bits));
+  putLittleEndian(bits, to);
+}
+
+inline float getFloat(const std::uint8_t* from) {
+  const auto bits = getLittleEndian<std::uint32_t>(from);
+  float value = 0.0F;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
+
+inline void putDouble(double value, std::uint8_t* to) {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(bits));
+  putLittleEndian(bits, to);
+}
+
+inline double getDouble(const std::uint8_t* from) {
+  const auto bits = getLittleEndian<std::uint64_t>(from);
+  double value = 0.0;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
+
+/// Position (3 doubles), rotation (w, x, y, z; 4 doubles), upper triangle of the covariance row by row (21 floats).
+constexpr std::size_t kPoseBytes = 3 * 8 + 4 * 8 + 21 * 4;
+/// Up to this number of features their indices take two bytes, beyond it four.
+constexpr std::size_t kMostShortIndices = 65536;
+
+/// Bytes of a landmark in an image of so many features: 20, or 22 beyond kMostShortIndices.
+constexpr std::size_t landmarkBytes(std::size_t feature_count) {
+  return (feature_count <= kMostShortIndices ? 2 : 4) + 4 + 3 * 4 + 2;
+}
+
+/// The blobs of a row of the table `landmarks`; all numbers are little-endian.
+struct PackedGeometry {
+  std::vector<std::uint8_t> pose;    ///< kPoseBytes
+  std::vector<std::uint8_t> points;  ///< landmarkBytes() each: feature, id, offset (3 floats), classes of the sigmas
+};
+
+/// `feature_count`: SIFT features of the image. Throws std::runtime_error when the geometry is not usable, as it is or
+/// with its covariance rounded to floats: what is written can be read.
+PackedGeometry packGeometry(const ImageGeometry& geometry, std::size_t feature_count);
+/// Inverse of packGeometry(), but for the rounding of covariance and sigmas. Throws std::runtime_error when a size is
+/// wrong or the geometry not usable (see requireUsable).
+ImageGeometry unpackGeometry(sqlite::Bytes pose, sqlite::Bytes points, std::size_t feature_count);
+
+/// Class of a standard deviation in metres: the smallest whose sigma is not below it, at most 255.
+std::uint8_t sigmaClass(float sigma_m);
+/// 1 mm * 1.05^class: from 1 mm to 253 m, at most 5 % too large.
+float sigmaOf(std::uint8_t sigma_class);
 
 }  // namespace visual_localization::map_schema

@@ -8,8 +8,8 @@
 
 #include "base/files.h"
 #include "features/image_size.h"
-#include "map/map_rows.h"
 #include "map/map_schema.h"
+#include "map/sqlite.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {

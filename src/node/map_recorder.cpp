@@ -347,6 +347,8 @@ void MapRecorder::onTimer(const ros::WallTimerEvent&) {
   updater_.force_update();
 }
 
+// What the recorder shows: diagnostics, and the way in rviz.
+
 namespace {
 
 using diagnostic_msgs::DiagnosticStatus;

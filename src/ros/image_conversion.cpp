@@ -23,6 +23,15 @@
 namespace visual_localization {
 namespace {
 
+/// The size itself. Throws ImageError when an image of this size, pixels, is empty or too large to be taken.
+cv::Size requireImageSize(std::uint64_t width, std::uint64_t height) {
+  if (width == 0 || height == 0) {
+    throw ImageError("image is empty (" + std::to_string(width) + "x" + std::to_string(height) + ")");
+  }
+  if (const auto reason = whyTooLarge(width, height)) throw ImageError("image is too large: " + *reason);
+  return {static_cast<int>(width), static_cast<int>(height)};
+}
+
 using Bytes = std::vector<std::uint8_t>;
 
 /// Each scan of a progressive JPEG goes over all its pixels and may take ten bytes; encoders write about ten of them.
@@ -205,14 +214,6 @@ void requireKnown(const Bytes& file) {
 }
 
 }  // namespace
-
-cv::Size requireImageSize(std::uint64_t width, std::uint64_t height) {
-  if (width == 0 || height == 0) {
-    throw ImageError("image is empty (" + std::to_string(width) + "x" + std::to_string(height) + ")");
-  }
-  if (const auto reason = whyTooLarge(width, height)) throw ImageError("image is too large: " + *reason);
-  return {static_cast<int>(width), static_cast<int>(height)};
-}
 
 cv::Mat decodedToGrey(const Bytes& file) {
   requireKnown(file);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/numbers.h"
-#include "map/map_rows.h"
+#include "map/map_schema.h"
 #include "visual_localization/localization/scores.h"
 
 namespace visual_localization {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "map/map_rows.h"
+#include "map/map_schema.h"
 #include "test/map/stored_geometry.h"
 
 namespace visual_localization {

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "map/map_rows.h"
 #include "map/map_schema.h"
 #include "test/support/example_map.h"
 

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "map/map_rows.h"
+#include "map/map_schema.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {

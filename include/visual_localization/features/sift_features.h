@@ -70,7 +70,7 @@ struct SiftConfig {
   int max_features = 0;
 
   /// What holds instead of max_features 0: far more than an image with structure has, and few enough that dense noise,
-  /// 4 features of 1000 pixels, is matched in a second or two; time grows with the square.
+  /// with four features per 1000 pixels, is matched in a second or two; time grows with the square.
   static constexpr int kMostFeatures = 20000;
 
   void declare(ParameterVisitor& visitor);

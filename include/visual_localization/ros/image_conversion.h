@@ -31,9 +31,6 @@ cv::Mat toGrey(const sensor_msgs::CompressedImage& message);
 cv::Size sizeOf(const sensor_msgs::Image& message);
 cv::Size sizeOf(const sensor_msgs::CompressedImage& message);
 
-/// The size itself. Throws ImageError when an image of this size, pixels, is empty or too large to be taken.
-cv::Size requireImageSize(std::uint64_t width, std::uint64_t height);
-
 /// Size of a JPEG or a PNG by its header, pixels; nothing is decoded. Throws ImageError when it is neither, empty or
 /// too large, and a JPEG that is cut off.
 cv::Size compressedSize(const std::vector<std::uint8_t>& file);
