@@ -1,6 +1,8 @@
 """Figures of curves: errors over images and speeds, single runs, swarm diversity."""
 import math
 import re
+from itertools import accumulate
+from statistics import median
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from matplotlib.lines import Line2D
@@ -138,45 +140,70 @@ def log_speeds(axis: plt.Axes, speeds: Sequence[float]) -> None:
 
 
 def runs_figure(traces: Dict[str, Series], palette: Palette, title: str) -> Optional[plt.Figure]:
-    """Error, speed limit and speed of the swarm in single runs; recovery is shaded ([J] Fig. 5)."""
+    """Cumulated error, speed limit and speed of the swarm in single runs; recovery is shaded ([J] Fig. 5)."""
     swarms = {method: series for method, series in traces.items() if series.has('v0') and series.has('err_m')}
     if not swarms:
         return None
-    handles: List[Any] = [Line2D([], [], color=COLOURS['black'], label='error'),
+    handles: List[Any] = [Line2D([], [], color=COLOURS['black'], label='cumulated error'),
                           Line2D([], [], color=COLOURS['vermillion'], linestyle='--', label='speed limit v₀'),
                           Line2D([], [], color=COLOURS['blue'], label='speed of the swarm (EMA)')]
+    if any(series.has('robot_mps') for series in swarms.values()):
+        handles.append(Line2D([], [], color=COLOURS['green'], linestyle=':', label='speed of the robot v_R (median)'))
     if any(series.has('recovering') and any(value == 1 for value in series.columns['recovering'])
            for series in swarms.values()):
         handles.append(Patch(facecolor=COLOURS['orange'], alpha=.3, label='recovering'))
     figure, axes = page(title, len(swarms), 1, 2.1, handles, legend_width=len(handles), share_x=True)
-    top = max(value for series in swarms.values() for value in series.columns['err_m'] if math.isfinite(value))
-    fastest = max(value for series in swarms.values() for name in ('v0', 'speed_ema')
-                  for value in series.columns.get(name, []) if math.isfinite(value))
+    top = max(cumulated(series.columns['err_m'])[-1] for series in swarms.values())
+    metric = all(series.has('swarm_mps') for series in swarms.values())
+    fastest = max((value for series in swarms.values() for name in ('limit', 'swarm')
+                   for value in speeds_of(series, metric)[name] if math.isfinite(value)), default=0)
     for axis, (method, series) in zip(axes, swarms.items()):
-        draw_run(axis, series)
+        draw_run(axis, series, metric)
         axis.set(title=literal(method), ylim=(0, top * 1.05 or 1))
-        figure.axes[-1].set_ylim(0, fastest * 105 or 1)
+        figure.axes[-1].set_ylim(0, fastest * 1.05 or 1)
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     axes[-1].set_xlabel('images since the start')
     return figure
 
 
-def draw_run(axis: plt.Axes, series: Series) -> None:
-    """One run: error on the left axis, speeds on the right axis."""
+def cumulated(errors: Sequence[float]) -> List[float]:
+    """The sum of the errors so far; an error that is not known adds nothing."""
+    return list(accumulate(0 if math.isnan(error) else error for error in errors))
+
+
+def speeds_of(series: Series, metric: bool) -> Dict[str, List[float]]:
+    """Speed limit, swarm and robot: metres per second, or per cent of the map's range per image.
+
+    The limit is a share of the range, which each axis has of its own; in m/s it is that for the swarm's direction.
+    """
+    limit, swarm = (series.columns.get(name, []) for name in ('v0', 'speed_ema'))
+    if not metric:
+        return {'limit': [100 * value for value in limit], 'swarm': [100 * value for value in swarm], 'robot': []}
+    metres = series.columns['swarm_mps']
+    return {'limit': [v0 * mps / share if share else math.nan for v0, share, mps in zip(limit, swarm, metres)],
+            'swarm': metres, 'robot': series.columns.get('robot_mps', [])}
+
+
+def draw_run(axis: plt.Axes, series: Series, metric: bool) -> None:
+    """One run: cumulated error on the left axis, speeds on the right axis."""
     if series.has('recovering'):
         shade(axis, series.step, series.columns['recovering'])
-    axis.plot(series.step, series.columns['err_m'], color=COLOURS['black'], linewidth=1.2)
-    axis.set_ylabel('error [m]')
+    axis.plot(series.step, cumulated(series.columns['err_m']), color=COLOURS['black'], linewidth=1.2)
+    axis.set_ylabel('cumulated error [m]')
     axis.set_xlim(series.step[0], series.step[-1])
     right = axis.twinx()
     right.grid(False)
     right.spines['right'].set_visible(True)
-    for name, style in (('v0', {'color': COLOURS['vermillion'], 'linestyle': '--'}),
-                        ('speed_ema', {'color': COLOURS['blue']})):
-        if series.has(name):
-            right.plot(series.step, [100 * value for value in series.columns[name]], linewidth=1.1, **style)
-    right.set_ylabel('speed [% of the\nrange per image]')
+    speeds = speeds_of(series, metric)
+    for name, style in (('limit', {'color': COLOURS['vermillion'], 'linestyle': '--'}),
+                        ('swarm', {'color': COLOURS['blue']})):
+        if speeds[name]:
+            right.plot(series.step, speeds[name], linewidth=1.1, **style)
+    robot = [value for value in speeds['robot'] if math.isfinite(value)]
+    if robot:
+        right.axhline(median(robot), color=COLOURS['green'], linestyle=':', linewidth=1.1)
+    right.set_ylabel('speed [m/s]' if metric else 'speed [% of the\nrange per image]')
 
 
 def shade(axis: plt.Axes, steps: Sequence[float], flags: Sequence[float]) -> None:

@@ -15,7 +15,7 @@ KEYS = ('train_group', 'test_group', 'method')
 NEEDED_MEASURES = ('mean_err_m',)
 CURVES = ('mean_err_m', 'comparisons', 'sift_share')
 TRACES = ('err_m', 'v0', 'speed_ema', 'quantum_share', 'phi2', 'recovering', 'spread_x_m', 'spread_y_m', 'diversity_m',
-          'similarity', 'comparisons')
+          'similarity', 'comparisons', 'swarm_mps', 'robot_mps')
 
 
 class DataError(Exception):

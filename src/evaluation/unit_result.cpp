@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <locale>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "base/numbers.h"
 #include "base/text.h"
+#include "base/time.h"
 #include "evaluation/metrics.h"
 
 namespace visual_localization {
@@ -74,6 +76,13 @@ double mostOf(std::vector<double> errors_m) {
   return quantile(errors_m, kMost);
 }
 
+/// How fast the robot truly was between two images, m/s; nothing where a true position is missing or time goes back.
+std::optional<double> robotSpeed_mps(const TraceRecord& before, const TraceRecord& now) {
+  const double seconds = secondsBetween(before.estimate.stamp_ns, now.estimate.stamp_ns);
+  if (!before.truth_m || !now.truth_m || seconds <= 0.0) return std::nullopt;
+  return (*now.truth_m - *before.truth_m).norm() / seconds;
+}
+
 std::string traceRow(const RunRecord& run, std::size_t step) {
   const TraceRecord& trace = run.trace[step];
   const Estimate& estimate = trace.estimate;
@@ -88,7 +97,11 @@ std::string traceRow(const RunRecord& run, std::size_t step) {
   }
   out << ',' << (tuning.recovering ? 1 : 0) << ',' << estimate.tracked.spread_m.x() << ','
       << estimate.tracked.spread_m.y() << ',' << trace.diversity_m << ',' << estimate.tracked.best.similarity << ','
-      << estimate.comparisons << ',' << toString(estimate.evidence.features);
+      << estimate.comparisons << ',' << toString(estimate.evidence.features) << ',';
+  if (tuning.speed_mps > 0.0) out << tuning.speed_mps;
+  out << ',';
+  const auto robot_mps = step > 0 ? robotSpeed_mps(run.trace[step - 1], trace) : std::nullopt;
+  if (robot_mps) out << *robot_mps;
   return out.str();
 }
 
@@ -96,7 +109,7 @@ std::string traceRow(const RunRecord& run, std::size_t step) {
 
 const char* const kTraceColumns =
     "start,step,image,err_m,v0,speed_ema,quantum_share,phi2,recovering,spread_x_m,spread_y_m,diversity_m,similarity,"
-    "comparisons,features";
+    "comparisons,features,swarm_mps,robot_mps";
 
 UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& costs) {
   UnitResult unit;

@@ -136,7 +136,7 @@ TEST_F(ResultTables, MethodsWithoutPosesLeaveTheirFieldsEmpty) {
 
 TEST_F(ResultTables, TracedRunsBecomeTrajectories) {
   UnitResult unit = test::unitOf(2, 2, 1.0);
-  unit.trace = {"7,0,7,,,,,,0,1,1,1,1,1,SIFT", "7,1,8,,,,,,0,1,1,1,1,1,SIFT"};
+  unit.trace = {"7,0,7,,,,,,0,1,1,1,1,1,SIFT,,", "7,1,8,,,,,,0,1,1,1,1,1,SIFT,,"};
   unit.trajectory = {{"1.5 1 2 0 0 0 0 1", "1.5 1 2.5 0 0 0 0 1"}, {"2.5 2 2 0 0 0 0 1", ""}};
   results_.save(0, 0, unit);
   writeResultTables(test::smallExperiment(), results_);

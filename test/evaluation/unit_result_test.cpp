@@ -1,6 +1,8 @@
 #include "evaluation/unit_result.h"
 
 #include <limits>
+#include <map>
+#include <sstream>
 #include <stdexcept>
 
 #include <gmock/gmock.h>
@@ -29,6 +31,15 @@ UnitResult exampleUnit() {
   traced.sift_comparisons = 30;
   traced.method_ms = 0.3;
   return summariseRuns({traced, runWithErrors(0, {4.0F, kUnknown})}, {20.0, 2.0, 0.5, 0.01});
+}
+
+/// The fields of a row of a trace, by their columns.
+std::map<std::string, std::string> fieldsOf(const std::string& row) {
+  std::map<std::string, std::string> fields;
+  std::istringstream names(kTraceColumns);
+  std::istringstream values(row);
+  for (std::string name; std::getline(names, name, ',');) std::getline(values, fields[name], ',');
+  return fields;
 }
 
 std::string refusal(const std::string& text) {
@@ -98,6 +109,26 @@ TEST(UnitResult, RefusesATextThatLostALineOrHasOneTwice) {
     }
     begin = end;
   }
+}
+
+TEST(UnitResult, ATraceHasTheSpeedsOfSwarmAndRobot) {
+  RunRecord run = runWithErrors(0, {1.0F, 1.0F, 1.0F, 1.0F});
+  run.trace.resize(run.steps.size());
+  for (std::size_t i = 0; i < run.trace.size(); ++i) {
+    run.trace[i].estimate.stamp_ns = static_cast<std::int64_t>(i) * 500'000'000;
+    run.trace[i].truth_m = Eigen::Vector2d(0.3 * static_cast<double>(i), 0.0);
+    run.trace[i].estimate.tracked.tuning.v0 = 0.01;
+    run.trace[i].estimate.tracked.tuning.speed_mps = 0.25 * static_cast<double>(i);
+  }
+  run.trace[2].truth_m.reset();
+  const UnitResult unit = summariseRuns({run}, {});
+  EXPECT_EQ(fieldsOf(unit.trace[0])["swarm_mps"], "") << "one image has no speed";
+  EXPECT_EQ(fieldsOf(unit.trace[0])["robot_mps"], "");
+  EXPECT_EQ(fieldsOf(unit.trace[1])["swarm_mps"], "0.25");
+  EXPECT_DOUBLE_EQ(std::stod(fieldsOf(unit.trace[1])["robot_mps"]), 0.6);
+  EXPECT_EQ(fieldsOf(unit.trace[2])["robot_mps"], "") << "no true position";
+  EXPECT_EQ(fieldsOf(unit.trace[3])["robot_mps"], "") << "nor before";
+  EXPECT_EQ(fieldsOf(unit.trace[3])["swarm_mps"], "0.75");
 }
 
 TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
