@@ -125,3 +125,9 @@ def ratio_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
         chosen = next((name for name in ('DPSO-80', 'hybrid') if name in methods), methods[0] if methods else '')
         pairs = [(chosen, method) for method in methods if method != chosen]
     return [pair for pair in pairs if pair[0] in methods and pair[1] in methods]
+
+
+def tested_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
+    """The pairs of methods of which the first has the lower error by a t-test in the papers ([J] section 7.3)."""
+    pairs = [(better, worse) for better in ('DPSO-80', 'PF-l-300') for worse in ('PF-g-100', 'PF-g-300', 'PF-l-100')]
+    return [pair for pair in pairs if experiment == 'comparison' and pair[0] in methods and pair[1] in methods]

@@ -1,13 +1,19 @@
 """The comparison with the papers in sentences: order, ratios, and whether they agree."""
+import math
 from itertools import combinations
-from typing import Dict, List, NamedTuple, Tuple
+from statistics import NormalDist
+from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from .data import Group, Outcome, Results
-from .experiments import by_illumination, count_of, group_title, marginals, ratio_pairs
+from .experiments import by_illumination, count_of, group_title, marginals, ratio_pairs, tested_pairs
 from .papers import Papers
 
 # Ratios this close count as equal: images and robot are not the papers'.
 TOLERANCE = 0.25
+# Of the papers' t-tests, one-sided ([J] section 7.3).
+SIGNIFICANCE = 0.005
+# With fewer runs a t-test needs another distribution than the normal one.
+FEWEST_RUNS = 100
 # At most this many reversed pairs are listed; the table shows all.
 LISTED = 6
 RATIO_METRICS = {'mean_err_m': 'mean error', 'comparisons_per_image': 'comparisons per image'}
@@ -30,6 +36,7 @@ class Words:
         self.lines: List[str] = []
         self._ratios = [0, 0]
         self._order = [0, 0]
+        self._tests = [0, 0]
 
     def heading(self, text: str) -> None:
         """Starts a section."""
@@ -40,7 +47,8 @@ class Words:
         if section.lines:
             self.heading(title)
             self.lines += section.lines
-            for own, other in ((self._ratios, section._ratios), (self._order, section._order)):
+            for own, other in ((self._ratios, section._ratios), (self._order, section._order),
+                               (self._tests, section._tests)):
                 own[:] = [a + b for a, b in zip(own, other)]
 
     def order(self, what: str, both: Both) -> None:
@@ -67,19 +75,33 @@ class Words:
         if not both.ours[second] or not both.papers[second]:
             return
         here, there = both.ours[first] / both.ours[second], both.papers[first] / both.papers[second]
-        self.agreement(f'{what}, `{first}` / `{second}`', here, there)
+        self.agreement(f'{what}, `{first}` / `{second}`', here, there, is_reversed=(here - 1) * (there - 1) < 0)
 
-    def agreement(self, what: str, here: float, there: float, scale: float = 1, unit: str = '') -> None:
-        """Two numbers that should be equal, and their relative difference."""
+    def agreement(self, what: str, here: float, there: float, scale: float = 1, unit: str = '', *,
+                  is_reversed: bool = False) -> None:
+        """Two numbers that should be equal, and their relative difference. Those with another winner do not agree."""
         if not there:
             return
         line = (f'- {what[0].upper() + what[1:]}: {scale * here:.2f}{unit} here, {scale * there:.2f}{unit} in the '
                 'papers: ')
         off = here / there - 1
-        agrees = abs(off) <= TOLERANCE
+        agrees = abs(off) <= TOLERANCE and not is_reversed
         self._ratios[0] += agrees
         self._ratios[1] += 1
-        self.lines.append(line + f'{"agrees" if agrees else "**differs**"} ({100 * off:+.0f} %).')
+        verdict = '**reversed**' if is_reversed else 'agrees' if agrees else '**differs**'
+        self.lines.append(f'{line}{verdict} ({100 * off:+.0f} %).')
+
+    def t_test(self, better: Outcome, worse: Outcome) -> None:
+        """Whether a method has the lower error by a t-test, as in the papers."""
+        t = welch_t(better, worse)
+        if t is None:
+            return
+        agrees = NormalDist().cdf(t) < SIGNIFICANCE
+        self._tests[0] += agrees
+        self._tests[1] += 1
+        verdict = 'agrees' if agrees else '**not reproduced**'
+        self.lines.append(f'- Error of `{better.method}` below that of `{worse.method}` by a t-test: t = {t:.0f}; papers: '
+                          f'below, on a level of {100 * SIGNIFICANCE:g} %: {verdict}.')
 
     def text(self) -> str:
         """All sentences, the tally first."""
@@ -88,10 +110,24 @@ class Words:
         tally = []
         if self._ratios[1]:
             tally.append(f'{self._ratios[0]} of {self._ratios[1]} ratios agree with the papers within '
-                         f'{100 * TOLERANCE:.0f} %')
+                         f'{100 * TOLERANCE:.0f} % and have the same winner')
         if self._order[1]:
             tally.append(f'{self._order[0]} of {self._order[1]} pairs of methods are in the papers\' order')
+        if self._tests[1]:
+            tally.append(f'{self._tests[0]} of {self._tests[1]} t-tests have the papers\' result; runs share their '
+                         'images, so here and there they take differences for more certain than they are')
         return ('; '.join(tally) + '.\n' if tally else '') + '\n'.join(self.lines) + '\n'
+
+
+def welch_t(first: Outcome, second: Outcome) -> Optional[float]:
+    """Welch's t of the mean errors of two methods; None when it is not known or the runs are few."""
+    values = [outcome.get(name) for outcome in (first, second) for name in ('mean_err_m', 'std_err_m', 'runs')]
+    if any(value is None for value in values):
+        return None
+    mean_a, std_a, runs_a, mean_b, std_b, runs_b = values  # type: ignore[misc]
+    if min(runs_a, runs_b) < FEWEST_RUNS or std_a + std_b == 0:
+        return None
+    return (mean_a - mean_b) / math.sqrt(std_a ** 2 / runs_a + std_b ** 2 / runs_b)
 
 
 def ranking(values: Dict[str, float]) -> str:
@@ -131,6 +167,9 @@ def compare(words: Words, experiment: str, group: Group, outcomes: List[Outcome]
         words.order(what, found[metric])
         for first, second in ratio_pairs(experiment, list(found[metric].ours)):
             words.ratio(what, first, second, found[metric])
+    by_method = {outcome.method: outcome for outcome in outcomes}
+    for better, worse in tested_pairs(experiment, list(by_method)):
+        words.t_test(by_method[better], by_method[worse])
 
 
 def compare_cost(words: Words, results: Results, papers: Papers) -> None:
