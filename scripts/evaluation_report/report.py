@@ -1,13 +1,18 @@
 """Assembles the report."""
+import sys
 from pathlib import Path
 from typing import List, Optional, Tuple
 
-from .data import Results, read_results
+from .data import DataError, Results, read_description, read_results
+from .discussion import discussed
 from .figures import Figures
 from .files import written_whole
 from .papers import Papers
 from .tables import escape, filtered_tables, pose_tables, relative_tables, result_tables, tracking_tables, trust_tables
 from .words import in_words
+
+
+DISCUSSION = '\n## Discussion\n\n'
 
 
 def counted(count: int, what: str) -> str:
@@ -43,15 +48,29 @@ def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]]
                           ('Poses behind a filter', filtered_tables(results))):
         text += f'\n## {title}\n\n{tables}' if tables else ''
     text += '\n## Comparison with the papers\n\n' + in_words(results, papers)
-    discussion = results.description.get('discussion')
-    if discussion:
-        text += f'\n## Discussion\n\n{str(discussion).rstrip()}\n'
+    if results.description.get('discussion'):
+        text += f'{DISCUSSION}\n'
     if figures:
         text += '\n## Figures\n\n' + '\n\n'.join(f'![{escape(caption)}](figures/{name})' for name, caption in figures)
         text += '\n'
     text += '\n## Tracking and cost\n\n' + tracking_tables(results)
     trust = trust_tables(results)
-    return text + (f'\n## Reliability of the states\n\n{trust}' if trust else '')
+    text += f'\n## Reliability of the states\n\n{trust}' if trust else ''
+    return with_discussion(text, str(results.description.get('discussion', '')))
+
+
+def with_discussion(report: str, discussion: str) -> str:
+    """The report with this discussion, computed from its tables, in place of the one it has."""
+    before, heading, after = report.partition(DISCUSSION)
+    if not heading:
+        return report
+    next_section = after.find('\n## ')
+    rest = after[next_section:] if next_section >= 0 else ''
+
+    def warn(text: str) -> None:
+        print(f'report_evaluation: {text}', file=sys.stderr)
+
+    return before + heading + discussed(discussion, before + rest, warn) + rest
 
 
 def write_report(folder: Path, papers_path: Optional[Path], file_format: str) -> int:
@@ -63,3 +82,15 @@ def write_report(folder: Path, papers_path: Optional[Path], file_format: str) ->
     with written_whole(folder / 'report.md') as partial:
         partial.write_text(text, encoding='utf-8')
     return len(figures)
+
+
+def renew_discussion(folder: Path, experiment: Path) -> None:
+    """Computes the discussion of a report again, from its own tables and the text of an experiment's YAML file."""
+    report = folder / 'report.md'
+    try:
+        text = report.read_text(encoding='utf-8')
+    except OSError as error:
+        raise DataError(report, error.strerror or 'cannot be read') from error
+    discussion = read_description(experiment).get('discussion', '')
+    with written_whole(report) as partial:
+        partial.write_text(with_discussion(text, str(discussion)), encoding='utf-8')

@@ -14,7 +14,7 @@ SUMMARY = ('experiment,train_group,test_group,method,runs,mean_err_m,std_err_m,c
            'sift_share,median_err_m,within_5m,steps_to_localise,steps_to_relocalise,recall_at_p99,extract_ms,match_ms,'
            'update_ms').split(',')
 TRACES = ('train_round,test_round,method,start,step,image,err_m,v0,speed_ema,quantum_share,phi2,recovering,spread_x_m,'
-          'spread_y_m,diversity_m,similarity,comparisons,features').split(',')
+          'spread_y_m,diversity_m,similarity,comparisons,features,swarm_mps,robot_mps').split(',')
 PAPERS = 'experiment,source,train_group,test_group,method,metric,value'.split(',')
 SAME, OTHER = ('sunny', 'sunny'), ('sunny', 'cloudy')
 
@@ -55,8 +55,8 @@ class Evaluation:
                                                        .2 * math.sin(step / 5 + index), 3),
                                    'comparisons': 30, 'sift_share': .05})
 
-    def trace(self, name: str, swarm: bool = True) -> None:
-        """One run that loses its position for a while."""
+    def trace(self, name: str, swarm: bool = True, metric: bool = True) -> None:
+        """One run that loses its position for a while. `metric`: with speeds in metres per second."""
         for step in range(365):
             lost = 290 <= step < 320
             row = {'train_round': 'sunny_1', 'test_round': 'cloudy_1', 'method': name, 'start': 7, 'step': step,
@@ -64,6 +64,8 @@ class Evaluation:
                    'recovering': int(lost and 'without' not in name) if swarm else '',
                    'diversity_m': round((8 if swarm else 17 + len(name)) + 9 * lost + math.sin(step / 7), 3),
                    'similarity': .2, 'comparisons': 22, 'features': 'sift'}
+            if swarm and metric:
+                row.update(swarm_mps=round(.6 + lost, 4), robot_mps='' if step % 100 == 0 else .6)
             if swarm:
                 row.update(v0=round(.012 + .05 * lost, 4), speed_ema=round(.006 + .01 * lost, 4))
             self.traces.append(row)
@@ -153,9 +155,60 @@ class ReportTest(unittest.TestCase):
         self.assertIn('Here: `PF-l-300` < `PF-l-100` < `DPSO-80`. Papers: `PF-l-300` < `DPSO-80` < `PF-l-100`. '
                       '2 of 3 pairs are in the papers\' order. Reversed: `DPSO-80` and `PF-l-100` (papers 2.54 < 2.8, '
                       'here 3 ≥ 2.9).', text)
-        self.assertIn('2 of 4 ratios agree with the papers within 25 %; 4 of 6 pairs', text)
+        self.assertIn('1 of 4 ratios agree with the papers within 25 % and have the same winner; 4 of 6 pairs', text)
         self.assertIn('## Discussion\n\nBecause of the light.\n\n- and of *this*\n', text)
         self.assertIn('a paper \\| its Table', text)
+
+    def test_the_discussion_is_computed_from_the_tables_and_can_be_renewed(self):
+        evaluation = self.evaluation('own')
+        evaluation.method(SAME, 'a', 1.5, 20)
+        evaluation.method(SAME, 'b', 2.5, 30)
+        evaluation.write('`a` has {mean error | a} m, {mean error | a < b ? less : no less} than `b`; {odd | }.')
+        result = run(evaluation.folder)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('discussion: {odd | }: must be', result.stderr)
+        report = evaluation.folder / 'report.md'
+        self.assertIn('`a` has 1.50 m, less than `b`; {odd | }.', report.read_text(encoding='utf-8'))
+        report.write_text(report.read_text(encoding='utf-8').replace('| b | 2.50', '| b | 1.20'), encoding='utf-8')
+        result = run(evaluation.folder, '--discussion', evaluation.folder / 'experiment.yaml')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('`a` has 1.50 m, no less than `b`', report.read_text(encoding='utf-8'))
+        result = run(evaluation.folder.parent, '--discussion', evaluation.folder / 'experiment.yaml')
+        self.assertEqual((result.returncode, result.stdout), (1, ''))
+        self.assertIn('report.md: No such file', result.stderr)
+
+    def test_another_winner_does_not_agree_however_close(self):
+        for error, verdict in ((2.6, 'agrees (-3 %)'), (2.5, 'agrees (-6 %)'), (2.3, '**reversed** (-14 %)'),
+                               (1.9, '**reversed** (-29 %)')):
+            with self.subTest(error):
+                evaluation = self.evaluation('particles')
+                evaluation.method(OTHER, 'DPSO-80', error, 20)
+                evaluation.method(OTHER, 'PF-l-300', 2.5, 40)
+                evaluation.write()
+                self.assertEqual(run(evaluation.folder).returncode, 0)
+                text = (evaluation.folder / 'report.md').read_text(encoding='utf-8')
+                self.assertIn(f'Mean error, `DPSO-80` / `PF-l-300`: {error / 2.5:.2f} here, 1.07 in the papers: {verdict}',
+                              text)
+                self.assertIn(f'{int("agrees" in verdict)} of 2 ratios agree', text)
+
+    def test_the_comparison_has_the_t_tests_of_the_paper(self):
+        evaluation = self.evaluation('comparison')
+        evaluation.method(OTHER, 'DPSO-80', 2.0, 20, std_err_m=.3)
+        evaluation.method(OTHER, 'PF-l-100', 2.1, 40, std_err_m=.4)
+        evaluation.method(OTHER, 'PF-g-300', 1.9, 40, std_err_m=.4)
+        evaluation.method(OTHER, 'PF-l-300', 2.06, 40, std_err_m=.4)
+        evaluation.method(OTHER, 'PF-g-100', 2.9, 40, std_err_m=.4, runs=99)
+        evaluation.write()
+        self.assertEqual(run(evaluation.folder).returncode, 0)
+        text = (evaluation.folder / 'report.md').read_text(encoding='utf-8')
+        self.assertIn('- Error of `DPSO-80` below that of `PF-l-100` by a t-test: t = -4; papers: below, on a level of 0.5 %'
+                      ': agrees.', text)
+        self.assertIn('`DPSO-80` below that of `PF-g-300` by a t-test: t = 4; papers: below, on a level of 0.5 %: '
+                      '**not reproduced**.', text)
+        self.assertIn('`PF-l-300` below that of `PF-l-100` by a t-test: t = -1; papers: below, on a level of 0.5 %: '
+                      '**not reproduced**.', text)
+        self.assertNotIn('that of `PF-g-100`', text)  # too few runs
+        self.assertIn('; 1 of 4 t-tests have the papers\' result; runs share', text)
 
     def test_poses_have_tables_of_their_own(self):
         evaluation = self.evaluation('metric')
@@ -214,6 +267,19 @@ class ReportTest(unittest.TestCase):
         evaluation.write()
         text = self.report(figures=('run', 'diversity', 'diversity_filters'))
         self.assertIn('The papers give no numbers for this experiment.', text)
+        drawn = (self.folder / 'figures/run.svg').read_text(encoding='utf-8')
+        for words in ('cumulated error [m]', 'speed [m/s]', 'speed of the robot v_R'):
+            self.assertIn(words, drawn)
+
+    def test_a_run_without_metric_speeds_is_drawn_in_shares_of_the_range(self):
+        evaluation = self.evaluation('single_run')
+        evaluation.fill(['paper recovery'])
+        evaluation.trace('paper recovery', metric=False)
+        evaluation.write()
+        self.report(figures=('run',))
+        drawn = (self.folder / 'figures/run.svg').read_text(encoding='utf-8')
+        self.assertIn('range per image]', drawn)
+        self.assertNotIn('[m/s]', drawn)
 
     def test_motion_grid_has_the_shape_of_the_table(self):
         evaluation = self.evaluation('motion_grid')
