@@ -106,7 +106,9 @@ std::string ChildProcess::errorOutputOf(const std::vector<std::string>& command)
     if (error == 0) process_ = process;
   }
   ::close(pipe[1]);
-  if (error == 0 && niceness_ != 0) ::setpriority(PRIO_PROCESS, static_cast<id_t>(process), niceness_);
+  if (error == 0 && niceness_ != 0) {
+    ::setpriority(PRIO_PROCESS, static_cast<id_t>(process), ::getpriority(PRIO_PROCESS, 0) + niceness_);
+  }
   const std::string output = readAll(pipe[0]);
   ::close(pipe[0]);
   if (error != 0) throw std::runtime_error("cannot be started: " + hint_ + std::strerror(error));

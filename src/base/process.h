@@ -18,7 +18,7 @@ std::string programOfPackage(const std::string& name);
 /// A program that runs as a process of its own.
 class ChildProcess {
  public:
-  /// `niceness`: see nice(1). `hint`: what may be missing when it cannot be started.
+  /// `niceness`: how much nicer than this process, see nice(1). `hint`: what may be missing when it cannot be started.
   explicit ChildProcess(int niceness = 0, std::string hint = "") : niceness_(niceness), hint_(std::move(hint)) {}
 
   /// Runs a program to its end and returns what it wrote to its standard error; its output goes to ours. Throws
