@@ -205,6 +205,14 @@ std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) 
 
 constexpr std::size_t kMostStarts = 1000000;
 
+Pruning readPruning(YamlMap& yaml) {
+  const std::string name = yaml.text("pruning", "previous");
+  if (name == "previous") return Pruning::kPrevious;
+  if (name == "both") return Pruning::kBoth;
+  if (name != "none") yaml.refuse("pruning", "= '" + name + "' must be previous, both or none");
+  return Pruning::kNone;
+}
+
 std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   std::vector<RoundSpec> rounds;
   RoundSpec common;
@@ -223,6 +231,7 @@ std::vector<RoundSpec> readRounds(YamlMap& yaml) {
     round.truth_topic = bag.text("truth_topic", common.truth_topic);
     round.camera_info = bag.text("camera_info", common.camera_info);
     round.poses = bag.text("poses", "");
+    round.pruning = readPruning(bag);
     bag.requireNoMore();
     const bool usable = !round.name.empty() && round.name.find_first_of("/ ,\"\n") == std::string::npos;
     if (!usable) bag.refuse("name", "= '" + round.name + "' must be a name without slash, comma, quote or space");

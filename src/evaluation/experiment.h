@@ -6,11 +6,17 @@
 #include <vector>
 
 #include "evaluation/place_recogniser.h"
-#include "parameters/yaml_map.h"
 #include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/map/map_builder.h"
 
 namespace visual_localization {
+
+/// Which images decide what is noise among the features of a drive's image.
+enum class Pruning {
+  kPrevious,  ///< the one before, as on a robot (Weiss et al., section III)
+  kBoth,      ///< the one before and the one after (Kronfeld et al., conference section VI, journal section 6)
+  kNone,      ///< no features are dropped, those of a map's images neither
+};
 
 /// One recorded round of an experiment.
 struct RoundSpec {
@@ -22,6 +28,7 @@ struct RoundSpec {
   std::string truth_topic;  ///< what estimates are judged by; if it is the fix topic, its cleaned positions
   std::string camera_info;  ///< calibration, a file beside the bag; empty: the bag's camera_info
   std::string poses;        ///< true poses of the camera, a file beside the bag; empty: not known
+  Pruning pruning = Pruning::kPrevious;
 };
 
 /// One round becomes the map, another one is driven. Indices into Experiment::rounds.

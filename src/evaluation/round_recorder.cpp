@@ -78,8 +78,10 @@ void forEachImage(const BagReader& bag, const std::string& topic,
 class DriveRecorder {
  public:
   /// `image_size`: of most images. `for_poses`: keeps features that are not pruned.
-  DriveRecorder(const SiftConfig& sift, const LocalizerConfig& config, cv::Size image_size, bool for_poses)
-      : sift_(sift), config_(config), for_poses_(for_poses) {
+  DriveRecorder(const SiftConfig& sift, const LocalizerConfig& config, Pruning pruning, cv::Size image_size,
+                bool for_poses)
+      : sift_(sift), config_(config), by_both_(config.prune && pruning == Pruning::kBoth), for_poses_(for_poses) {
+    config_.prune = config.prune && pruning == Pruning::kPrevious;
     drive_.image_size = image_size;
   }
 
@@ -97,11 +99,15 @@ class DriveRecorder {
     const CpuStopwatch global_watch;
     image.global = front_end_->global();
     drive_.global_ms += global_watch.elapsed_ms();
-    if (for_poses_) image.unpruned = front_end_->unprunedSift();
+    if (for_poses_ || by_both_) image.unpruned = front_end_->unprunedSift();
     drive_.images.push_back(std::move(image));
   }
 
   Drive finish() {
+    if (by_both_) pruneByBothNeighbours(drive_.images, config_.match.max_angle_ratio, config_.max_image_gap_s);
+    if (!for_poses_) {
+      for (DriveImage& image : drive_.images) image.unpruned.reset();
+    }
     const auto count = static_cast<double>(std::max<std::size_t>(1, drive_.images.size()));
     drive_.sift_ms /= count;
     drive_.global_ms /= count;
@@ -111,6 +117,7 @@ class DriveRecorder {
  private:
   SiftConfig sift_;
   LocalizerConfig config_;
+  bool by_both_;
   bool for_poses_;
   std::optional<FrontEnd> front_end_;
   Drive drive_;
@@ -136,7 +143,9 @@ Trajectory trueTrajectory(const BagReader& bag, const std::string& topic, const 
 std::shared_ptr<const TrainingMap> recordMap(const std::string& path, const RoundSpec& recording,
                                              const MapBuilderConfig& config) {
   const BagReader bag(path);
-  MapBuilder builder(config);
+  MapBuilderConfig like_the_round = config;
+  like_the_round.prune = config.prune && recording.pruning != Pruning::kNone;
+  MapBuilder builder(like_the_round);
   const std::vector<Fix> fixes = bag.fixes(recording.fix_topic);
   const std::optional<CameraModel> camera = cameraOf(bag, recording);
   if (config.geometry.enabled && !camera) {
@@ -165,7 +174,8 @@ std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpe
   const BagReader bag(path);
   const Truth truth = truthOf(bag, recording, map.trajectory);
   const std::optional<CameraModel> camera = for_poses ? cameraOf(bag, recording) : std::nullopt;
-  DriveRecorder recorder(map.sift, front_end, bag.images(recording.image_topic).usualSize(), for_poses);
+  const cv::Size usual_size = bag.images(recording.image_topic).usualSize();
+  DriveRecorder recorder(map.sift, front_end, recording.pruning, usual_size, for_poses);
   forEachImage(bag, recording.image_topic,
                [&](std::int64_t stamp_ns, const cv::Mat& grey) { recorder.add(stamp_ns, grey, truth(stamp_ns)); });
   auto drive = std::make_shared<Drive>(recorder.finish());

@@ -16,6 +16,7 @@
 #include "base/parallel.h"
 #include "base/text.h"
 #include "base/time.h"
+#include "visual_localization/features/sift_matcher.h"
 
 namespace visual_localization {
 namespace {
@@ -150,6 +151,34 @@ RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimi
 }
 
 }  // namespace
+
+namespace {
+
+bool isRepetition(const DriveImage& image, const DriveImage& before) {
+  return image.unpruned->descriptors() == before.unpruned->descriptors();
+}
+
+}  // namespace
+
+void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_ratio, double max_gap_s) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    DriveImage& image = images[i];
+    if (i > 0 && isRepetition(image, images[i - 1])) {
+      image.sift = images[i - 1].sift;
+      continue;
+    }
+    std::vector<const SiftFeatures*> neighbours;
+    const auto add = [&](const DriveImage& other) {
+      const double gap_s = std::abs(secondsBetween(other.stamp_ns, image.stamp_ns));
+      if (gap_s <= max_gap_s) neighbours.push_back(&*other.unpruned);
+    };
+    if (i > 0) add(images[i - 1]);
+    std::size_t next = i + 1;
+    while (next < images.size() && isRepetition(images[next], image)) ++next;
+    if (next < images.size()) add(images[next]);
+    image.sift = neighbours.empty() ? *image.unpruned : keepSeenIn(*image.unpruned, neighbours, max_angle_ratio);
+  }
+}
 
 ScoreTable::ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads)
     : training_images_(map.size()), entries_(drive.images.size() * map.size()) {

@@ -36,7 +36,7 @@ Trajectory movedOnto(const Trajectory& positions, const Trajectory& poses);
 struct DriveImage {
   std::int64_t stamp_ns = 0;
   std::optional<TruePose> truth;  ///< absent when it has no true position
-  SiftFeatures sift;              ///< pruned by the image recorded before it
+  SiftFeatures sift;              ///< pruned as its round says
   GlobalFeatures global;
   std::optional<SiftFeatures> unpruned;  ///< all its SIFT features; only kept for methods that solve poses
 };
@@ -49,6 +49,11 @@ struct Drive {
   double sift_ms = 0.0;               ///< mean time to extract and prune the SIFT features of an image
   double global_ms = 0.0;             ///< mean time to extract its global features
 };
+
+/// Drops from `sift` what neither the image before nor the one after shows: Kronfeld et al. (conference), section VI,
+/// and (journal), section 6. Every image must have its `unpruned` features. A repetition has the features of what it
+/// repeats. An image farther away than `max_gap_s` is no neighbour; without any, all features stay.
+void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_ratio, double max_gap_s);
 
 /// A recorded round in the roles it plays in an experiment; a role it does not play is empty.
 struct RecordedRound {

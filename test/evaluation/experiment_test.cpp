@@ -114,6 +114,18 @@ TEST(Experiment, RoundsMayHaveACalibrationAndTruePoses) {
   EXPECT_EQ(test::smallExperiment().rounds[1].camera_info, "");
 }
 
+TEST(Experiment, ARoundSaysHowItIsPruned) {
+  const auto pruning = [](const std::string& entry) {
+    return parseExperiment(test::smallYamlWith("bag: a1.bag", "bag: a1.bag" + entry), "e.yaml").rounds[0].pruning;
+  };
+  EXPECT_EQ(pruning(""), Pruning::kPrevious);
+  EXPECT_EQ(pruning(", pruning: previous"), Pruning::kPrevious);
+  EXPECT_EQ(pruning(", pruning: both"), Pruning::kBoth);
+  EXPECT_EQ(pruning(", pruning: none"), Pruning::kNone);
+  expectRefused({{"bag: a1.bag", "bag: a1.bag, pruning: next",
+                  "'rounds/bags[0]/pruning' = 'next' must be previous, both or none"}});
+}
+
 TEST(Experiment, TheSpacingOfTheMapMayBeSwept) {
   const std::string yaml =
       test::smallYamlWith(kBestMethod, "{name: 's {map_spacing}', tracker: dpso, sweep: {map_spacing: [0, 2, 10]}}");
