@@ -51,7 +51,9 @@ void Dpso::reset(const Prior& prior) {
   tuning_ = {config_.v0, 0.0, config_.quantum_share, config_.phi2, config_.phi0, false};
   attractor_m_.reset();
   centre_of_mass_m_.reset();
+  last_centre_m_.reset();
   speed_known_ = false;
+  ground_speed_known_ = false;
   seen_an_image_ = false;
   position_unknown_ = false;
   bad_images_ = 0;
@@ -101,7 +103,8 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   adaptSpeed(input.travel);
   if (!input.verified_m) adaptDiversity(result.best);
   assignKinds();
-  centre_of_mass_m_ = last_centre_m_ = centreOfMass();  // of the particles that count from now on
+  centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
+  if (!last_centre_m_ || input.travel.seconds > 0.0) last_centre_m_ = centre_of_mass_m_;
   result.tuning = tuning_;
   return result;
 }
@@ -253,8 +256,9 @@ void Dpso::adaptSpeed(const Travel& travel) {
         smoothed(speed_known_, tuning_.speed_ema, relativeLength(centre - *centre_of_mass_m_, range_m()));
     speed_known_ = true;
     if (travel.seconds > 0.0) {
-      const double speed_mps = (centre - last_centre_m_).norm() / travel.seconds;
-      tuning_.speed_mps = smoothed(tuning_.speed_mps > 0.0, tuning_.speed_mps, speed_mps);
+      const double speed_mps = (centre - *last_centre_m_).norm() / travel.seconds;
+      tuning_.speed_mps = smoothed(ground_speed_known_, tuning_.speed_mps, speed_mps);
+      ground_speed_known_ = true;
     }
   }
   if (!config_.adapt_speed || tuning_.recovering || !speed_known_) return;
@@ -282,8 +286,10 @@ void Dpso::adaptDiversity(const Score& best) {
 }
 
 void Dpso::endRecovery() {
-  tuning_ = {config_.v0, tuning_.speed_ema, config_.quantum_share, config_.phi2, config_.phi0, false};
+  tuning_ = {config_.v0, tuning_.speed_ema, config_.quantum_share, config_.phi2, config_.phi0,
+             false,      tuning_.speed_mps};
   speed_known_ = false;
+  ground_speed_known_ = false;
   bad_images_ = 0;
 }
 

@@ -53,11 +53,13 @@ class Dpso final : public Tracker {
   TrackerTuning tuning_;
   std::vector<Particle> particles_;
   std::vector<Fitness> fitness_;
-  std::optional<Eigen::Vector2d> attractor_m_;               ///< p^n: the best particle of the last image
-  std::optional<Eigen::Vector2d> centre_of_mass_m_;          ///< after the last image, shifted by the odometry since
-  Eigen::Vector2d last_centre_m_ = Eigen::Vector2d::Zero();  ///< the same, not shifted
-  bool seen_an_image_ = false;                               ///< since the last reset
+  std::optional<Eigen::Vector2d> attractor_m_;       ///< p^n: the best particle of the last image
+  std::optional<Eigen::Vector2d> centre_of_mass_m_;  ///< after the last image, shifted by the odometry since
+  /// The same at the last image of another time, not shifted.
+  std::optional<Eigen::Vector2d> last_centre_m_;
+  bool seen_an_image_ = false;  ///< since the last reset
   bool speed_known_ = false;
+  bool ground_speed_known_ = false;
   bool position_unknown_ = true;  ///< nothing was recognised since a reset without a prior
   int bad_images_ = 0;
 };

@@ -368,6 +368,32 @@ TEST(SwarmEquations, RecoveryIsStepwiseAndEndsAtTheConfiguration) {
       << "the speed of the search is forgotten";
 }
 
+TEST(SwarmEquations, TheSpeedOverTheGroundStaysKnown) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.recovery = "paper";
+  Dpso swarm(world.map(), config, FitnessConfig(), 4);
+  const auto see = [&](TrackerInput input, double seconds) {
+    input.travel.seconds = seconds;
+    swarm.update(input);
+  };
+  for (int image = 0; image < 10; ++image) see(world.from(onCircle(0.6 * image)), 1.0);
+  const double known_mps = swarm.tuning().speed_mps;
+  EXPECT_GT(known_mps, 0.0);
+  const Eigen::Vector2d before_m = centreOfTravellers(swarm);
+  see(world.from(onCircle(6.0)), 0.0);  // the stamp of the image before
+  EXPECT_EQ(swarm.tuning().speed_mps, known_mps);
+  see(world.from(onCircle(6.6)), 2.0);
+  EXPECT_NEAR(swarm.tuning().speed_mps, 0.875 * known_mps + 0.125 * 0.5 * (centreOfTravellers(swarm) - before_m).norm(),
+              1e-9);
+  while (!swarm.tuning().recovering) see(world.inTheDark(), 1.0);
+  for (int image = 0; image < 60 && swarm.tuning().recovering; ++image) see(world.from(onCircle(7.0)), 1.0);
+  ASSERT_FALSE(swarm.tuning().recovering);
+  EXPECT_GT(swarm.tuning().speed_mps, 0.0) << "the image that ends a recovery";
+  swarm.reset();
+  EXPECT_EQ(swarm.tuning().speed_mps, 0.0);
+}
+
 TEST(SwarmEquations, WhatIsAtItsLimitStaysThereInARecovery) {
   World world = roundWorld();
   DpsoConfig config;
