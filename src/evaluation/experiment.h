@@ -15,7 +15,7 @@ namespace visual_localization {
 enum class Pruning {
   kPrevious,  ///< the one before, as on a robot (Weiss et al., section III)
   kBoth,      ///< the one before and the one after (Kronfeld et al., conference section VI, journal section 6)
-  kNone,      ///< no features are dropped, those of a map's images neither
+  kNone,      ///< none: all features stay, also where the round is the map
 };
 
 /// One recorded round of an experiment.

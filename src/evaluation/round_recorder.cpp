@@ -104,7 +104,11 @@ class DriveRecorder {
   }
 
   Drive finish() {
-    if (by_both_) pruneByBothNeighbours(drive_.images, config_.match.max_angle_ratio, config_.max_image_gap_s);
+    if (by_both_) {
+      const CpuStopwatch sift_watch;
+      pruneByBothNeighbours(drive_.images, config_.match.max_angle_ratio, config_.max_image_gap_s);
+      drive_.sift_ms += sift_watch.elapsed_ms();
+    }
     if (!for_poses_) {
       for (DriveImage& image : drive_.images) image.unpruned.reset();
     }

@@ -150,10 +150,6 @@ RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimi
   return times;
 }
 
-}  // namespace
-
-namespace {
-
 bool isRepetition(const DriveImage& image, const DriveImage& before) {
   return image.unpruned->descriptors() == before.unpruned->descriptors();
 }
@@ -169,8 +165,9 @@ void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_rat
     }
     std::vector<const SiftFeatures*> neighbours;
     const auto add = [&](const DriveImage& other) {
+      constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
       const double gap_s = std::abs(secondsBetween(other.stamp_ns, image.stamp_ns));
-      if (gap_s <= max_gap_s) neighbours.push_back(&*other.unpruned);
+      if (gap_s <= max_gap_s && other.unpruned->size() >= kLeast) neighbours.push_back(&*other.unpruned);
     };
     if (i > 0) add(images[i - 1]);
     std::size_t next = i + 1;

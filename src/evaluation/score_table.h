@@ -52,7 +52,8 @@ struct Drive {
 
 /// Drops from `sift` what neither the image before nor the one after shows: Kronfeld et al. (conference), section VI,
 /// and (journal), section 6. Every image must have its `unpruned` features. A repetition has the features of what it
-/// repeats. An image farther away than `max_gap_s` is no neighbour; without any, all features stay.
+/// repeats. An image farther away than `max_gap_s`, or with fewer than two features, is no neighbour; without any
+/// neighbour all features stay.
 void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_ratio, double max_gap_s);
 
 /// A recorded round in the roles it plays in an experiment; a role it does not play is empty.

@@ -50,7 +50,7 @@ struct TracedPose {
 };
 
 /// Of the text of a UnitResult: goes up whenever older results cannot be read any more.
-constexpr int kUnitFormat = 2;
+constexpr int kUnitFormat = 3;
 
 /// One method on one pair of rounds: the unit of work that is stored and resumed.
 struct UnitResult {

@@ -56,5 +56,14 @@ TEST(PruningByBothNeighbours, AnImageFarAwayIsNoNeighbour) {
   expectKept(images[2], {4, 6, 7});
 }
 
+TEST(PruningByBothNeighbours, AnImageThatShowsNothingIsNoNeighbour) {
+  std::vector<DriveImage> images{imageOf(0.0, {}), imageOf(1.0, {1, 4, 5}), imageOf(2.0, {9}), imageOf(3.0, {4, 6, 7}),
+                                 imageOf(4.0, {4, 8, 9})};
+  pruneByBothNeighbours(images, kRatio, kLongestGap_s);
+  EXPECT_TRUE(images[0].sift.empty());
+  expectKept(images[1], {1, 4, 5});
+  expectKept(images[3], {4});
+}
+
 }  // namespace
 }  // namespace visual_localization
