@@ -26,7 +26,7 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def roslaunch(*arguments, timeout_s=120):
+def roslaunch(*arguments, timeout_s=300):
     return subprocess.run(['roslaunch', *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           universal_newlines=True, timeout=timeout_s)
 

@@ -3,6 +3,7 @@
 import math
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -138,7 +139,12 @@ class ReplayTest(unittest.TestCase):
     def check_plot(self):
         self.plot.send_signal(signal.SIGINT)
         self.assertEqual(self.plot.wait(60), 0)
-        self.assertIn('TRACKING', self.picture.read_text(encoding='utf-8'))  # the heading, as a comment
+        # The heading, as a comment: the last state, which is no longer TRACKING seconds after the last image.
+        heading = re.search(r'<!-- .*: ([A-Z_]+) -->', self.picture.read_text(encoding='utf-8'))
+        self.assertIsNotNone(heading)
+        states = {status.state_name for status in self.localizer.status.messages()}
+        self.assertIn('TRACKING', states)
+        self.assertIn(heading.group(1), states)
         self.assertEqual([path.name for path in self.picture.parent.iterdir()], ['status.svg'])
 
 
