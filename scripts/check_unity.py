@@ -12,13 +12,14 @@ from pathlib import Path
 # Of the library that is built in batches, see src/CMakeLists.txt.
 SOURCES = ('ros/*.cpp', 'bag/*.cpp', 'node/*.cpp', 'evaluation/round_recorder.cpp')
 BLOCK = re.compile(r'^namespace \{\n(.*?)^\}  // namespace\n', re.DOTALL | re.MULTILINE)
-DEFINITION = re.compile(r'^(?!using|template|///|//|#|\}|\s)[^\n=;]*?\b(\w+)(?:\(| =|\{| \{)', re.MULTILINE)
+TYPE = re.compile(r'^(?:class|struct|enum class|enum|union) (\w+)', re.MULTILINE)
+OTHER = re.compile(
+    r'^(?!using|template|class|struct|enum|union|//|#|\}|\s)[^\n=;({]*?\b(\w+)(?:\[\w*\])?(?:\(| =|\{|;)', re.MULTILINE)
 
 
-def private_names(path: Path) -> set:
-    """What a file defines in unnamed namespaces, at their first level."""
-    text = path.read_text(encoding='utf-8')
-    return {match.group(1) for block in BLOCK.findall(text) for match in DEFINITION.finditer(block)}
+def private_names(text: str) -> set:
+    """What a source defines in unnamed namespaces, at their first level."""
+    return {match.group(1) for block in BLOCK.findall(text) for kind in (TYPE, OTHER) for match in kind.finditer(block)}
 
 
 def main() -> int:
@@ -27,7 +28,7 @@ def main() -> int:
     files = [path for pattern in SOURCES for path in sorted(root.glob(pattern))]
     where = defaultdict(list)
     for path in files:
-        for name in private_names(path):
+        for name in private_names(path.read_text(encoding='utf-8')):
             where[name].append(str(path.relative_to(root)))
     shared = {name: paths for name, paths in where.items() if len(paths) > 1}
     for name, paths in sorted(shared.items()):

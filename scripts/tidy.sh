@@ -48,7 +48,9 @@ main() {
   if [[ ! -f $build/compile_commands.json ]]; then
     (cd "$repo" && cmake --preset debug -B "$build" -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null)
   fi
-  cmake --build "$build" --target visual_localization_generate_messages_cpp >/dev/null
+  # The headers of the messages; a build without ROS has none.
+  local messages=visual_localization_generate_messages_cpp
+  if cmake --build "$build" --target help | grep -q "$messages"; then cmake --build "$build" --target "$messages" >/dev/null; fi
   # A file that the build does not know has no compiler options to check it with.
   local known=() unknown=() file
   for file in "${files[@]}"; do
