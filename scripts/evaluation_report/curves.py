@@ -147,16 +147,16 @@ def runs_figure(traces: Dict[str, Series], palette: Palette, title: str) -> Opti
     handles: List[Any] = [Line2D([], [], color=COLOURS['black'], label='cumulated error'),
                           Line2D([], [], color=COLOURS['vermillion'], linestyle='--', label='speed limit v₀'),
                           Line2D([], [], color=COLOURS['blue'], label='speed of the swarm (EMA)')]
-    if any(series.has('robot_mps') for series in swarms.values()):
+    metric = all(series.has('swarm_mps') for series in swarms.values())
+    if metric and any(series.has('robot_mps') for series in swarms.values()):
         handles.append(Line2D([], [], color=COLOURS['green'], linestyle=':', label='speed of the robot v_R (median)'))
     if any(series.has('recovering') and any(value == 1 for value in series.columns['recovering'])
            for series in swarms.values()):
         handles.append(Patch(facecolor=COLOURS['orange'], alpha=.3, label='recovering'))
     figure, axes = page(title, len(swarms), 1, 2.1, handles, legend_width=len(handles), share_x=True)
     top = max(cumulated(series.columns['err_m'])[-1] for series in swarms.values())
-    metric = all(series.has('swarm_mps') for series in swarms.values())
-    fastest = max((value for series in swarms.values() for name in ('limit', 'swarm')
-                   for value in speeds_of(series, metric)[name] if math.isfinite(value)), default=0)
+    fastest = max((value for series in swarms.values() for values in speeds_of(series, metric).values()
+                   for value in values if math.isfinite(value)), default=0)
     for axis, (method, series) in zip(axes, swarms.items()):
         draw_run(axis, series, metric)
         axis.set(title=literal(method), ylim=(0, top * 1.05 or 1))
@@ -172,17 +172,24 @@ def cumulated(errors: Sequence[float]) -> List[float]:
     return list(accumulate(0 if math.isnan(error) else error for error in errors))
 
 
+def middle(values: Sequence[float]) -> List[float]:
+    """The median of what is known, if anything is."""
+    known = [value for value in values if math.isfinite(value)]
+    return [median(known)] if known else []
+
+
 def speeds_of(series: Series, metric: bool) -> Dict[str, List[float]]:
     """Speed limit, swarm and robot: metres per second, or per cent of the map's range per image.
 
-    The limit is a share of the range, which each axis has of its own; in m/s it is that for the swarm's direction.
+    The limit is a share of the range, which each axis has of its own; in m/s it is that for the swarm's direction. With
+    odometry, which moves the swarm beside its own speed, there is no such limit.
     """
     limit, swarm = (series.columns.get(name, []) for name in ('v0', 'speed_ema'))
     if not metric:
         return {'limit': [100 * value for value in limit], 'swarm': [100 * value for value in swarm], 'robot': []}
     metres = series.columns['swarm_mps']
     return {'limit': [v0 * mps / share if share else math.nan for v0, share, mps in zip(limit, swarm, metres)],
-            'swarm': metres, 'robot': series.columns.get('robot_mps', [])}
+            'swarm': metres, 'robot': middle(series.columns.get('robot_mps', []))}
 
 
 def draw_run(axis: plt.Axes, series: Series, metric: bool) -> None:
@@ -200,9 +207,8 @@ def draw_run(axis: plt.Axes, series: Series, metric: bool) -> None:
                         ('swarm', {'color': COLOURS['blue']})):
         if speeds[name]:
             right.plot(series.step, speeds[name], linewidth=1.1, **style)
-    robot = [value for value in speeds['robot'] if math.isfinite(value)]
-    if robot:
-        right.axhline(median(robot), color=COLOURS['green'], linestyle=':', linewidth=1.1)
+    for robot_mps in speeds['robot']:
+        right.axhline(robot_mps, color=COLOURS['green'], linestyle=':', linewidth=1.1)
     right.set_ylabel('speed [m/s]' if metric else 'speed [% of the\nrange per image]')
 
 

@@ -3,14 +3,16 @@
 In the YAML file of an experiment, parts of the discussion in braces stand for what the tables say:
 
 {COLUMN | METHODS | GROUPS | FORMAT}          a number as in the table, or "1.2 to 1.9" for several
-{COLUMN | A / B | GROUPS | FORMAT}            a ratio; A - B: a difference; A % B: by how many per cent they differ
+{COLUMN | A / B | GROUPS | FORMAT}            a ratio; A - B: a difference; A % B: how many per cent A is above B
 {COLUMN | A < B | GROUPS ? these words : or these}
 
-COLUMN is a column's name without its unit: `mean error`, `mean error (papers)`, `images until relocalised of 95 %`; the
-first table that has it counts, or the one of a section: `Poses behind a filter: mean error`. METHODS, A, B and GROUPS
-are patterns as of file names, several with `;` between them and `!` before exceptions; B may be a number, and A a ratio
-or a difference. GROUPS may be left out: all tables. FORMAT is Python's (`.0f`) and may be left out. A comparison is one
-of < > <= >= and ~ (they differ by at most 10 %); it must hold for each A and each B in every group.
+COLUMN is a column's name without its unit: `mean error`, `mean error (papers)`, `images until relocalised of 95 %`; of
+a group, the first section that has it counts, or the one that is named: `Poses behind a filter: mean error`. METHODS,
+A, B and GROUPS are patterns as of file names, several with `;` between them and `!` before exceptions; B may be a
+number, and A a ratio or a difference. GROUPS may be left out: all tables. FORMAT is Python's (`.0f`) and may be left
+out. A comparison is one of < > <= >= and ~ (they differ by at most 10 %); it must hold for each A and each B in every
+group. Groups may be related instead of methods: {COLUMN | METHODS | G / H} is each method's ratio of group G to group H.
+Lines may be broken anywhere. Paragraphs with such parts are filled anew, all others stay as they are.
 """
 import operator
 import re
@@ -22,7 +24,8 @@ WIDTH = 120
 NO_DATA = '(no data)'
 TOLERANCE = 0.10
 PART = re.compile(r'\{([^{}]*)\}')
-NUMBER = re.compile(r'-?\d+(\.\d+)?')
+NUMBER = re.compile(r'-?\d+(\.\d+)?(e[-+]?\d+)?')
+ITEM = re.compile(r'(?:[-*]|\d+\.) ')
 
 
 class DiscussionError(ValueError):
@@ -35,6 +38,7 @@ class Cell(NamedTuple):
     method: str
     group: str
     text: str
+    section: str = ''
 
     @property
     def value(self) -> float:
@@ -50,12 +54,12 @@ def similar(first: float, second: float) -> bool:
 COMPARISONS: Dict[str, Callable[[float, float], bool]] = {
     '<=': operator.le, '>=': operator.ge, '<': operator.lt, '>': operator.gt, '~': similar}
 OPERATIONS: Dict[str, Callable[[float, float], float]] = {
-    '/': operator.truediv, '-': operator.sub, '%': lambda first, second: abs(100 * (first / second - 1))}
-DEFAULT_FORMATS = {'/': '.1f', '-': '.2f', '%': '.0f'}
+    '/': operator.truediv, '-': operator.sub, '%': lambda first, second: 100 * (first / second - 1)}
+DEFAULT_FORMATS = {'/': '.1f', '-': '+.2f', '%': '+.0f'}
 
 
 def column_names(header: List[str]) -> List[str]:
-    """Names of columns without units; no two are the same."""
+    """Names of columns without units; a name that comes again is that in relation to the map."""
     names: List[str] = []
     for cell in header:
         name = re.sub(r'\s*\[[^\]]*\]', '', cell).strip()
@@ -73,7 +77,7 @@ def cells_of_row(line: str) -> List[str]:
 
 
 def cells_of(report: str) -> List[Cell]:
-    """All numbers of all tables of a report, the first of a cell; tables belong to the heading above them."""
+    """The first number of each cell of all tables of a report; a table belongs to the headings above it."""
     found: List[Cell] = []
     section, group = '', ''
     names: List[str] = []
@@ -87,11 +91,11 @@ def cells_of(report: str) -> List[Cell]:
             names = column_names(cells_of_row(line))
         else:
             row = cells_of_row(line)
+            if row[0] == '---':
+                continue
             for name, text in zip(names[1:], row[1:]):
                 number = NUMBER.match(text)
-                if number:
-                    found.append(Cell(name, row[0], group, number.group()))
-                    found.append(Cell(f'{section}: {name}', row[0], group, number.group()))
+                found.append(Cell(name, row[0], group, number.group() if number else '', section))
     return found
 
 
@@ -107,13 +111,18 @@ class Tables:
     """Looks up what the tables of a report say."""
 
     def __init__(self, cells: List[Cell]):
-        self._cells: Dict[Tuple[str, str, str], Cell] = {}
+        self._cells = cells
+        self._first: Dict[Tuple[str, str], str] = {}
         for cell in cells:
-            self._cells.setdefault((cell.column, cell.method, cell.group), cell)
+            self._first.setdefault((cell.column, cell.group), cell.section)
 
     def find(self, column: str, methods: str, groups: str) -> List[Cell]:
-        """The cells in the order of the tables. An exact name is no pattern."""
-        return [cell for cell in self._cells.values() if cell.column == column
+        """The cells that have a number, in the order of the tables. An exact name is no pattern."""
+        section = next((cell.section for cell in self._cells if column.startswith(f'{cell.section}: ')), '')
+        name = column[len(section) + 2:] if section else column
+        return [cell for cell in self._cells if cell.text
+                and cell.column == name
+                and cell.section == (section or self._first[cell.column, cell.group])
                 and (cell.method == methods or matches(cell.method, methods))
                 and (cell.group == groups or matches(cell.group, groups))]
 
@@ -127,12 +136,21 @@ class Tables:
             pairs += [(cell.value, other.value) for other in theirs if other != cell]
         return pairs
 
+    def across(self, column: str, methods: str, first: str, second: str) -> List[Tuple[float, float]]:
+        """Each method in the first groups with itself in each of the second ones; empty if there is none."""
+        return [(cell.value, other.value) for cell in self.find(column, methods, first)
+                for other in self.find(column, cell.method, second)]
+
     def values(self, column: str, methods: str, groups: str) -> List[float]:
-        """Of methods, or of a ratio or difference of methods. Throws ZeroDivisionError."""
-        found = split_by(methods, list(OPERATIONS))
-        if not found:
-            return [cell.value for cell in self.find(column, methods, groups)]
-        return [OPERATIONS[found[1]](*pair) for pair in self.paired(column, found[0], found[2], groups)]
+        """Of methods, or of a ratio or difference of methods or groups. Throws ZeroDivisionError."""
+        of_methods, of_groups = (split_by(text, list(OPERATIONS)) for text in (methods, groups))
+        if of_methods:
+            first, name, second = of_methods
+            return [OPERATIONS[name](*pair) for pair in self.paired(column, first, second, groups)]
+        if of_groups:
+            first, name, second = of_groups
+            return [OPERATIONS[name](*pair) for pair in self.across(column, methods, first, second)]
+        return [cell.value for cell in self.find(column, methods, groups)]
 
 
 def split_by(text: str, operators: List[str]) -> Optional[Tuple[str, str, str]]:
@@ -148,14 +166,15 @@ def span(values: List[float], shown: Callable[[float], str]) -> str:
     """One number, or the smallest and the largest."""
     if not values:
         return NO_DATA
-    low, high = shown(min(values)), shown(max(values))
+    low, high = (re.sub(r'^[-+]0(\.0*)?$', r'0\1', shown(value)) for value in (min(values), max(values)))
     return low if low == high else f'{low} to {high}'
 
 
 def computed(part: str, tables: Tables) -> str:
     """What a part in braces says."""
-    question, asked, answers = part.partition('?') if re.search(r' \? ', part) else (part, '', '')
-    fields = [' '.join(field.split()) for field in question.split('|')]
+    part = ' '.join(part.split())
+    question, asked, answers = part.partition(' ? ')
+    fields = [field.strip() for field in question.split('|')]
     if not 2 <= len(fields) <= 4 or not all(fields) or (asked and len(fields) > 3):
         raise DiscussionError(f'{{{part}}}: must be {{COLUMN | METHODS | GROUPS}}')
     column, methods = fields[:2]
@@ -172,7 +191,7 @@ def computed(part: str, tables: Tables) -> str:
 
 def numbers(column: str, methods: str, groups: str, form: str, tables: Tables) -> str:
     """Values as the tables show them, or in a format."""
-    operation = split_by(methods, list(OPERATIONS))
+    operation = split_by(methods, list(OPERATIONS)) or split_by(groups, list(OPERATIONS))
     form = form or (DEFAULT_FORMATS[operation[1]] if operation else '')
     if form:
         return span(tables.values(column, methods, groups), lambda value: format(value, form))
@@ -182,11 +201,14 @@ def numbers(column: str, methods: str, groups: str, form: str, tables: Tables) -
 
 def compared(part: str, column: str, methods: str, groups: str, tables: Tables) -> Optional[bool]:
     """Whether a comparison holds everywhere; None without data."""
-    found = split_by(methods, list(COMPARISONS))
+    of_groups = split_by(groups, list(COMPARISONS))
+    found = split_by(methods, list(COMPARISONS)) or of_groups
     if not found:
         raise DiscussionError(f'{{{part}}}: compares nothing, allowed: {" ".join(COMPARISONS)}')
     first, name, second = found
-    if NUMBER.fullmatch(second):
+    if of_groups:
+        pairs = tables.across(column, methods, first, second)
+    elif NUMBER.fullmatch(second):
         pairs = [(value, float(second)) for value in tables.values(column, first, groups)]
     else:
         pairs = tables.paired(column, first, second, groups)
@@ -201,22 +223,25 @@ def chosen(part: str, answers: str, holds: Optional[bool]) -> str:
     return NO_DATA if holds is None else (yes if holds else no).strip()
 
 
-def wrapped(text: str) -> str:
-    """Paragraphs and items of lists, filled anew."""
-    paragraphs = []
-    for paragraph in re.split(r'\n\s*\n', text.strip()):
-        items = re.split(r'\n(?=- )', paragraph)
-        paragraphs.append('\n'.join(textwrap.fill(' '.join(item.split()), WIDTH, break_long_words=False,
-                                                  break_on_hyphens=False,
-                                                  subsequent_indent='  ' if item.startswith('- ') else '')
-                                    for item in items))
-    return '\n\n'.join(paragraphs)
+def filled(paragraph: str) -> str:
+    """A paragraph, or the items of a list, in lines of the usual width."""
+    items: List[List[str]] = []
+    for line in paragraph.splitlines():
+        if not items or ITEM.match(line):
+            items.append([])
+        items[-1].append(line)
+    lines = []
+    for item in items:
+        mark = ITEM.match(item[0])
+        lines.append(textwrap.fill(' '.join(' '.join(item).split()), WIDTH, break_long_words=False,
+                                   break_on_hyphens=False, subsequent_indent=' ' * len(mark.group()) if mark else ''))
+    return '\n'.join(lines)
 
 
 def discussed(discussion: str, report: str, warn: Callable[[str], None]) -> str:
     """The discussion with all its parts computed from the tables of the report.
 
-    A part that cannot be understood stays as it is, with a warning.
+    A part that cannot be understood stays as it is. `warn`: gets a line for each such part, and for each without data.
     """
     tables = Tables(cells_of(report))
 
@@ -224,9 +249,16 @@ def discussed(discussion: str, report: str, warn: Callable[[str], None]) -> str:
         if '|' not in part.group(1):
             return part.group()
         try:
-            return computed(part.group(1), tables)
+            said = computed(part.group(1), tables)
         except DiscussionError as error:
             warn(f'discussion: {error}')
             return part.group()
+        if said == NO_DATA:
+            warn(f'discussion: {{{" ".join(part.group(1).split())}}}: the tables have no such numbers')
+        return said
 
-    return wrapped(PART.sub(replaced, discussion)) + '\n'
+    paragraphs = []
+    for paragraph in re.split(r'\n\s*\n', discussion.strip('\n')):
+        said = PART.sub(replaced, paragraph)
+        paragraphs.append(said if said == paragraph else filled(said))
+    return '\n\n'.join(paragraphs).rstrip() + '\n'

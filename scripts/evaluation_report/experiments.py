@@ -128,6 +128,9 @@ def ratio_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
 
 
 def tested_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
-    """The pairs of methods of which the first has the lower error by a t-test in the papers ([J] section 7.3)."""
+    """The pairs of methods of which the first has the lower error by a t-test in the papers.
+
+    [J] section 7.2: PF-l-300 and DPSO-80 "outperform the PF-g methods as well as the PF-l with 100 particles".
+    """
     pairs = [(better, worse) for better in ('DPSO-80', 'PF-l-300') for worse in ('PF-g-100', 'PF-g-300', 'PF-l-100')]
     return [pair for pair in pairs if experiment == 'comparison' and pair[0] in methods and pair[1] in methods]

@@ -1,4 +1,5 @@
 """Assembles the report."""
+import re
 import sys
 from pathlib import Path
 from typing import List, Optional, Tuple
@@ -13,6 +14,7 @@ from .words import in_words
 
 
 DISCUSSION = '\n## Discussion\n\n'
+BEHIND = re.compile('\n## (?:Figures|Tracking and cost)\n')
 
 
 def counted(count: int, what: str) -> str:
@@ -64,8 +66,8 @@ def with_discussion(report: str, discussion: str) -> str:
     before, heading, after = report.partition(DISCUSSION)
     if not heading:
         return report
-    next_section = after.find('\n## ')
-    rest = after[next_section:] if next_section >= 0 else ''
+    behind = BEHIND.search(after)
+    rest = after[behind.start():] if behind else ''
 
     def warn(text: str) -> None:
         print(f'report_evaluation: {text}', file=sys.stderr)
@@ -89,8 +91,14 @@ def renew_discussion(folder: Path, experiment: Path) -> None:
     report = folder / 'report.md'
     try:
         text = report.read_text(encoding='utf-8')
-    except OSError as error:
-        raise DataError(report, error.strerror or 'cannot be read') from error
-    discussion = read_description(experiment).get('discussion', '')
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(report, getattr(error, 'strerror', None) or 'is not a text in UTF-8') from error
+    if DISCUSSION not in text:
+        raise DataError(report, 'has no discussion')
+    if not experiment.is_file():
+        raise DataError(experiment, 'is not a file')
+    discussion = read_description(experiment).get('discussion')
+    if not discussion:
+        raise DataError(experiment, 'has no discussion')
     with written_whole(report) as partial:
         partial.write_text(with_discussion(text, str(discussion)), encoding='utf-8')

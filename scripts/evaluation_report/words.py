@@ -10,7 +10,9 @@ from .papers import Papers
 
 # Ratios this close count as equal: images and robot are not the papers'.
 TOLERANCE = 0.25
-# Of the papers' t-tests, one-sided ([J] section 7.3).
+# Ratios this close to 1 have no winner.
+TIE = 0.02
+# Of the papers' t-tests, one-sided ([J] section 7.2).
 SIGNIFICANCE = 0.005
 # With fewer runs a t-test needs another distribution than the normal one.
 FEWEST_RUNS = 100
@@ -75,7 +77,7 @@ class Words:
         if not both.ours[second] or not both.papers[second]:
             return
         here, there = both.ours[first] / both.ours[second], both.papers[first] / both.papers[second]
-        self.agreement(f'{what}, `{first}` / `{second}`', here, there, is_reversed=(here - 1) * (there - 1) < 0)
+        self.agreement(f'{what}, `{first}` / `{second}`', here, there, is_reversed=have_other_winners(here, there))
 
     def agreement(self, what: str, here: float, there: float, scale: float = 1, unit: str = '', *,
                   is_reversed: bool = False) -> None:
@@ -100,8 +102,8 @@ class Words:
         self._tests[0] += agrees
         self._tests[1] += 1
         verdict = 'agrees' if agrees else '**not reproduced**'
-        self.lines.append(f'- Error of `{better.method}` below that of `{worse.method}` by a t-test: t = {t:.0f}; papers: '
-                          f'below, on a level of {100 * SIGNIFICANCE:g} %: {verdict}.')
+        self.lines.append(f'- Error of `{better.method}` below that of `{worse.method}` by a t-test: t = {t:.1f}; '
+                          f'papers: below, on a level of {100 * SIGNIFICANCE:g} %: {verdict}.')
 
     def text(self) -> str:
         """All sentences, the tally first."""
@@ -114,9 +116,14 @@ class Words:
         if self._order[1]:
             tally.append(f'{self._order[0]} of {self._order[1]} pairs of methods are in the papers\' order')
         if self._tests[1]:
-            tally.append(f'{self._tests[0]} of {self._tests[1]} t-tests have the papers\' result; runs share their '
-                         'images, so here and there they take differences for more certain than they are')
+            tally.append(f'{self._tests[0]} of {self._tests[1]} t-tests have the papers\' result (their runs share '
+                         'images: in both, here and in the papers, differences are less certain than the tests say)')
         return ('; '.join(tally) + '.\n' if tally else '') + '\n'.join(self.lines) + '\n'
+
+
+def have_other_winners(here: float, there: float) -> bool:
+    """Whether two ratios lie on different sides of 1."""
+    return (here - 1) * (there - 1) < 0 and min(abs(here - 1), abs(there - 1)) > TIE
 
 
 def welch_t(first: Outcome, second: Outcome) -> Optional[float]:

@@ -166,20 +166,53 @@ class ReportTest(unittest.TestCase):
         evaluation.write('`a` has {mean error | a} m, {mean error | a < b ? less : no less} than `b`; {odd | }.')
         result = run(evaluation.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn('discussion: {odd | }: must be', result.stderr)
+        self.assertIn('discussion: {odd |}: must be', result.stderr)
         report = evaluation.folder / 'report.md'
         self.assertIn('`a` has 1.50 m, less than `b`; {odd | }.', report.read_text(encoding='utf-8'))
         report.write_text(report.read_text(encoding='utf-8').replace('| b | 2.50', '| b | 1.20'), encoding='utf-8')
         result = run(evaluation.folder, '--discussion', evaluation.folder / 'experiment.yaml')
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn('`a` has 1.50 m, no less than `b`', report.read_text(encoding='utf-8'))
-        result = run(evaluation.folder.parent, '--discussion', evaluation.folder / 'experiment.yaml')
-        self.assertEqual((result.returncode, result.stdout), (1, ''))
-        self.assertIn('report.md: No such file', result.stderr)
+
+    def test_a_discussion_that_cannot_be_renewed_stays(self):
+        evaluation = self.evaluation('own')
+        evaluation.method(SAME, 'a', 1.5, 20)
+        evaluation.write('What was said.')
+        self.assertEqual(run(evaluation.folder).returncode, 0)
+        report, experiment = evaluation.folder / 'report.md', evaluation.folder / 'experiment.yaml'
+        silent = self.folder / 'silent.yaml'
+        silent.write_text('experiment: own\n', encoding='utf-8')
+        before = report.read_bytes()
+
+        def refused(words: str, yaml_file: Path, folder: Path = evaluation.folder) -> None:
+            result = run(folder, '--discussion', yaml_file)
+            self.assertEqual((result.returncode, result.stdout), (1, ''))
+            self.assertEqual(len(result.stderr.splitlines()), 1)
+            self.assertIn(words, result.stderr)
+        refused('no.yaml: is not a file', self.folder / 'no.yaml')
+        refused('silent.yaml: has no discussion', silent)
+        refused('report.md: No such file', experiment, self.folder.parent)
+        self.assertEqual(report.read_bytes(), before)
+        for content, words in ((b'# Title\n', 'has no discussion'), (b'\xff\n', 'is not a text in UTF-8')):
+            report.write_bytes(content)
+            refused(words, experiment)
+            self.assertEqual(report.read_bytes(), content)
+
+    def test_a_discussion_keeps_its_own_layout(self):
+        evaluation = self.evaluation('own')
+        evaluation.method(SAME, 'a', 1.5, 20)
+        said = '## Why\n1. one\n2. two\n\n| x | y |\n| --- | --- |\n| 1 | 2 |\n\n```\ncode  {a, b}\n```\n'
+        evaluation.write(said)
+        report = evaluation.folder / 'report.md'
+        self.assertEqual(run(evaluation.folder).returncode, 0)
+        self.assertIn(said, report.read_text(encoding='utf-8'))
+        before = report.read_bytes()
+        self.assertEqual(run(evaluation.folder, '--discussion', evaluation.folder / 'experiment.yaml').returncode, 0)
+        self.assertEqual(report.read_bytes(), before)
 
     def test_another_winner_does_not_agree_however_close(self):
-        for error, verdict in ((2.6, 'agrees (-3 %)'), (2.5, 'agrees (-6 %)'), (2.3, '**reversed** (-14 %)'),
-                               (1.9, '**reversed** (-29 %)')):
+        for error, verdict in ((2.6, 'agrees (-3 %)'), (2.5, 'agrees (-6 %)'), (2.46, 'agrees (-8 %)'),
+                               (2.3, '**reversed** (-14 %)'), (1.9, '**reversed** (-29 %)')):
             with self.subTest(error):
                 evaluation = self.evaluation('particles')
                 evaluation.method(OTHER, 'DPSO-80', error, 20)
@@ -187,8 +220,8 @@ class ReportTest(unittest.TestCase):
                 evaluation.write()
                 self.assertEqual(run(evaluation.folder).returncode, 0)
                 text = (evaluation.folder / 'report.md').read_text(encoding='utf-8')
-                self.assertIn(f'Mean error, `DPSO-80` / `PF-l-300`: {error / 2.5:.2f} here, 1.07 in the papers: {verdict}',
-                              text)
+                self.assertIn(f'Mean error, `DPSO-80` / `PF-l-300`: {error / 2.5:.2f} here, 1.07 in the papers: '
+                              f'{verdict}', text)
                 self.assertIn(f'{int("agrees" in verdict)} of 2 ratios agree', text)
 
     def test_the_comparison_has_the_t_tests_of_the_paper(self):
@@ -201,14 +234,14 @@ class ReportTest(unittest.TestCase):
         evaluation.write()
         self.assertEqual(run(evaluation.folder).returncode, 0)
         text = (evaluation.folder / 'report.md').read_text(encoding='utf-8')
-        self.assertIn('- Error of `DPSO-80` below that of `PF-l-100` by a t-test: t = -4; papers: below, on a level of 0.5 %'
-                      ': agrees.', text)
-        self.assertIn('`DPSO-80` below that of `PF-g-300` by a t-test: t = 4; papers: below, on a level of 0.5 %: '
+        self.assertIn('- Error of `DPSO-80` below that of `PF-l-100` by a t-test: t = -4.0; papers: below, on a level '
+                      'of 0.5 %: agrees.', text)
+        self.assertIn('`DPSO-80` below that of `PF-g-300` by a t-test: t = 4.0; papers: below, on a level of 0.5 %: '
                       '**not reproduced**.', text)
-        self.assertIn('`PF-l-300` below that of `PF-l-100` by a t-test: t = -1; papers: below, on a level of 0.5 %: '
+        self.assertIn('`PF-l-300` below that of `PF-l-100` by a t-test: t = -1.4; papers: below, on a level of 0.5 %: '
                       '**not reproduced**.', text)
         self.assertNotIn('that of `PF-g-100`', text)  # too few runs
-        self.assertIn('; 1 of 4 t-tests have the papers\' result; runs share', text)
+        self.assertIn('; 1 of 4 t-tests have the papers\' result (their runs share', text)
 
     def test_poses_have_tables_of_their_own(self):
         evaluation = self.evaluation('metric')
