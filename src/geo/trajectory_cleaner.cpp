@@ -95,8 +95,33 @@ std::vector<PathSample> samplesOf(const std::vector<Node>& nodes) {
   return samples;
 }
 
+/// Noise of a single fix along one axis, metres: by second differences, in which steady motion cancels. Errors that
+/// drift slowly do not show.
+double fixNoise_m(const std::vector<PathSample>& samples) {
+  constexpr double kSecondDifferences = 2.449;  // their standard deviation is sqrt(6) times that of white noise
+  constexpr double kNormal = 1.4826;            // standard deviation by the median of absolute values
+  std::vector<double> sizes_m;
+  for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
+    const double before_s = samples[i].time_s - samples[i - 1].time_s;
+    const double after_s = samples[i + 1].time_s - samples[i].time_s;
+    if (std::max(before_s, after_s) > 1.5 * std::min(before_s, after_s)) continue;  // a gap
+    const Eigen::Vector2d bend_m = samples[i + 1].position_m - 2.0 * samples[i].position_m + samples[i - 1].position_m;
+    sizes_m.insert(sizes_m.end(), {std::abs(bend_m.x()), std::abs(bend_m.y())});
+  }
+  return sizes_m.empty() ? 0.0 : kNormal / kSecondDifferences * median(std::move(sizes_m));
+}
+
+/// That of the way between two nodes, by the noise of the fixes that each is the median of.
+double nodeNoise_m(const std::vector<Node>& nodes, double fix_noise_m) {
+  constexpr double kOfMedian = 1.2533;  // standard deviation of a median over that of a mean
+  std::vector<double> counts;
+  for (const Node& node : nodes) counts.push_back(static_cast<double>(node.members.size()));
+  const double count = median(std::move(counts));
+  return std::sqrt(2.0) * (count > 2.0 ? kOfMedian : 1.0) * fix_noise_m / std::sqrt(count);
+}
+
 /// `rough_mps` stands in where the recording is too short to measure its speed over several nodes.
-DrivingModel motionOf(const std::vector<Node>& nodes, double node_s, double rough_mps,
+DrivingModel motionOf(const std::vector<Node>& nodes, double node_s, double rough_mps, double fix_noise_m,
                       const TrajectoryCleanerConfig& config) {
   constexpr double kLongSpan = 4.0;  // nodes
   const std::vector<PathSample> samples = samplesOf(nodes);
@@ -104,7 +129,8 @@ DrivingModel motionOf(const std::vector<Node>& nodes, double node_s, double roug
   const double measured_mps = measureSpeed(samples, kLongSpan * node_s).median_mps;
   motion.speed_mps = measured_mps > 0.0 ? std::max(kLeastSpeed, measured_mps) : rough_mps;
   motion.speed_std_mps = config.speed_tolerance * motion.speed_mps;
-  motion.step_noise_m = node_s * measureSpeed(samples, 0.5 * node_s).std_mps;
+  // Few steps say little about their own noise, and one that looks too small refuses good fixes.
+  motion.step_noise_m = std::max(node_s * measureSpeed(samples, 0.5 * node_s).std_mps, nodeNoise_m(nodes, fix_noise_m));
   motion.opening_cost = config.opening_cost;
   motion.rejection_cost = config.rejection_cost;
   motion.max_bridge_s = config.max_bridge_s;
@@ -260,7 +286,7 @@ CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFram
   const double rough_mps = std::max(kLeastSpeed, measureSpeed(usable.samples, 10.0 * interval_s).median_mps);
   const double node_s = std::max(0.9 * interval_s, config.node_length_m / rough_mps);
   const std::vector<Node> nodes = summarise(usable.samples, node_s);
-  const DrivingModel motion = motionOf(nodes, node_s, rough_mps, config);
+  const DrivingModel motion = motionOf(nodes, node_s, rough_mps, fixNoise_m(usable.samples), config);
   std::vector<bool> believed = consistentSamples(samplesOf(nodes), motion);
   widenRejections(nodes, config.margin_m / motion.speed_mps, believed);
   judgeNodes(nodes, believed, usable, kSpike * std::max(config.node_length_m, motion.speed_mps * node_s),

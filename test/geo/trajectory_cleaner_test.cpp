@@ -35,6 +35,30 @@ TEST(TrajectoryCleaner, ACleanRoundLosesNothing) {
   EXPECT_EQ(cleaned.gaps_closed, 0u);
 }
 
+// Thirty steps underestimate their own noise at times, and then refuse good fixes.
+TEST(TrajectoryCleaner, FewShortRecordingsLoseTheirFixesToNoise) {
+  constexpr int kDrives = 400;
+  constexpr int kSeconds = 45;
+  int shorter = 0;
+  std::size_t dropped = 0;
+  for (int seed = 1; seed <= kDrives; ++seed) {
+    std::mt19937 random(static_cast<std::uint32_t>(seed));
+    std::normal_distribution<double> noise_m(0.0, 0.4);
+    std::vector<Fix> fixes;
+    for (int i = 0; i < kSeconds * 5; ++i) {
+      const double time_s = 0.2 * i;
+      const double east_m = time_s + noise_m(random);
+      fixes.push_back({stampOf(time_s), LocalFrame(test::kDatum).toGeodetic({east_m, noise_m(random)}), true});
+    }
+    const CleanedTrajectory cleaned = clean(fixes);
+    const auto& points = cleaned.trajectory.points();
+    shorter += secondsBetween(points.front().stamp_ns, points.back().stamp_ns) < kSeconds - 2.5 ? 1 : 0;
+    dropped += fixes.size() - countOf(cleaned, FixVerdict::kKept);
+  }
+  EXPECT_LE(shorter, kDrives / 20);
+  EXPECT_LE(dropped, std::size_t{kDrives * kSeconds * 5} * 7 / 100);
+}
+
 TEST(TrajectoryCleaner, HeadingIsTheDirectionOfTravel) {
   const CleanedTrajectory cleaned = clean(record(block, 250.0));
   for (const double time_s : {20.0, 100.0, 150.0}) {
