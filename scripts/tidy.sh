@@ -50,7 +50,9 @@ main() {
   fi
   # The headers of the messages; a build without ROS has none.
   local messages=visual_localization_generate_messages_cpp
-  if cmake --build "$build" --target help | grep -q "$messages"; then cmake --build "$build" --target "$messages" >/dev/null; fi
+  if cmake --build "$build" --target help | grep -q "$messages"; then
+    cmake --build "$build" --target "$messages" >/dev/null
+  fi
   # A file that the build does not know has no compiler options to check it with.
   local known=() unknown=() file
   for file in "${files[@]}"; do
