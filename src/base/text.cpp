@@ -54,6 +54,18 @@ std::string csvField(const std::string& text) {
   return text.find_first_of(",\"\n") == std::string::npos ? text : csvQuoted(text);
 }
 
+std::vector<std::string> csvFields(const std::string& line) {
+  std::vector<std::string> fields(1);
+  for (const char c : line) {
+    if (c == ',') {
+      fields.emplace_back();
+    } else {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
 std::ostringstream numberStream(int digits) {
   std::ostringstream out;
   out.imbue(std::locale::classic());

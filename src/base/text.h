@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 #include <string>
+#include <vector>
 
 namespace visual_localization {
 
@@ -39,6 +40,9 @@ std::string csvQuoted(const std::string& text);
 
 /// A field of a CSV file, in quotes where it needs them.
 std::string csvField(const std::string& text);
+
+/// The fields of a line of a CSV file that has no quotes.
+std::vector<std::string> csvFields(const std::string& line);
 
 /// Decimal digits with which every number reads back as the same double.
 constexpr int kFullPrecision = std::numeric_limits<double>::max_digits10;

@@ -29,15 +29,7 @@ const std::array<const char*, 4> kColumns{"stamp_ns", "east_m", "north_m", "yaw_
 
 std::vector<std::string> fieldsOf(std::string line) {
   if (!line.empty() && line.back() == '\r') line.pop_back();
-  std::vector<std::string> fields(1);
-  for (const char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  return fields;
+  return csvFields(line);
 }
 
 template <class Number>

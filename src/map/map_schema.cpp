@@ -171,7 +171,7 @@ std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoin
   std::uint8_t* to = bytes.data();
   for (const SiftKeypoint& keypoint : keypoints) {
     for (const float value : {keypoint.x_px, keypoint.y_px, keypoint.size_px, keypoint.angle_deg}) {
-      putFloat(value, to);
+      putReal<float>(value, to);
       to += sizeof(float);
     }
   }
@@ -182,7 +182,7 @@ std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes) {
   std::vector<SiftKeypoint> keypoints(bytes.size / kKeypointBytes);
   const std::uint8_t* from = bytes.data;
   for (SiftKeypoint& keypoint : keypoints) {
-    keypoint = {getFloat(from), getFloat(from + 4), getFloat(from + 8), getFloat(from + 12)};
+    keypoint = {getReal<float>(from), getReal<float>(from + 4), getReal<float>(from + 8), getReal<float>(from + 12)};
     for (const float value : {keypoint.x_px, keypoint.y_px, keypoint.size_px, keypoint.angle_deg}) {
       if (!std::isfinite(value)) throw std::runtime_error("a keypoint is not finite");
     }
@@ -193,7 +193,7 @@ std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes) {
 
 std::vector<std::uint8_t> packHistogram(const GlobalFeatures::Histogram& histogram) {
   std::vector<std::uint8_t> bytes(kHistogramBytes);
-  for (std::size_t i = 0; i < histogram.size(); ++i) putFloat(histogram[i], &bytes[i * sizeof(float)]);
+  for (std::size_t i = 0; i < histogram.size(); ++i) putReal<float>(histogram[i], &bytes[i * sizeof(float)]);
   return bytes;
 }
 
@@ -201,7 +201,7 @@ GlobalFeatures::Histogram unpackHistogram(sqlite::Bytes bytes) {
   if (bytes.size != kHistogramBytes) throw std::runtime_error("a global descriptor has a wrong size");
   GlobalFeatures::Histogram histogram{};
   for (std::size_t i = 0; i < histogram.size(); ++i) {
-    histogram[i] = getFloat(bytes.data + i * sizeof(float));
+    histogram[i] = getReal<float>(bytes.data + i * sizeof(float));
     if (!(std::isfinite(histogram[i]) && histogram[i] >= 0.0F)) {
       throw std::runtime_error("a global descriptor is not finite or negative");
     }
@@ -237,11 +237,11 @@ std::vector<std::uint8_t> packPose(const ImageGeometry& geometry) {
   const Eigen::Vector3d& position_m = geometry.camera.position_m;
   const Eigen::Quaterniond& q = geometry.camera.rotation;
   for (const double value : {position_m.x(), position_m.y(), position_m.z(), q.w(), q.x(), q.y(), q.z()}) {
-    putDouble(value, to);
+    putReal<double>(value, to);
     to += sizeof(value);
   }
   forUpperTriangle(geometry.covariance, [&to](double value) {
-    putFloat(static_cast<float>(value), to);
+    putReal<float>(static_cast<float>(value), to);
     to += sizeof(float);
   });
   return bytes;
@@ -250,13 +250,13 @@ std::vector<std::uint8_t> packPose(const ImageGeometry& geometry) {
 void unpackPose(const std::uint8_t* from, ImageGeometry& geometry) {
   std::array<double, 7> values{};
   for (double& value : values) {
-    value = getDouble(from);
+    value = getReal<double>(from);
     from += sizeof(value);
   }
   geometry.camera.position_m = {values[0], values[1], values[2]};
   geometry.camera.rotation = {values[3], values[4], values[5], values[6]};
   forUpperTriangle(geometry.covariance, [&from](double& value) {
-    value = getFloat(from);
+    value = getReal<float>(from);
     from += sizeof(float);
   });
   geometry.covariance.triangularView<Eigen::StrictlyLower>() = geometry.covariance.transpose().eval();
@@ -270,7 +270,7 @@ void packLandmark(const SeenLandmark& landmark, bool is_short, std::uint8_t* to)
   }
   to += is_short ? 2 : 4;
   putLittleEndian(landmark.id, to);
-  for (Eigen::Index axis = 0; axis < 3; ++axis) putFloat(landmark.offset_m[axis], to + 4 + 4 * axis);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) putReal<float>(landmark.offset_m[axis], to + 4 + 4 * axis);
   to[16] = sigmaClass(landmark.sigma_along_m);
   to[17] = sigmaClass(landmark.sigma_across_m);
 }
@@ -280,7 +280,7 @@ SeenLandmark unpackLandmark(const std::uint8_t* from, bool is_short) {
   landmark.feature = is_short ? getLittleEndian<std::uint16_t>(from) : getLittleEndian<std::uint32_t>(from);
   from += is_short ? 2 : 4;
   landmark.id = getLittleEndian<std::uint32_t>(from);
-  landmark.offset_m = {getFloat(from + 4), getFloat(from + 8), getFloat(from + 12)};
+  landmark.offset_m = {getReal<float>(from + 4), getReal<float>(from + 8), getReal<float>(from + 12)};
   landmark.sigma_along_m = sigmaOf(from[16]);
   landmark.sigma_across_m = sigmaOf(from[17]);
   return landmark;

@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <map>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "map/sqlite.h"
@@ -133,28 +134,22 @@ Unsigned getLittleEndian(const std::uint8_t* from) {
   return value;
 }
 
-inline void putFloat(float value, std::uint8_t* to) {
-  std::uint32_t bits = 0;
+/// The bits of a float or a double.
+template <class Real>
+using RealBits = std::conditional_t<sizeof(Real) == sizeof(std::uint32_t), std::uint32_t, std::uint64_t>;
+
+template <class Real>
+void putReal(Real value, std::uint8_t* to) {
+  RealBits<Real> bits = 0;
+  static_assert(sizeof(bits) == sizeof(value));
   std::memcpy(&bits, &value, sizeof(bits));
   putLittleEndian(bits, to);
 }
 
-inline float getFloat(const std::uint8_t* from) {
-  const auto bits = getLittleEndian<std::uint32_t>(from);
-  float value = 0.0F;
-  std::memcpy(&value, &bits, sizeof(value));
-  return value;
-}
-
-inline void putDouble(double value, std::uint8_t* to) {
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &value, sizeof(bits));
-  putLittleEndian(bits, to);
-}
-
-inline double getDouble(const std::uint8_t* from) {
-  const auto bits = getLittleEndian<std::uint64_t>(from);
-  double value = 0.0;
+template <class Real>
+Real getReal(const std::uint8_t* from) {
+  const auto bits = getLittleEndian<RealBits<Real>>(from);
+  Real value = 0;
   std::memcpy(&value, &bits, sizeof(value));
   return value;
 }

@@ -29,6 +29,13 @@ TEST(Csv, AFieldIsQuotedWhereItNeedsToBe) {
   EXPECT_EQ(csvQuoted(""), "\"\"");
 }
 
+TEST(Csv, ALineHasAFieldMoreThanCommas) {
+  using Fields = std::vector<std::string>;
+  EXPECT_EQ(csvFields("a,bc,d"), (Fields{"a", "bc", "d"}));
+  EXPECT_EQ(csvFields(",a,,"), (Fields{"", "a", "", ""}));
+  EXPECT_EQ(csvFields(""), Fields{""});
+}
+
 /// Writes numbers as no file may have them.
 struct Commas : std::numpunct<char> {
   char do_decimal_point() const override { return ','; }

@@ -1,7 +1,6 @@
-#include <sstream>
-
 #include <gtest/gtest.h>
 
+#include "base/text.h"
 #include "evaluation/evaluator.h"
 #include "evaluation/metrics.h"
 
@@ -25,12 +24,8 @@ TEST(TrackCsv, RowHasAFieldForEveryColumnAndReadsBackExactly) {
   estimate.stamp_ns = 1226500000123456789;
   estimate.pose.position_m = {1.0 / 3.0, -2.0e-7};
   estimate.state = LocalizationState::kTracking;
-  std::istringstream header(trackCsvHeader());
-  std::istringstream row(trackCsvRow(estimate));
-  std::vector<std::string> columns;
-  std::vector<std::string> fields;
-  for (std::string cell; std::getline(header, cell, ',');) columns.push_back(cell);
-  for (std::string cell; std::getline(row, cell, ',');) fields.push_back(cell);
+  const std::vector<std::string> columns = csvFields(trackCsvHeader());
+  const std::vector<std::string> fields = csvFields(trackCsvRow(estimate));
   ASSERT_EQ(fields.size(), columns.size());
   EXPECT_EQ(columns.front(), "stamp");
   EXPECT_EQ(fields[0], "1226500000.123456789");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/text.h"
 #include "evaluation/evaluator.h"
 #include "test/evaluation/small_experiment.h"
 
@@ -13,18 +14,6 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 using Row = std::map<std::string, std::string>;
-
-std::vector<std::string> fieldsOf(const std::string& line) {
-  std::vector<std::string> fields(1);
-  for (const char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  return fields;
-}
 
 class ResultTables : public ::testing::Test {
  protected:
@@ -40,10 +29,10 @@ class ResultTables : public ::testing::Test {
     std::istringstream lines(test::readAll(results_.path() + "/" + name));
     std::string line;
     std::getline(lines, line);
-    const std::vector<std::string> columns = fieldsOf(line);
+    const std::vector<std::string> columns = csvFields(line);
     std::vector<Row> rows;
     while (std::getline(lines, line)) {
-      const std::vector<std::string> fields = fieldsOf(line);
+      const std::vector<std::string> fields = csvFields(line);
       EXPECT_EQ(fields.size(), columns.size()) << line;
       Row row;
       for (std::size_t i = 0; i < fields.size(); ++i) row[columns[i]] = fields[i];

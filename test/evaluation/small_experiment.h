@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/text.h"
 #include "evaluation/evaluator.h"
 #include "test/support/synthetic.h"
 #include "test/support/temporary_folder.h"
@@ -96,9 +97,9 @@ inline std::string withoutTimes(const std::string& table) {
   std::vector<bool> is_time;
   std::string kept;
   for (std::string line; std::getline(lines, line);) {
-    std::istringstream fields(line);
-    std::size_t column = 0;
-    for (std::string field; std::getline(fields, field, ','); ++column) {
+    const std::vector<std::string> fields = csvFields(line);
+    for (std::size_t column = 0; column < fields.size(); ++column) {
+      const std::string& field = fields[column];
       if (kept.find('\n') == std::string::npos) {
         is_time.push_back(field == "ms_per_image" || field == "extract_ms" || field == "match_ms" ||
                           field == "update_ms");

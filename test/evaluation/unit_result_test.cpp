@@ -1,12 +1,14 @@
 #include "evaluation/unit_result.h"
 
+#include <algorithm>
 #include <limits>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "base/text.h"
 
 namespace visual_localization {
 namespace {
@@ -35,10 +37,11 @@ UnitResult exampleUnit() {
 
 /// The fields of a row of a trace, by their columns.
 std::map<std::string, std::string> fieldsOf(const std::string& row) {
+  const std::vector<std::string> names = csvFields(kTraceColumns);
+  const std::vector<std::string> values = csvFields(row);
+  EXPECT_EQ(names.size(), values.size());
   std::map<std::string, std::string> fields;
-  std::istringstream names(kTraceColumns);
-  std::istringstream values(row);
-  for (std::string name; std::getline(names, name, ',');) std::getline(values, fields[name], ',');
+  for (std::size_t i = 0; i < std::min(names.size(), values.size()); ++i) fields[names[i]] = values[i];
   return fields;
 }
 

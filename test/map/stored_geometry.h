@@ -63,20 +63,20 @@ inline map_schema::PackedGeometry packedAsIs(const ImageGeometry& geometry) {
   map_schema::PackedGeometry packed{std::vector<std::uint8_t>(140),
                                     std::vector<std::uint8_t>(20 * geometry.landmarks.size())};
   const CameraPose& camera = geometry.camera;
-  for (Eigen::Index i = 0; i < 3; ++i) map_schema::putDouble(camera.position_m[i], &packed.pose[8 * i]);
+  for (Eigen::Index i = 0; i < 3; ++i) map_schema::putReal<double>(camera.position_m[i], &packed.pose[8 * i]);
   const double rotation[] = {camera.rotation.w(), camera.rotation.x(), camera.rotation.y(), camera.rotation.z()};
-  for (std::size_t i = 0; i < 4; ++i) map_schema::putDouble(rotation[i], &packed.pose[24 + 8 * i]);
+  for (std::size_t i = 0; i < 4; ++i) map_schema::putReal<double>(rotation[i], &packed.pose[24 + 8 * i]);
   std::uint8_t* to = &packed.pose[56];
   for (Eigen::Index row = 0; row < 6; ++row) {
     for (Eigen::Index column = row; column < 6; ++column, to += 4) {
-      map_schema::putFloat(static_cast<float>(geometry.covariance(row, column)), to);
+      map_schema::putReal<float>(static_cast<float>(geometry.covariance(row, column)), to);
     }
   }
   to = packed.points.data();
   for (const SeenLandmark& landmark : geometry.landmarks) {
     map_schema::putLittleEndian(static_cast<std::uint16_t>(landmark.feature), to);
     map_schema::putLittleEndian(landmark.id, to + 2);
-    for (Eigen::Index i = 0; i < 3; ++i) map_schema::putFloat(landmark.offset_m[i], to + 6 + 4 * i);
+    for (Eigen::Index i = 0; i < 3; ++i) map_schema::putReal<float>(landmark.offset_m[i], to + 6 + 4 * i);
     to[18] = map_schema::sigmaClass(landmark.sigma_along_m);
     to[19] = map_schema::sigmaClass(landmark.sigma_across_m);
     to += 20;
