@@ -62,6 +62,10 @@ struct MapFindings {
   std::optional<AmbiguousPlaces> ambiguity;  ///< only if it was checked
 };
 
+/// What a person wants to know about a map before a drive: sessions, coverage, density, headings and where it is weak.
+/// `path` is the map's file. However large the map, a few dozen lines.
+void printMapReport(std::ostream& out, const std::string& path, const TrainingMap& map, const MapFindings& findings);
+
 /// One line per image. `weak` is 1 for few features, `ambiguous` 1 for an image that looks like one far away and empty
 /// when that was not checked.
 std::string toCsv(const TrainingMap& map, const MapFindings& findings);

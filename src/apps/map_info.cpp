@@ -8,7 +8,6 @@
 #include "apps/app_support.h"
 #include "apps/command_line.h"
 #include "apps/map_export.h"
-#include "apps/map_report.h"
 #include "base/files.h"
 #include "visual_localization/map/map_file.h"
 

@@ -1,5 +1,3 @@
-#include "apps/map_report.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "apps/app_support.h"
+#include "apps/map_export.h"
 #include "base/numbers.h"
 #include "base/text.h"
 #include "visual_localization/map/map_file.h"

@@ -1,10 +1,9 @@
-#include "apps/map_report.h"
-
 #include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "apps/map_export.h"
 #include "test/support/example_map.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
