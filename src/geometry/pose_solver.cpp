@@ -11,6 +11,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "base/numbers.h"
+#include "geometry/ransac.h"
 #include "geometry/rays.h"
 
 namespace visual_localization {
@@ -24,7 +25,6 @@ constexpr double kNearest_m = 0.05;
 constexpr int kLeastSamples = 30;
 constexpr double kSharpness = 16.0;  ///< an inlier's noise is about a quarter of the tolerance
 constexpr int kMostSamples = 200;
-constexpr double kConfidence = 0.999;
 constexpr std::size_t kLeast = 4;
 constexpr int kMostSteps = 10;
 constexpr int kImprovements = 4;    ///< least squares steps for a better sample
@@ -101,18 +101,10 @@ CameraPose moved(const CameraPose& pose, const Vector6& step) {
           pose.position_m + step.head<3>()};
 }
 
-/// How many samples of three find one without an outlier, as surely as kConfidence.
-int samplesNeeded(double inlier_share) {
-  const double clean = inlier_share * inlier_share * inlier_share;
-  if (clean >= kConfidence) return kLeastSamples;
-  const double samples = std::ceil(std::log(1.0 - kConfidence) / std::log(1.0 - clean));
-  return static_cast<int>(std::clamp<double>(samples, kLeastSamples, kMostSamples));
-}
-
 /// RANSAC (Fischler and Bolles 1981) over the poses that three matches allow.
-class Sampler {
+class PoseSampler {
  public:
-  Sampler(const std::vector<LandmarkMatch>& matches, double tolerance) : matches_(matches), tolerance_(tolerance) {
+  PoseSampler(const std::vector<LandmarkMatch>& matches, double tolerance) : matches_(matches), tolerance_(tolerance) {
     // Relative to their middle, so that OpenCV need not subtract large numbers.
     for (const LandmarkMatch& match : matches) origin_ += match.landmark_m / static_cast<double>(matches.size());
   }
@@ -121,10 +113,11 @@ class Sampler {
   std::optional<CameraPose> best() {
     int samples = kMostSamples;
     for (int i = 0; i < samples; ++i) {
-      for (const CameraPose& pose : posesOf(draw())) {
+      for (const CameraPose& pose : posesOf(drawDistinct<3>(matches_.size(), random_))) {
         if (!keepIfBest(pose)) continue;
         improveBest();
-        samples = samplesNeeded(static_cast<double>(most_.inliers) / static_cast<double>(matches_.size()));
+        const double share = static_cast<double>(most_.inliers) / static_cast<double>(matches_.size());
+        samples = samplesNeeded(share, 3, kLeastSamples, kMostSamples);
       }
     }
     return best_;
@@ -137,16 +130,6 @@ class Sampler {
     std::size_t inliers = 0;
     double score = 0.0;  ///< less for an inlier that is farther off (Geman and McClure 1987)
   };
-
-  Sample draw() {
-    std::uniform_int_distribution<std::size_t> any(0, matches_.size() - 1);
-    Sample sample{any(random_)};
-    do sample[1] = any(random_);
-    while (sample[1] == sample[0]);
-    do sample[2] = any(random_);
-    while (sample[2] == sample[0] || sample[2] == sample[1]);
-    return sample;
-  }
 
   /// At most four, by AP3P (Ke and Roumeliotis 2017).
   std::vector<CameraPose> posesOf(const Sample& sample) const {
@@ -249,7 +232,7 @@ std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, d
                                     std::size_t min_inliers) {
   min_inliers = std::max(min_inliers, kLeast);
   if (matches.size() < min_inliers) return std::nullopt;
-  const std::optional<CameraPose> start = Sampler(matches, tolerance).best();
+  const std::optional<CameraPose> start = PoseSampler(matches, tolerance).best();
   return start ? refined(matches, *start, tolerance, min_inliers) : std::nullopt;
 }
 

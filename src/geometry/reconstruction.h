@@ -11,7 +11,7 @@
 #include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
 #include "geometry/rays.h"
-#include "geometry/rotation_averaging.h"
+#include "geometry/relative_rotation.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/geometry_config.h"

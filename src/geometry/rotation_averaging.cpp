@@ -1,5 +1,3 @@
-#include "geometry/rotation_averaging.h"
-
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
@@ -9,6 +7,7 @@
 #include "base/numbers.h"
 #include "geometry/bundle_residuals.h"
 #include "geometry/rays.h"
+#include "geometry/relative_rotation.h"
 #include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {

@@ -10,7 +10,7 @@
 #include "geometry/feature_tracks.h"
 #include "geometry/rays.h"
 #include "geometry/reconstruction.h"
-#include "geometry/rotation_averaging.h"
+#include "geometry/relative_rotation.h"
 
 namespace visual_localization {
 namespace {

@@ -1,7 +1,10 @@
-// Landmarks and poses of a session, by its number of images: time should grow as it does.
+// Landmarks and poses of a session, by its number of images: time should grow as it does. And verification of the
+// matches of two images, beside OpenCV's.
 #include <benchmark/benchmark.h>
+#include <opencv2/calib3d.hpp>
 #include <sys/resource.h>
 
+#include "geometry/relative_rotation.h"
 #include "test/support/landmark_world.h"
 
 namespace visual_localization {
@@ -41,6 +44,56 @@ void adjustStreet(benchmark::State& state) {
 }
 
 BENCHMARK(adjustStreet)->Arg(100)->Arg(400)->Arg(1600)->Arg(6400)->Iterations(1)->Unit(benchmark::kMillisecond);
+
+constexpr double kPixel = 1.0 / 450.0;
+
+/// 250 matches of a robot that drives 1 m and turns by 0.1 rad, to 0.3 pixels; `wrong_percent` of them lead anywhere.
+struct Matches {
+  std::vector<Eigen::Vector2d> a;
+  std::vector<Eigen::Vector2d> b;
+  std::vector<FeatureMatch> all;
+
+  explicit Matches(std::int64_t wrong_percent) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> side(-0.6, 0.6);
+    std::uniform_real_distribution<double> depth_m(4.0, 25.0);
+    std::normal_distribution<double> noise(0.0, 0.3 * kPixel);
+    const CameraPose b_in_a = {Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())), {0.1, 0.0, 1.0}};
+    const auto at = [&](auto& distribution) {
+      const double x = distribution(random);
+      return Eigen::Vector2d(x, distribution(random));
+    };
+    for (std::size_t i = 0; i < 250; ++i) {
+      const Eigen::Vector3d point = depth_m(random) * at(side).homogeneous();
+      a.emplace_back(point.hnormalized() + at(noise));
+      const bool is_wrong = static_cast<std::int64_t>(i) * 100 < wrong_percent * 250;
+      b.push_back(is_wrong ? at(side) : b_in_a.toCamera(point).hnormalized() + at(noise));
+      all.push_back({i, i});
+    }
+  }
+};
+
+void verifyMatches(benchmark::State& state) {
+  const Matches matches(state.range(0));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(verifyTwoViews(matches.a, matches.b, matches.all, kPixel, 15, 0.6));
+  }
+}
+BENCHMARK(verifyMatches)->Arg(0)->Arg(30)->Arg(60)->Unit(benchmark::kMillisecond);
+
+void verifyMatchesByOpenCv(benchmark::State& state) {
+  const Matches matches(state.range(0));
+  std::vector<cv::Point2d> a;
+  std::vector<cv::Point2d> b;
+  for (const Eigen::Vector2d& point : matches.a) a.emplace_back(point.x(), point.y());
+  for (const Eigen::Vector2d& point : matches.b) b.emplace_back(point.x(), point.y());
+  cv::Mat inliers;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        cv::findEssentialMat(a, b, cv::Mat::eye(3, 3, CV_64F), cv::USAC_MAGSAC, 0.999, kPixel, inliers));
+  }
+}
+BENCHMARK(verifyMatchesByOpenCv)->Arg(0)->Arg(30)->Arg(60)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace visual_localization

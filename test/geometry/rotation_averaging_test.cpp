@@ -1,11 +1,10 @@
-#include "geometry/rotation_averaging.h"
-
 #include <algorithm>
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "base/numbers.h"
+#include "geometry/relative_rotation.h"
 #include "test/support/landmark_world.h"
 
 namespace visual_localization {

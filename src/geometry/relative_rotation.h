@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "visual_localization/features/sift_matcher.h"
+
+namespace visual_localization {
+
+/// What two images of one static scene agree on.
+struct TwoView {
+  Eigen::Quaterniond b_from_a = Eigen::Quaterniond::Identity();  ///< turns directions of camera a into those of b
+  std::vector<FeatureMatch> inliers;                             ///< matches that lie on each other's epipolar lines
+};
+
+/// Verifies matches by the essential matrix: RANSAC over samples of five matches, whose motion is found by descent
+/// from any direction of travel without a turn (Botterill, Mills and Green 2011, BMVC), with random subsets of the
+/// inliers wherever a motion is the best so far (Chum, Matas and Kittler 2003) and a robust least squares estimate at
+/// the end. `a`, `b`: normalised image coordinates of all features, to which `matches` refer. `tolerance`, same unit:
+/// farthest of an inlier from both lines together, the root of the sum of both squared distances (to first order,
+/// Sampson 1982). Of the two rotations that explain the matrix the smaller is taken: with little parallax the test of
+/// depths picks the twisted one. Nothing when fewer than `min_inliers` remain or the cameras turn by more than
+/// `max_rotation_rad`. The result depends on the input alone.
+std::optional<TwoView> verifyTwoViews(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
+                                      const std::vector<FeatureMatch>& matches, double tolerance,
+                                      std::size_t min_inliers, double max_rotation_rad);
+
+/// How camera b is turned against camera a: turns directions in a's frame into those in b's.
+struct RelativeRotation {
+  std::uint32_t a = 0;
+  std::uint32_t b = 0;
+  Eigen::Quaterniond b_from_a = Eigen::Quaterniond::Identity();
+};
+
+/// What the directions of the cameras come to.
+struct AveragedRotations {
+  std::vector<Eigen::Quaterniond> camera_in_map;
+  /// How the camera is mounted: turned against a level camera that looks along the direction of travel, as a rotation
+  /// vector in its frame (x pitch, y yaw, z roll), radians.
+  Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();
+};
+
+/// Rotations of all cameras from relative rotations and the directions of travel (`travel_yaws_rad`, 0 = east,
+/// counter-clockwise), of which both may be wrong here and there (Cauchy losses). The mounting is one for all cameras.
+AveragedRotations averageRotations(const std::vector<double>& travel_yaws_rad,
+                                   const std::vector<RelativeRotation>& relative);
+
+}  // namespace visual_localization
