@@ -57,7 +57,7 @@ void printGeometry(const SessionImages& session) {
   if (geometry.contradicts_calibration) {
     std::cout << session.name << ": the images contradict the calibration (they ask for "
               << 100.0 * geometry.focal_scale << " % of its focal length, move " << 100.0 * geometry.far_share
-              << " % of the images by more than 3 m, and explain " << 100.0 * geometry.agreeing_share
+              << " % of the images that fixes confirm by more than 3 m, and explain " << 100.0 * geometry.agreeing_share
               << " % of the matched features): a map of places\n";
     return;
   }
@@ -66,11 +66,11 @@ void printGeometry(const SessionImages& session) {
             << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
             << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "
             << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
-            << " % of the calibration's; fixes come " << std::showpos << geometry.fix_delay_s << std::noshowpos
-            << " s late\n";
+            << " % of the calibration's; delay of fixes " << std::showpos << geometry.fix_delay_s << std::noshowpos
+            << " s\n";
   if (geometry.tied_apart_m > 0.0) {
-    std::cout << session.name << ": tied to the sessions before, which had the same " << geometry.tied_apart_m
-              << " m away\n";
+    std::cout << session.name << ": tied to the sessions before; median offset before that " << geometry.tied_apart_m
+              << " m\n";
   }
   std::cout << std::setprecision(1);
 }

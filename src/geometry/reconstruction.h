@@ -104,6 +104,7 @@ class Reconstruction {
   std::vector<std::set<std::uint32_t>> tiedSessions() const;
   double fixBias_m(const std::set<std::uint32_t>& tied) const;
   ImageGeometry imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const;
+  std::vector<bool> confirmedByFixes() const;
   void addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;

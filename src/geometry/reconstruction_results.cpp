@@ -14,6 +14,7 @@
 namespace visual_localization {
 namespace {
 
+constexpr double kConfirming_m = 1.0;         ///< from the cleaned path, of a fix that confirms it
 constexpr double kFar_m = 3.0;                ///< an image moved by more than this is far from the cleaned path
 constexpr std::size_t kEnoughTracked = 20;    ///< features of an image on average, for their share to say anything
 constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
@@ -87,10 +88,22 @@ ImageGeometry Reconstruction::imageAt(std::size_t image, const std::set<std::uin
   return geometry;
 }
 
+/// Where fixes are missing or err, the cleaned path is a guess: an image moved away from it says nothing there.
+std::vector<bool> Reconstruction::confirmedByFixes() const {
+  std::vector<bool> confirmed(images_.size());
+  for (const PositionObservation& fix : fixes_) {
+    confirmed[fix.image] = (fix.east_north_m - images_[fix.image].cleaned.position_m).norm() <= kConfirming_m;
+  }
+  return confirmed;
+}
+
 /// Images with enough landmarks, and how far they were moved.
 void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const {
+  const std::vector<bool> confirmed = confirmedByFixes();
+  std::vector<double> confirmed_images(geometries.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     SessionGeometry& geometry = geometries[sessionOf(i)];
+    confirmed_images[sessionOf(i)] += confirmed[i] ? 1.0 : 0.0;
     const auto least = static_cast<std::size_t>(config_.min_landmarks);
     if (images[i].landmarks.size() < least || isAstray(i)) {
       geometry.images.emplace_back();
@@ -103,11 +116,12 @@ void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vect
     const double shift_m = shiftOf_m(i).head<2>().norm();
     geometry.mean_shift_m += shift_m;
     geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
-    geometry.far_share += shift_m > kFar_m ? 1.0 : 0.0;
+    geometry.far_share += confirmed[i] && shift_m > kFar_m ? 1.0 : 0.0;
   }
-  for (SessionGeometry& geometry : geometries) {
+  for (std::size_t k = 0; k < geometries.size(); ++k) {
+    SessionGeometry& geometry = geometries[k];
     if (geometry.located > 0) geometry.mean_shift_m /= static_cast<double>(geometry.located);
-    geometry.far_share /= static_cast<double>(std::max<std::size_t>(1, geometry.images.size()));
+    geometry.far_share /= std::max(1.0, confirmed_images[k]);
   }
 }
 

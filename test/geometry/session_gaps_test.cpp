@@ -1,5 +1,7 @@
 // What a session may lack: motion, texture, images or fixes.
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <random>
 
@@ -107,6 +109,28 @@ TEST(SessionGeometry, BridgesImagesWithoutFixes) {
   const auto third = static_cast<std::ptrdiff_t>(fixes.size() / 3);
   fixes.erase(fixes.begin() + third, fixes.begin() + 2 * third);
   EXPECT_LT(pathError_m(adjusted(drive), drive.truth), kPathError_m);
+}
+
+// A cleaned path crosses a gap in a straight line, however the road bends. The images know better, and that is no sign
+// of a wrong calibration.
+TEST(SessionGeometry, IsBelievedWhereTheCleanedPathGuessed) {
+  test::StreetDrive street;
+  street.images = 90;
+  RecordedDrive drive = recorded(street, 15);
+  UnadjustedSession session = withTruePath(drive);
+  constexpr double kMost_m = 5.0;
+  for (std::size_t i = 25; i < 65; ++i) {
+    const double share = (static_cast<double>(i) - 25.0) / 40.0;
+    session.images[i].position_m.y() += kMost_m * std::pow(std::sin(M_PI * share), 2);
+  }
+  const auto is_in_gap = [&](const MapFix& fix) {
+    return fix.stamp_ns >= session.images[25].stamp_ns && fix.stamp_ns <= session.images[65].stamp_ns;
+  };
+  session.fixes.erase(std::remove_if(session.fixes.begin(), session.fixes.end(), is_in_gap), session.fixes.end());
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  EXPECT_GT(geometry.largest_shift_m, 0.8 * kMost_m);
+  EXPECT_FALSE(geometry.contradicts_calibration) << "far: " << geometry.far_share;
+  EXPECT_EQ(imagesIn(geometry), drive.truth.size());
 }
 
 void expectFinite(const SessionGeometry& geometry) {
