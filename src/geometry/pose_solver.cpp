@@ -30,6 +30,17 @@ constexpr int kMostSteps = 10;
 constexpr int kImprovements = 4;    ///< least squares steps for a better sample
 constexpr double kLossScale = 2.5;  ///< sigmas, of the Cauchy loss
 
+// A scene that moves.
+constexpr double kMotions_m[] = {0.1, 0.3};  ///< of landmarks since the day of the map
+constexpr double kMovingGain = 12.0;         ///< of the logarithm of the likelihood, over that of a rigid scene
+constexpr double kMovingStretch = 1.5;       ///< keypoints on what moves are found less well
+constexpr double kMovingAlike = 1.5;         ///< plants move in groups: this multiple of the sigmas of one by one
+constexpr double kWrongDensity = 1.0;        ///< of wrong matches in an image as wide and high as its focal length
+constexpr double kLeastShare = 0.02;         ///< of right matches, and of wrong ones
+constexpr double kLeastWeight = 1e-6;
+constexpr double kFarthestStep_m = 5.0;
+constexpr int kExpectations = 8;
+
 double errorOf(const LandmarkMatch& match, const CameraPose& pose) {
   const Eigen::Vector3d point = pose.toCamera(match.landmark_m);
   if (!(point.z() >= kNearest_m)) return std::numeric_limits<double>::infinity();
@@ -45,21 +56,66 @@ std::vector<std::size_t> inliersOf(const std::vector<LandmarkMatch>& matches, co
   return inliers;
 }
 
-/// Normal equations of all inliers, for a step of position (map frame) and rotation about the map's axes.
+/// How far sights may be off: keypoints and landmarks by `stretch` times what they tell, landmarks by `motion_m`
+/// besides.
+struct SceneNoise {
+  double stretch = 1.0;
+  double motion_m = 0.0;
+};
+
+/// A match as a pose sees it; normalised coordinates.
+struct Residual {
+  Eigen::Vector2d projected;
+  Eigen::Vector2d error;
+  Eigen::Matrix2d covariance;
+  Eigen::Matrix2d information;
+  Matrix26 jacobian;     ///< by a step of position (map frame) and rotation about the map's axes
+  double squared = 0.0;  ///< in sigmas
+};
+
+/// Nothing when the landmark is behind the camera.
+std::optional<Residual> residualOf(const LandmarkMatch& match, const CameraPose& pose,
+                                   const Eigen::Matrix3d& camera_from_map, const SceneNoise& noise = {}) {
+  const Eigen::Vector3d offset = match.landmark_m - pose.position_m;
+  const Eigen::Vector3d point = camera_from_map * offset;
+  if (!(point.z() >= kNearest_m)) return std::nullopt;
+  const double inverse_z = 1.0 / point.z();
+  Eigen::Matrix<double, 2, 3> by_point;
+  by_point << inverse_z, 0.0, -point.x() * inverse_z * inverse_z, 0.0, inverse_z, -point.y() * inverse_z * inverse_z;
+  const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera_from_map;
+  Residual residual;
+  residual.projected = point.hnormalized();
+  residual.error = residual.projected - match.normalised;
+  residual.covariance = noise.stretch * noise.stretch *
+                            (match.sigma * match.sigma * Eigen::Matrix2d::Identity() +
+                             by_landmark * match.covariance_m2 * by_landmark.transpose()) +
+                        noise.motion_m * noise.motion_m * by_landmark * by_landmark.transpose();
+  residual.information = residual.covariance.inverse();
+  residual.jacobian.leftCols<3>() = -by_landmark;
+  residual.jacobian.rightCols<3>() = by_landmark * crossMatrix(offset);
+  residual.squared = residual.error.dot(residual.information * residual.error);
+  return residual;
+}
+
+/// Normal equations for a step of position (map frame) and rotation about the map's axes.
 struct NormalEquations {
   Matrix6 information = Matrix6::Zero();
   Vector6 gradient = Vector6::Zero();
-  double squared_sigmas = 0.0;  ///< mean of the squared residuals
+  double squared_sigmas = 0.0;  ///< sum of the squared residuals
   // The same of the focal length's scale, alone and with the step.
   double focal_information = 0.0;
   double focal_gradient = 0.0;
   Vector6 focal_with_step = Vector6::Zero();
 
-  NormalEquations(const std::vector<LandmarkMatch>& matches, const std::vector<std::size_t>& inliers,
-                  const CameraPose& pose) {
-    const Eigen::Matrix3d camera_from_map = pose.rotation.conjugate().toRotationMatrix();
-    for (const std::size_t i : inliers) add(matches[i], pose, camera_from_map);
-    squared_sigmas /= 2.0 * static_cast<double>(inliers.size());
+  void add(const Residual& residual, double weight) {
+    const Matrix26 by_step = weight * residual.information * residual.jacobian;
+    information += residual.jacobian.transpose() * by_step;
+    gradient += by_step.transpose() * residual.error;
+    squared_sigmas += weight * residual.squared;
+    const Eigen::Vector2d by_focal = weight * residual.information * residual.projected;
+    focal_information += by_focal.dot(residual.projected);
+    focal_gradient += by_focal.dot(residual.error);
+    focal_with_step += residual.jacobian.transpose() * by_focal;
   }
 
   /// Towards the least squares.
@@ -67,34 +123,19 @@ struct NormalEquations {
     const Vector6 step = -information.ldlt().solve(gradient);
     return step.allFinite() ? std::optional<Vector6>(step) : std::nullopt;
   }
-
- private:
-  void add(const LandmarkMatch& match, const CameraPose& pose, const Eigen::Matrix3d& camera_from_map) {
-    const Eigen::Vector3d offset = match.landmark_m - pose.position_m;
-    const Eigen::Vector3d point = camera_from_map * offset;
-    if (!(point.z() >= kNearest_m)) return;
-    const double inverse_z = 1.0 / point.z();
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << inverse_z, 0.0, -point.x() * inverse_z * inverse_z, 0.0, inverse_z, -point.y() * inverse_z * inverse_z;
-    const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera_from_map;
-    const Eigen::Matrix2d covariance = match.sigma * match.sigma * Eigen::Matrix2d::Identity() +
-                                       by_landmark * match.covariance_m2 * by_landmark.transpose();
-    Matrix26 jacobian;
-    jacobian.leftCols<3>() = -by_landmark;
-    jacobian.rightCols<3>() = by_landmark * crossMatrix(offset);
-    const Eigen::Vector2d residual = point.hnormalized() - match.normalised;
-    const Eigen::Matrix2d inverse = covariance.inverse();
-    const double squared = residual.dot(inverse * residual);
-    const double weight = 1.0 / (1.0 + squared / (kLossScale * kLossScale));
-    information += weight * jacobian.transpose() * inverse * jacobian;
-    gradient += weight * jacobian.transpose() * inverse * residual;
-    squared_sigmas += weight * squared;
-    const Eigen::Vector2d by_focal = inverse * point.hnormalized();
-    focal_information += weight * by_focal.dot(point.hnormalized());
-    focal_gradient += weight * by_focal.dot(residual);
-    focal_with_step += weight * jacobian.transpose() * by_focal;
-  }
 };
+
+/// Of all inliers, with Cauchy's weights.
+NormalEquations equationsOf(const std::vector<LandmarkMatch>& matches, const std::vector<std::size_t>& inliers,
+                            const CameraPose& pose) {
+  NormalEquations equations;
+  const Eigen::Matrix3d camera_from_map = pose.rotation.conjugate().toRotationMatrix();
+  for (const std::size_t i : inliers) {
+    const std::optional<Residual> residual = residualOf(matches[i], pose, camera_from_map);
+    if (residual) equations.add(*residual, 1.0 / (1.0 + residual->squared / (kLossScale * kLossScale)));
+  }
+  return equations;
+}
 
 CameraPose moved(const CameraPose& pose, const Vector6& step) {
   return {(Eigen::Quaterniond(exponential(step.tail<3>())) * pose.rotation).normalized(),
@@ -169,7 +210,7 @@ class PoseSampler {
     for (int i = 0; i < kImprovements; ++i) {
       const std::vector<std::size_t> inliers = inliersOf(matches_, *best_, tolerance_);
       if (inliers.size() < kLeast) return;
-      const std::optional<Vector6> step = NormalEquations(matches_, inliers, *best_).step();
+      const std::optional<Vector6> step = equationsOf(matches_, inliers, *best_).step();
       if (!step || !keepIfBest(moved(*best_, *step))) return;
     }
   }
@@ -196,34 +237,121 @@ class PoseSampler {
   Support most_;  ///< of the best
 };
 
+/// `equations`: of the inliers at the pose. Nothing when they leave it open.
+std::optional<SolvedPose> solvedFrom(const std::vector<LandmarkMatch>& matches, const CameraPose& pose,
+                                     std::vector<std::size_t> inliers, const NormalEquations& equations) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(equations.information);
+  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().minCoeff() > 0.0)) return std::nullopt;
+  const double variance = std::max(1.0, equations.squared_sigmas / (2.0 * static_cast<double>(inliers.size())));
+  SolvedPose solved;
+  solved.camera = pose;
+  solved.covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+                      eigen.eigenvectors().transpose() * variance;
+  const Vector6 by_step = equations.information.ldlt().solve(equations.focal_with_step);
+  const double information = equations.focal_information - by_step.dot(equations.focal_with_step);
+  solved.focal_scale = 1.0 - (equations.focal_gradient - by_step.dot(equations.gradient)) / information;
+  solved.focal_sigma = std::sqrt(variance / information);
+  std::vector<double> errors;
+  for (const std::size_t i : inliers) errors.push_back(errorOf(matches[i], pose));
+  solved.median_error = median(errors);
+  solved.inliers = std::move(inliers);
+  return solved.covariance.allFinite() ? std::optional<SolvedPose>(solved) : std::nullopt;
+}
+
 /// Least squares on the inliers, which are chosen anew before each step.
 std::optional<SolvedPose> refined(const std::vector<LandmarkMatch>& matches, CameraPose pose, double tolerance,
                                   std::size_t min_inliers) {
   for (int i = 0; i < kMostSteps; ++i) {
     const std::vector<std::size_t> inliers = inliersOf(matches, pose, tolerance);
     if (inliers.size() < min_inliers) return std::nullopt;
-    const std::optional<Vector6> step = NormalEquations(matches, inliers, pose).step();
+    const std::optional<Vector6> step = equationsOf(matches, inliers, pose).step();
     if (!step) return std::nullopt;
     pose = moved(pose, *step);
     if (step->head<3>().norm() < 1e-5 && step->tail<3>().norm() < 1e-6) break;
   }
-  SolvedPose solved;
-  solved.camera = pose;
-  solved.inliers = inliersOf(matches, pose, tolerance);
-  if (solved.inliers.size() < min_inliers) return std::nullopt;
-  const NormalEquations equations(matches, solved.inliers, pose);
-  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(equations.information);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().minCoeff() > 0.0)) return std::nullopt;
-  solved.covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                      eigen.eigenvectors().transpose() * std::max(1.0, equations.squared_sigmas);
-  const Vector6 by_step = equations.information.ldlt().solve(equations.focal_with_step);
-  const double information = equations.focal_information - by_step.dot(equations.focal_with_step);
-  solved.focal_scale = 1.0 - (equations.focal_gradient - by_step.dot(equations.gradient)) / information;
-  solved.focal_sigma = std::sqrt(std::max(1.0, equations.squared_sigmas) / information);
-  std::vector<double> errors;
-  for (const std::size_t i : solved.inliers) errors.push_back(errorOf(matches[i], pose));
-  solved.median_error = median(errors);
-  return solved.covariance.allFinite() ? std::optional<SolvedPose>(solved) : std::nullopt;
+  std::vector<std::size_t> inliers = inliersOf(matches, pose, tolerance);
+  if (inliers.size() < min_inliers) return std::nullopt;
+  const NormalEquations equations = equationsOf(matches, inliers, pose);
+  return solvedFrom(matches, pose, std::move(inliers), equations);
+}
+
+/// The pose by all matches, of which some are wrong: right ones are off by the noise, wrong ones are anywhere in the
+/// image. By expectation maximisation (Dempster, Laird and Rubin 1977).
+class SceneFit {
+ public:
+  SceneFit(const std::vector<LandmarkMatch>& matches, const SolvedPose& start, const SceneNoise& noise)
+      : matches_(matches), noise_(noise), pose_(start.camera) {
+    expect(rightShare(static_cast<double>(start.inliers.size())));
+    for (int i = 0; i < kExpectations; ++i) {
+      const std::optional<Vector6> step = equations_.step();
+      if (!step || !(step->head<3>().norm() < kFarthestStep_m)) return;
+      pose_ = moved(pose_, *step);
+      expect(rightShare(right_));
+    }
+    ended_ = true;
+  }
+
+  double logLikelihood() const { return ended_ ? log_likelihood_ : -std::numeric_limits<double>::infinity(); }
+
+  std::optional<SolvedPose> solved() const { return solvedFrom(matches_, pose_, inliers_, equations_); }
+  std::size_t inliers() const { return inliers_.size(); }
+
+ private:
+  double rightShare(double right) const {
+    return std::clamp(right / static_cast<double>(matches_.size()), kLeastShare, 1.0 - kLeastShare);
+  }
+
+  /// Weighs each match by how probably it is right.
+  void expect(double right_share) {
+    equations_ = {};
+    inliers_.clear();
+    log_likelihood_ = 0.0;
+    right_ = 0.0;
+    const Eigen::Matrix3d camera_from_map = pose_.rotation.conjugate().toRotationMatrix();
+    for (std::size_t i = 0; i < matches_.size(); ++i) {
+      const std::optional<Residual> residual = residualOf(matches_[i], pose_, camera_from_map, noise_);
+      const double wrong = (1.0 - right_share) * kWrongDensity;
+      const double right = residual ? right_share * densityOf(*residual) : 0.0;
+      log_likelihood_ += std::log(right + wrong);
+      const double weight = right / (right + wrong);
+      right_ += weight;
+      if (weight > 0.5) inliers_.push_back(i);
+      if (weight > kLeastWeight) equations_.add(*residual, weight);
+    }
+  }
+
+  static double densityOf(const Residual& residual) {
+    return std::exp(-0.5 * residual.squared) / (2.0 * M_PI * std::sqrt(residual.covariance.determinant()));
+  }
+
+  const std::vector<LandmarkMatch>& matches_;
+  const SceneNoise noise_;
+  CameraPose pose_;
+  NormalEquations equations_;
+  std::vector<std::size_t> inliers_;  ///< more probably right than wrong
+  double right_ = 0.0;                ///< sum of the weights
+  double log_likelihood_ = 0.0;
+  bool ended_ = false;
+};
+
+/// Plants stand elsewhere than on the day of the map, near ones by many pixels. The few that agree with one pose by
+/// chance, to the pixel, are no better than the others: where a scene that moves explains the matches far better than a
+/// rigid one, all of them decide, near ones less. Nothing elsewhere.
+std::optional<SolvedPose> inMovingScene(const std::vector<LandmarkMatch>& matches, const SolvedPose& rigid,
+                                        std::size_t min_inliers) {
+  double best = SceneFit(matches, rigid, {}).logLikelihood() + kMovingGain;
+  std::optional<SolvedPose> moving;
+  for (const double motion_m : kMotions_m) {
+    const SceneFit fit(matches, rigid, {kMovingStretch, motion_m});
+    if (!(fit.logLikelihood() > best) || fit.inliers() < min_inliers) continue;
+    best = fit.logLikelihood();
+    moving = fit.solved();
+  }
+  if (!moving) return moving;
+  moving->covariance *= kMovingAlike * kMovingAlike;
+  moving->focal_scale = rigid.focal_scale;  // a wrong calibration must not pass for motion
+  moving->focal_sigma = rigid.focal_sigma;
+  return moving;
 }
 
 }  // namespace
@@ -233,7 +361,10 @@ std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, d
   min_inliers = std::max(min_inliers, kLeast);
   if (matches.size() < min_inliers) return std::nullopt;
   const std::optional<CameraPose> start = PoseSampler(matches, tolerance).best();
-  return start ? refined(matches, *start, tolerance, min_inliers) : std::nullopt;
+  const std::optional<SolvedPose> rigid = start ? refined(matches, *start, tolerance, min_inliers) : std::nullopt;
+  if (!rigid) return std::nullopt;
+  const std::optional<SolvedPose> moving = inMovingScene(matches, *rigid, min_inliers);
+  return moving ? moving : rigid;
 }
 
 }  // namespace visual_localization

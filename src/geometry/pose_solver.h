@@ -31,9 +31,10 @@ struct SolvedPose {
 };
 
 /// The pose from which most matches are right, the nearer the better: AP3P in RANSAC, then least squares on all
-/// inliers, each weighed by its own and its landmark's covariance (Cauchy loss). `tolerance`: farthest of an inlier
-/// from its landmark's projection, normalised coordinates. Nothing with fewer than `min_inliers` (at least 4), or when
-/// they leave the pose open. The result depends on the input alone.
+/// inliers, each weighed by its own and its landmark's covariance (Cauchy loss). Where landmarks that moved since the
+/// day of the map explain the matches far better, all matches decide, and the covariance grows. `tolerance`: farthest
+/// of an inlier from its landmark's projection, normalised coordinates. Nothing with fewer than `min_inliers` (at least
+/// 4), or when they leave the pose open. The result depends on the input alone.
 std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, double tolerance,
                                     std::size_t min_inliers);
 

@@ -180,9 +180,9 @@ std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& im
   pose.inliers = solved->inliers.size();
   pose.reprojection_px = solved->median_error * focal_px_;
   if (const auto geometry = map_.geometry(images.front())) pose.map_covariance = atBase(geometry->covariance, pose);
-  if (!(pose.sigma_m() <= config_.max_sigma_m)) return std::nullopt;
   focal_.add(solved->focal_scale, solved->focal_sigma);
-  return focal_.contradicts() ? std::nullopt : std::optional<MetricPose>(pose);
+  const bool is_sure = pose.sigma_m() <= config_.max_sigma_m;
+  return is_sure && !focal_.contradicts() ? std::optional<MetricPose>(pose) : std::nullopt;
 }
 
 /// Each training image is compared at most once.
