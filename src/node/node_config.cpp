@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <ros/master.h>
+#include <ros/this_node.h>
 
 #include "base/text.h"
 #include "node/map_recorder.h"
@@ -222,9 +223,16 @@ ParameterValues flatten(const XmlRpcValue& tree) {
 }
 
 bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values) {
-  if (!ros::master::check()) return false;
-  for (const auto& [name, value] : values) private_node.setParam(name, toXmlRpc(value));
-  return true;
+  // Not NodeHandle::setParam(): that waits without end for a master that is gone.
+  return std::all_of(values.begin(), values.end(), [&private_node](const auto& parameter) {
+    XmlRpcValue request;
+    XmlRpcValue response;
+    XmlRpcValue payload;
+    request[0] = ros::this_node::getName();
+    request[1] = private_node.resolveName(parameter.first);
+    request[2] = toXmlRpc(parameter.second);
+    return ros::master::execute("setParam", request, response, payload, false);
+  });
 }
 
 bool belongsToOthers(const std::string& name) {

@@ -64,8 +64,7 @@ std::string mapFileBelow(const std::string& directory, const std::string& path,
 /// parameter for anything that is neither a struct nor a scalar.
 ParameterValues flatten(const XmlRpc::XmlRpcValue& tree);
 
-/// Writes values into a node's private namespace. Without a master it writes nothing and returns false: roscpp would
-/// wait.
+/// Writes values into a node's private namespace. Returns false at the first one that no master takes.
 bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values);
 
 /// True for parameters that stand in a node's private namespace but belong to others: diagnostic_updater,
