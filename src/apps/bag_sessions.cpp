@@ -172,8 +172,8 @@ std::string host() {
 void printMerged(const MergedMap& map) {
   std::cout << oneLine(map.name) << ": " << map.images << " images, " << map.with_landmarks << " with landmarks; ";
   if (map.tied > 0) {
-    std::cout << map.tied << " see landmarks of the maps before, which had the same " << std::fixed
-              << std::setprecision(2) << map.apart_m << " m away; now " << map.left_m << " m (medians)\n";
+    std::cout << map.tied << " tied to the maps before: median offset " << std::fixed << std::setprecision(2)
+              << map.apart_m << " m before, " << map.left_m << " m after\n";
   } else if (map.with_landmarks == 0) {
     std::cout << "without landmarks it lies where its fixes have it\n";
   } else {
@@ -183,7 +183,7 @@ void printMerged(const MergedMap& map) {
 
 /// The first one stays.
 void printAllMerged(const std::vector<MergedMap>& merged) {
-  std::cout << oneLine(merged.front().name) << ": " << merged.front().images << " images, stays where it is\n";
+  std::cout << oneLine(merged.front().name) << ": " << merged.front().images << " images, the reference\n";
   for (std::size_t k = 1; k < merged.size(); ++k) printMerged(merged[k]);
 }
 

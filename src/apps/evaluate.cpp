@@ -52,7 +52,7 @@ std::string provenanceOf(const Experiment& experiment, const EvaluateOptions& op
     for (const std::string& file : {round.camera_info, round.poses}) {
       if (file.empty()) continue;
       text +=
-          csvField(file) + " of " + round.name + "," + fingerprintOf(besideBag(bagPath(options, round), file)) + "\n";
+          csvField(file + " of " + round.name) + "," + fingerprintOf(besideBag(bagPath(options, round), file)) + "\n";
     }
   }
   return text;

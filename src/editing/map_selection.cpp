@@ -49,7 +49,7 @@ Integer takeNumber(std::string_view& text, char separator, std::size_t line) {
   Integer number = 0;
   const auto read = std::from_chars(field.data(), field.data() + field.size(), number);
   if (read.ec != std::errc() || read.ptr != field.data() + field.size()) {
-    refuse(line, "'" + oneLine(std::string(field), 40) + "' is no number of the right kind");
+    refuse(line, "'" + oneLine(std::string(field), 40) + "' is not a valid number");
   }
   return number;
 }

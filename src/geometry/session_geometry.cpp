@@ -340,7 +340,7 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                 "fixes err alike for many images: this multiple of their sigma is that of one image's position"},
                fix_correlation, 1.0, 100.0);
   visitor.real({"geometry/fix_loss", "1",
-                "fixes much farther from the adjusted path than this multiple of that sigma lose their say"},
+                "fixes much farther from the adjusted path than this multiple of that sigma have no influence"},
                fix_loss, 0.01, 1000.0);
   visitor.real({"geometry/fix_bias", "1",
                 "what slow errors of the receiver leave in the map, per axis, as a multiple of a fix's sigma"},

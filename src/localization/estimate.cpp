@@ -74,8 +74,8 @@ double Estimate::sigmaYaw_rad() const { return metric ? metric->sigmaYaw_rad() :
 std::string Estimate::cameraTrouble() const {
   if (!camera_contradicted) return "";
   std::ostringstream text;
-  text << "the images ask for " << std::fixed << std::setprecision(1) << 100.0 * focal_scale
-       << " % of the calibration's focal length: no metric poses";
+  text << "the focal length estimated from the images is " << std::fixed << std::setprecision(1) << 100.0 * focal_scale
+       << " % of the calibration's: no metric poses";
   return text.str();
 }
 

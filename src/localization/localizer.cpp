@@ -58,7 +58,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   sessions_->startImage(stamp_ns);
   // Geometry looks where the motion leads. Without success the tracker proposes, and geometry disposes.
   std::optional<MetricPose> metric = poseNearPrediction(stamp_ns);
-  // Similarities to the training images are computed when somebody asks for them, each at most once.
+  // Similarities to the training images are computed on demand, each at most once.
   scores_.startImage(metric ? FeatureKind::kSift : choice_.next(),
                      [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
   sweep_.startImage();
@@ -74,7 +74,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   return answer(stopwatch.elapsed_ms());
 }
 
-/// The same stamp with the same pixels is the same image, come twice.
+/// The same pixels once more: an image that came twice has the same stamp, one of a frozen camera a new one.
 bool Localizer::isRepetition(std::int64_t stamp_ns) const {
   if (!last_ || !image_->isRepeated()) return false;
   return config_.state.frozen_images > 0 || last_->stamp_ns == stamp_ns;

@@ -24,7 +24,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
        "most similar training image, by how large things look (interpolated; SIFT only)"},
       estimate, {"image", "interpolated"});
   visitor.choice(
-      {"sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any map", kAtStartOnly},
+      {"sift_backend", "", "extractor of SIFT features, native or OpenCV's; their maps are compatible", kAtStartOnly},
       sift_backend, siftBackends());
   visitor.integer(
       {"seed", "1", "of the random generator; the same seed, map and images give the same track", kAtStartOnly}, seed,
@@ -38,9 +38,10 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
                min_position_std_m, 0.0, 1000.0);
   visitor.real({"min_yaw_std", "rad", "no heading without landmarks claims to be more accurate than this"},
                min_yaw_std_rad, 0.0, 3.2);
-  visitor.integer({"sweep_images", "1",
-                   "of a larger map, guided recovery and the place check compare at most this number per image"},
-                  sweep_images, 1, std::numeric_limits<int>::max());
+  visitor.integer(
+      {"sweep_images", "1",
+       "of a larger map, guided recovery, place check and proposals for poses compare about this number per image"},
+      sweep_images, 1, std::numeric_limits<int>::max());
   visitor.renamed("max_proposal_images", "sweep_images");
   visitor.renamed("state/place_check_images", "sweep_images");
   match.declare(visitor);

@@ -28,7 +28,7 @@ void OdometryConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"odometry/max_gap", "s", "longest time between two readings"}, max_gap_s, 0.001, 60.0);
   visitor.real({"odometry/distance_sigma", "1", "standard deviation of a position by odometry, share of the way"},
                distance_sigma, 0.0001, 1.0);
-  visitor.real({"odometry/turn_sigma", "rad/m", "standard deviation of a heading by odometry, by the way"},
+  visitor.real({"odometry/turn_sigma", "rad/m", "standard deviation of a heading by odometry, per metre driven"},
                turn_sigma_rad_m, 0.0, 1.0);
   visitor.real({"odometry/max_distance", "m", "longest way since the last verified pose that odometry bridges"},
                max_distance_m, 0.0, 100000.0);

@@ -59,7 +59,7 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"dpso/recovery_step", "1", "share of the way to the limits taken per bad image"}, recovery_step, 0.01,
                1.0);
   visitor.real({"dpso/v0_max", "1", "speed limit in recovery and of the speed adaptation"}, v0_max, 1e-6, 1.0);
-  visitor.real({"dpso/max_range", "m", "of a larger map, shares of its range are shares of this"}, max_range_m, 1.0,
+  visitor.real({"dpso/max_range", "m", "largest range of a map that shares of the range refer to"}, max_range_m, 1.0,
                100000.0);
   visitor.real({"dpso/quantum_share_max", "1", "share of quantum particles in recovery"}, quantum_share_max, 0.0, 1.0);
   visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);

@@ -72,7 +72,7 @@ void CameraWatch::findMount() {
   mount_ = mount;
   try {
     localizer_.setMount(mount);
-    say_(false, "The robot carries the camera as " + base_frame_ + " to " + camera_frame_ + " on /tf_static says");
+    say_(false, "Camera mounting from /tf_static: " + base_frame_ + " to " + camera_frame_);
   } catch (const MountError& error) {
     say_(true, "Mount of the camera refused: /tf_static: " + std::string(error.what()));
   }
@@ -128,7 +128,7 @@ void CameraWatch::mapIs(const MapHeader& map) {
 void CameraWatch::compareWithMap() {
   if (!camera_ || !of_map_) return;
   const std::string words = differences(camera_->scaledTo(map_size_), *of_map_);
-  if (!words.empty() && words != said_) say_(false, "Not the camera of the map: " + words);
+  if (!words.empty() && words != said_) say_(false, "The camera differs from the map's: " + words);
   said_ = words;
 }
 

@@ -209,7 +209,7 @@ void LocalizerDiagnostics::reportTransform(Wrapper& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool missing = !missing_transform_.empty();
   status.summary(missing ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
-                 missing ? "No transform broadcast: " + missing_transform_ : "Transform broadcast with every image");
+                 missing ? "No transform broadcast: " + missing_transform_ : "Transform broadcast");
 }
 
 void LocalizerDiagnostics::reportCamera(Wrapper& status) {

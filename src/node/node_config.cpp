@@ -128,10 +128,10 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
   visitor.text({"mask_file", "", "grey PNG of the camera's size, features are used where it is white; empty: the map's",
                 kAtStartOnly},
                mask_file);
-  visitor.text(
-      {"usage_file", "", "what metric poses rest on is counted there, for map_edit, an absolute path; empty: nowhere",
-       kAtStartOnly},
-      usage_file);
+  visitor.text({"usage_file", "",
+                "file that counts the landmarks used by metric poses, for map_edit; an absolute path; empty: none",
+                kAtStartOnly},
+               usage_file);
   visitor.text({"session_folder", "", "where ~record_session writes, an absolute path; empty: nowhere", kAtStartOnly},
                session_folder);
   visitor.choice({"tf_mode", "", "which transform is broadcast; map_to_odom needs odometry on tf", kAtStartOnly},

@@ -145,7 +145,7 @@ void SessionRecorder::offer(ros::NodeHandle private_node) {
   spinner_->start();
   std::error_code none;
   if (!folder_.empty() && !std::filesystem::is_directory(folder_, none)) {
-    ROS_WARN_STREAM("session_folder " << oneLine(folder_) << ": is no folder, so no session can be recorded");
+    ROS_WARN_STREAM("session_folder " << oneLine(folder_) << " is not a folder, so no session can be recorded");
   }
 }
 

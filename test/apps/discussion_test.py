@@ -205,15 +205,17 @@ class ShippedDiscussionTest(unittest.TestCase):
                 self.assertIn(f'| {title} | {" | ".join(quoted)} |', readme)
         ratio = numbers('comparisons per image', 'DPSO-80 / PF-l-100', '*', '.2f', comparison)
         share = numbers('SIFT steps', 'hybrid', 'Cost under changing illumination', '.0f', hybrid)
-        self.assertIn(f"half of PF-l-100's ({ratio} here), SIFT for 6 % of the images across light ({share} %)", readme)
+        text = ' '.join(readme.split())
+        self.assertIn(f'half the comparisons of PF-l-100 (here {ratio} of them)', text)
+        self.assertIn(f'SIFT for 6 % of the images across light (here {share} %)', text)
         theirs, ours = (numbers(column, 'adaptive, paper recovery, kidnapped', 'sunny → cloudy', '', kidnapped)
                         for column in ('mean error (papers)', 'mean error'))
-        self.assertIn(f'{theirs} m when kidnapped across light ({ours} m)', ' '.join(readme.split()))
+        self.assertIn(f'{theirs} m when kidnapped across light (here {ours} m)', text)
         same, across, off_map = (numbers('TRACKING beyond 5 m', method, group, form, states) for method, group, form in
                                  (('SIFT', 'sunny → sunny', '.1f'), ('SIFT', 'sunny → cloudy', '.0f'),
                                   ('SIFT, a third of the map missing', 'sunny → sunny', '.0f')))
         self.assertIn(f'Of `TRACKING` claims {same} % are wrong by more than 5 m in the same light, {across} % across, '
-                      f'and up to {off_map} % where a third is not in the map', ' '.join(readme.split()))
+                      f'and up to {off_map} % where a third is not in the map', text)
         failed = numbers('mean error', '*; !*, global', '*', '.0f', park)
         self.assertIn(f'every method with SIFT fails ({failed} m;', readme)
 

@@ -60,8 +60,8 @@ class MapEditTest(ProgramTest):
 
     def test_an_added_recording_lies_beside_the_old_one(self):
         self.assertEqual(self.added.returncode, 0, self.added.stderr)
-        tied, apart, left = re.search(r'(\d+) see landmarks of the maps before, which had the same ([\d.]+) m away; '
-                                      r'now ([\d.]+) m', self.added.stdout).groups()
+        tied, apart, left = re.search(r'(\d+) tied to the maps before: median offset ([\d.]+) m before, '
+                                      r'([\d.]+) m after', self.added.stdout).groups()
         old, rows = self.images(MAP), self.images(self.both)
         self.assertEqual(rows[:len(old)], old)
         new = rows[len(old):]

@@ -75,10 +75,10 @@ class CameraInfoTest(unittest.TestCase):
         last = self.wait_for_report(self.diagnostics.OK, "not the map's")
         self.assertIn('fx 150 instead of 266.285', last.message)
         self.show(other)
-        self.log.wait_for('Not the camera of the map', DEADLINE_S)
+        self.log.wait_for("The camera differs from the map's", DEADLINE_S)
         self.show(info())
         self.wait_for_report(self.diagnostics.OK, '266.3')
-        self.assertEqual(len(self.logged('Not the camera of the map')), 1)
+        self.assertEqual(len(self.logged("The camera differs from the map's")), 1)
         self.assertEqual(len(self.logged('The calibration of the camera changes: size 640 x 480')), 1)
 
     def test_5_a_file_needs_no_topic(self):
@@ -104,7 +104,7 @@ class CameraInfoTest(unittest.TestCase):
             images.publish(image)
             rospy.sleep(0.1)
             return [line for line in self.log.messages()
-                    if 'carries the camera as base_link to stereo_left' in line.msg and line.name == '/by_file']
+                    if 'Camera mounting from /tf_static: base_link to stereo_left' in line.msg and line.name == '/by_file']
         fixture.wait_for(told, DEADLINE_S, 'the mount of the camera')
 
     def test_7_odometry_is_subscribed_when_asked_for_and_refused_when_it_is_none(self):
