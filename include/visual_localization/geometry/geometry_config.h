@@ -8,7 +8,7 @@ namespace visual_localization {
 struct GeometryConfig {
   bool enabled = true;
   bool self_calibration = false;
-  int pair_span = 5;
+  int pair_span = 8;
   double match_ratio = 0.75;
   double epipolar_tolerance_px = 1.0;
   int min_pair_inliers = 15;
