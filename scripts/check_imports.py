@@ -1,24 +1,35 @@
 #!/usr/bin/python3
 """Checks that imports run one way, that public headers need no private one, and that few folders know ROS.
 
-A folder of src/ and include/visual_localization/ may include its own headers and those of the folders before it in
-ORDER, which doc/architecture.md explains.
+A folder of src/ and include/visual_localization/ may include its own headers and those of the folders above it in
+the list of doc/architecture.md.
 """
 import argparse
 import re
 import sys
 from pathlib import Path
-from typing import Iterator, Optional, Tuple
+from typing import Iterator, List, Optional, Tuple
 
 PACKAGE = 'visual_localization'
-ORDER = ['base', 'parameters', 'geo', 'camera', 'features', 'geometry', 'map', 'localization', 'editing', 'survey', 'ros', 'bag',
-         'evaluation', 'node', 'apps']
+ARCHITECTURE = Path(__file__).resolve().parent.parent / 'doc' / 'architecture.md'
 KNOWS_ROS = {'ros', 'bag', 'node', 'apps'}
 READS_BAGS = {'round_recorder'}  # of evaluation/: the rest of it belongs to the library without ROS
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 ROS_HEADER = re.compile(
     r'^(ros|rosbag|roscpp|nodelet|pluginlib|class_loader|camera_calibration_parsers|cv_bridge|image_transport|'
     r'message_filters|tf2?|tf2_\w+|\w+_msgs|std_srvs|diagnostic_updater|dynamic_reconfigure|topic_tools|bondcpp)/')
+
+
+def written_order() -> List[str]:
+    """The folders of src/ as doc/architecture.md lists them, top to bottom."""
+    listing = re.search(r'^src/ .*?\n(.*?)^\S', ARCHITECTURE.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE)
+    folders = re.findall(r'^  (\w+)/ ', listing.group(1), re.MULTILINE) if listing else []
+    if not folders:
+        sys.exit(f'{ARCHITECTURE}: there is no list of the folders of src/')
+    return folders
+
+
+ORDER = written_order()
 
 
 def includes(path: Path) -> Iterator[Tuple[int, str]]:
