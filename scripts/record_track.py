@@ -30,7 +30,7 @@ except ImportError:
 
 COLUMNS = ['stamp', 'east_m', 'north_m', 'yaw_rad', 'latitude_deg', 'longitude_deg', 'state', 'similarity', 'features',
            'comparisons', 'extract_ms', 'match_ms', 'update_ms', 'source', 'inliers', 'reprojection_px', 'sigma_m',
-           'sigma_yaw_rad', 'true_latitude_deg', 'true_longitude_deg', 'error_m']
+           'sigma_yaw_rad', 'swept', 'true_latitude_deg', 'true_longitude_deg', 'error_m']
 FEATURES = {LocalizationStatus.SIFT: 'SIFT', LocalizationStatus.GLOBAL: 'GLOBAL'}
 SAME_STAMP_S = 0.05  # a truth this near to an image belongs to it
 
@@ -199,7 +199,8 @@ def row(stamp: rospy.Time, recorder: Recorder, truth: Truth) -> Dict[str, object
               'features': FEATURES.get(status.features, status.features), 'comparisons': status.comparisons,
               'extract_ms': status.extract_ms, 'match_ms': status.match_ms, 'update_ms': status.update_ms,
               'source': status.source_name, 'inliers': status.inliers, 'reprojection_px': status.reprojection,
-              'sigma_m': status.sigma_position, 'sigma_yaw_rad': status.sigma_heading}
+              'sigma_m': status.sigma_position, 'sigma_yaw_rad': status.sigma_heading,
+              'swept': status.swept}
     exact = truth.at(stamp.to_sec())
     if exact:
         result['true_latitude_deg'], result['true_longitude_deg'] = exact

@@ -36,7 +36,7 @@ class Track:
         self.seconds = self.stamps - self.stamps[0]
         self.east, self.north = self._column(rows, 'east_m'), self._column(rows, 'north_m')
         self.error = self._column(rows, 'error_m')
-        self.comparisons = self._column(rows, 'comparisons')
+        self.comparisons, self.swept = self._column(rows, 'comparisons'), self._column(rows, 'swept')
         self.milliseconds = sum(self._column(rows, name) for name in ('extract_ms', 'match_ms', 'update_ms'))
         self.states = np.array([row['state'] for row in rows])
         self.sources = np.array([row.get('source', '') for row in rows])  # not in tracks of older versions
@@ -140,6 +140,8 @@ def summary(track: Track) -> List[str]:
             lines.append(f'  while tracking mean {tracking.mean():.2f} m, median {np.median(tracking):.2f} m')
     lines += metric_summary(track)
     lines.append(f'comparisons      {np.nanmean(track.comparisons):.1f} per image')
+    if np.isfinite(track.swept).any():  # not in tracks of older versions
+        lines.append(f'swept            {np.nanmean(track.swept):.1f} per image')
     lines.append(f'time             {np.nanmean(track.milliseconds):.1f} ms per image')
     shares = [(state, 100 * np.mean(track.states == state)) for state in STATES]
     lines.append('states           ' + ', '.join(f'{state} {share:.1f} %' for state, share in shares if share))

@@ -9,6 +9,9 @@ namespace visual_localization {
 
 constexpr double kPi = 3.14159265358979323846;
 
+constexpr double toDegrees(double angle_rad) { return angle_rad * 180.0 / kPi; }
+constexpr double toRadians(double angle_deg) { return angle_deg * kPi / 180.0; }
+
 /// The shorter way round from one angle to another, radians in [-pi, pi].
 inline double angleDifference(double from_rad, double to_rad) { return std::remainder(to_rad - from_rad, 2.0 * kPi); }
 

@@ -15,7 +15,7 @@
 namespace visual_localization::lens {
 namespace {
 
-constexpr double kWidestAngle_rad = 85.0 / 180.0 * kPi;
+constexpr double kWidestAngle_rad = toRadians(85.0);
 
 double at(const std::vector<double>& coefficients, std::size_t i) {
   return i < coefficients.size() ? coefficients[i] : 0.0;

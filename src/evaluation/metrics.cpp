@@ -175,7 +175,7 @@ constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 constexpr double kMostNees = 1e9;  ///< of a covariance that leaves no room for an error
 
 float degreesApart(double yaw_rad, double other_rad) {
-  return static_cast<float>(std::abs(angleDifference(other_rad, yaw_rad)) * 180.0 / kPi);
+  return static_cast<float>(toDegrees(std::abs(angleDifference(other_rad, yaw_rad))));
 }
 
 float neesOf(const Eigen::Vector2d& error_m, const Eigen::Matrix2d& covariance_m2) {

@@ -1,5 +1,6 @@
 #include "visual_localization/geometry/camera_pose.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <locale>
@@ -77,9 +78,9 @@ std::string describe(const SensorMount& mount) {
   std::ostringstream out;
   out.imbue(std::locale::classic());
   out << std::fixed << std::setprecision(2) << "camera at " << mount.camera.position_m.transpose().format(row)
-      << " m, looking " << std::setprecision(1) << std::atan2(ahead.y(), ahead.x()) * 180.0 / kPi
-      << " degrees to the left and " << std::asin(std::min(1.0, std::max(-1.0, ahead.z()))) * 180.0 / kPi
-      << " up; antenna at " << std::setprecision(2) << mount.antenna_m.transpose().format(row) << " m";
+      << " m, looking " << std::setprecision(1) << toDegrees(std::atan2(ahead.y(), ahead.x()))
+      << " degrees to the left and " << toDegrees(std::asin(std::clamp(ahead.z(), -1.0, 1.0))) << " up; antenna at "
+      << std::setprecision(2) << mount.antenna_m.transpose().format(row) << " m";
   return out.str();
 }
 

@@ -16,7 +16,7 @@ std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const P
   if (tracker == "pf_gaussian") {
     of_papers = std::make_unique<GaussianMotion>(config.gaussian_std_m);
   } else {
-    of_papers = std::make_unique<LinearMotion>(config.rotation_std_deg * kPi / 180.0, config.acceleration_std,
+    of_papers = std::make_unique<LinearMotion>(toRadians(config.rotation_std_deg), config.acceleration_std,
                                                config.initial_speed_m);
   }
   std::vector<std::unique_ptr<MotionModel>> parts;

@@ -12,6 +12,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "base/numbers.h"
 #include "features/image_size.h"
 #include "visual_localization/ros/image_conversion.h"
 
@@ -181,8 +182,7 @@ std::string inliersText(const LocalizationStatus& status) {
 }
 
 std::string sigmaText(const LocalizationStatus& status) {
-  constexpr double kDegreesPerRadian = 180.0 / M_PI;
-  return format("%.2f m, ", status.sigma_position) + format("%.1f deg", status.sigma_heading * kDegreesPerRadian);
+  return format("%.2f m, ", status.sigma_position) + format("%.1f deg", toDegrees(status.sigma_heading));
 }
 
 std::vector<Row> rowsOf(const LocalizationStatus& now) {

@@ -6,6 +6,8 @@
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
+#include "base/numbers.h"
+
 namespace visual_localization {
 namespace {
 
@@ -14,8 +16,6 @@ constexpr double kDark = 20.0;
 constexpr double kBright = 235.0;
 constexpr double kLowContrast = 8.0;
 constexpr double kStretched = 0.05;
-
-constexpr double kDegreesPerRadian = 180.0 / M_PI;
 
 const char* guessAt(const ImageStatistics& image) {
   if (image.mean_grey < kDark) return ": dark or covered?";
@@ -56,14 +56,14 @@ using diagnostic_msgs::DiagnosticStatus;
 void addPose(const Estimate& estimate, diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("Source of the pose", toString(estimate.source));
   status.addf("Sigma of position (m), heading (deg)", "%.2f, %.2f", estimate.sigma_m(),
-              estimate.sigmaYaw_rad() * kDegreesPerRadian);
+              toDegrees(estimate.sigmaYaw_rad()));
   if (!estimate.evidence.verified) return;  // landmarks are not used
   status.add("Images since the last metric pose", estimate.images_since_metric);
   if (!estimate.metric) return;
   status.add("Inliers", estimate.metric->inliers);
   status.addf("Reprojection error (px)", "%.2f", estimate.metric->reprojection_px);
   status.addf("Sigma of the map: position (m), heading (deg)", "%.2f, %.2f", estimate.metric->mapSigma_m(),
-              estimate.metric->mapSigmaYaw_rad() * kDegreesPerRadian);
+              toDegrees(estimate.metric->mapSigmaYaw_rad()));
 }
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
@@ -171,6 +171,7 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
   status.addf("Place ratio", "%.3f", estimate_->evidence.place_ratio);
   status.addf("Motion residual (m)", "%.2f", estimate_->motion_residual_m);
   status.add("Training images compared", estimate_->comparisons);
+  status.add("Training images compared by the map sweep", estimate_->swept);
   status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->tracked.spread_m.x(), estimate_->tracked.spread_m.y());
   status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->image.extract_ms, estimate_->image.match_ms,
               estimate_->update_ms);
