@@ -80,7 +80,7 @@ class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 1> {
     const Eigen::Matrix3d camera_from_map = exponential(-turn) * start_from_map_;
     const Eigen::Vector3d point = camera_from_map * (landmark - position);
     Eigen::Map<Eigen::Vector2d> residual(residuals);
-    if (point.z() < kNearest_m) {  // a constant: the robust loss gives it no say
+    if (point.z() < kNearest_m) {  // a constant: the robust loss takes its influence
       residual.setConstant(kBehind_sigmas);
       for (int block = 0; derivatives != nullptr && block < 3; ++block) {
         if (derivatives[block] != nullptr) std::fill_n(derivatives[block], kDerivatives[block], 0.0);
@@ -121,7 +121,7 @@ class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 1> {
   double weight_;
 };
 
-/// rho(s) = s / (1 + s / c^2): what is far off loses its say altogether (Geman and McClure 1987).
+/// rho(s) = s / (1 + s / c^2): what is far off has no influence at all (Geman and McClure 1987).
 class GemanMcClureLoss final : public ceres::LossFunction {
  public:
   explicit GemanMcClureLoss(double scale) : squared_(scale * scale) {}

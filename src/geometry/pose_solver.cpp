@@ -321,7 +321,7 @@ class SceneFit {
   }
 
   static double densityOf(const Residual& residual) {
-    return std::exp(-0.5 * residual.squared) / (2.0 * M_PI * std::sqrt(residual.covariance.determinant()));
+    return std::exp(-0.5 * residual.squared) / (2.0 * kPi * std::sqrt(residual.covariance.determinant()));
   }
 
   const std::vector<LandmarkMatch>& matches_;

@@ -33,7 +33,7 @@ constexpr double kRough = 1e-3;  ///< tells a focal length that is a hundredth o
 /// their tracks are cut.
 constexpr std::size_t kCoarseViews = 20;
 constexpr std::size_t kAllViews = std::numeric_limits<std::size_t>::max();
-constexpr double kCoarseLoss = 5.0;  ///< the same for the loss of fixes, as a multiple: no fix loses its say yet
+constexpr double kCoarseLoss = 5.0;  ///< the same for the loss of fixes, as a multiple: no fix is without influence yet
 
 using Indices = std::pair<std::uint32_t, std::uint32_t>;
 

@@ -23,7 +23,7 @@ constexpr int kSubsets = 20;
 constexpr std::size_t kSubsetSize = 14;
 constexpr int kSubsetSteps = 3;
 constexpr int kLastSteps = 10;
-constexpr double kReach = 9.0;  ///< squared tolerances, beyond which a match has no say
+constexpr double kReach = 9.0;  ///< squared tolerances, beyond which a match has no influence
 /// Squared tolerances at which a match has half the support (Geman and McClure 1987).
 constexpr double kHalfSupport = 2.0;
 

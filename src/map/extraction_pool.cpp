@@ -5,7 +5,6 @@
 #include <utility>
 
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "base/numbers.h"
 #include "base/parallel.h"
@@ -21,12 +20,9 @@ constexpr int kPreviewQuality = 70;
 std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
   if (width_px <= 0) return {};
   const int height_px = std::max(1, static_cast<int>(std::lround(1.0 * grey.rows * width_px / grey.cols)));
-  cv::Mat small = grey;
-  if (grey.size() != cv::Size(width_px, height_px)) {
-    cv::resize(grey, small, {width_px, height_px}, 0.0, 0.0, cv::INTER_AREA);
-  }
+  cv::Mat small;
   std::vector<std::uint8_t> jpeg;
-  cv::imencode(".jpg", small, jpeg, {cv::IMWRITE_JPEG_QUALITY, kPreviewQuality});
+  cv::imencode(".jpg", fitted(grey, {width_px, height_px}, small), jpeg, {cv::IMWRITE_JPEG_QUALITY, kPreviewQuality});
   return jpeg;
 }
 
