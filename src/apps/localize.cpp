@@ -252,13 +252,65 @@ OdometryFeed odometryOf(const LocalizeOptions& options, const NodeConfig& config
   return OdometryFeed(bag.odometry(options.odom_topic, config.base_frame_id, config.global_frame_id));
 }
 
-void run(const LocalizeOptions& options) {
-  const NodeParameters config = configOf(options);
+/// What a drive comes to.
+struct DriveResult {
+  std::string track = trackCsvHeader();
+  Totals totals;
+  std::string first_refusal;     ///< of an image that cannot be used
+  std::vector<double> errors_m;  ///< of images with a true position
+  MapUsage usage;
+  std::vector<Fix> verified;  ///< poses
+
+  void add(const Estimate& estimate, const Localizer& localizer, const std::optional<Trajectory>& truth) {
+    track += trackCsvRow(estimate);
+    totals.add(estimate);
+    if (estimate.source == PoseSource::kMetric) usage.add(localizer.map(), localizer.lastLandmarks());
+    if (estimate.evidence.verified.value_or(false)) verified.push_back(toFix(estimate));
+    const auto true_point = truth ? truth->at(estimate.stamp_ns) : std::nullopt;
+    if (true_point) errors_m.push_back((estimate.pose.position_m - true_point->position_m).norm());
+  }
+};
+
+DriveResult localizeDrive(const BagImages& images, const std::vector<std::size_t>& order,
+                          const std::optional<Trajectory>& truth, OdometryFeed odometry, Localizer& localizer) {
+  DriveResult result;
+  ProgressBar progress("localize");
+  for (std::size_t step = 0; step < order.size(); ++step) {
+    progress.show(step, order.size());
+    const bool follows = step > 0 && order[step] == order[step - 1] + 1;
+    const BagImage image = images.read(order[step]);
+    odometry.feed(image.stamp_ns, follows, localizer);
+    const std::optional<Estimate> estimate = localizeImage(image, order[step], localizer, result.first_refusal);
+    if (estimate) {
+      result.add(*estimate, localizer, truth);
+    } else {
+      ++result.totals.unusable;
+    }
+  }
+  progress.show(order.size(), order.size());
+  return result;
+}
+
+void print(const DriveResult& result, bool has_truth) {
+  if (!result.first_refusal.empty()) {
+    warn("localize: " + std::to_string(result.totals.unusable) + " images skipped, first " + result.first_refusal);
+  }
+  if (!result.totals.camera_trouble.empty()) warn("localize: camera: " + result.totals.camera_trouble);
+  print(result.totals);
+  if (has_truth) print(summarise(result.errors_m));
+}
+
+void requireOutputs(const LocalizeOptions& options) {
   std::vector<std::string> inputs{options.map, options.bag, options.config, options.camera_info, options.mask};
   requireNoInput("--output", options.output, inputs);
   inputs.push_back(options.output);
   if (!options.usage.empty()) requireNoInput("--usage", options.usage, inputs);
   requireExtension(options, inputs);
+}
+
+void run(const LocalizeOptions& options) {
+  const NodeParameters config = configOf(options);
+  requireOutputs(options);
   PartialFile output(options.output);  // fails now, not after the run
   std::optional<PartialFile> usage_file;
   if (!options.usage.empty()) usage_file.emplace(options.usage);
@@ -271,43 +323,16 @@ void run(const LocalizeOptions& options) {
   std::optional<Trajectory> truth;
   if (!options.truth_topic.empty()) truth = trueTrajectory(bag, options.truth_topic, localizer.map().frame());
 
-  std::string track = trackCsvHeader();
-  std::vector<double> errors_m;
-  std::string first_refusal;
-  Totals totals;
-  MapUsage usage;
-  std::vector<Fix> verified;
-  OdometryFeed odometry = odometryOf(options, config.node, bag);
-  ProgressBar progress("localize");
-  for (std::size_t step = 0; step < order.size(); ++step) {
-    progress.show(step, order.size());
-    const bool follows = step > 0 && order[step] == order[step - 1] + 1;
-    const BagImage image = images.read(order[step]);
-    odometry.feed(image.stamp_ns, follows, localizer);
-    const std::optional<Estimate> estimate = localizeImage(image, order[step], localizer, first_refusal);
-    if (!estimate) {
-      ++totals.unusable;
-      continue;
-    }
-    track += trackCsvRow(*estimate);
-    totals.add(*estimate);
-    if (estimate->source == PoseSource::kMetric) usage.add(localizer.map(), localizer.lastLandmarks());
-    if (estimate->evidence.verified.value_or(false)) verified.push_back(toFix(*estimate));
-    const auto true_point = truth ? truth->at(estimate->stamp_ns) : std::nullopt;
-    if (true_point) errors_m.push_back((estimate->pose.position_m - true_point->position_m).norm());
+  DriveResult drive = localizeDrive(images, order, truth, odometryOf(options, config.node, bag), localizer);
+  if (drive.totals.images == 0) {
+    throw BagError(options.bag + ": no usable image on " + images.topic() + ": " + drive.first_refusal);
   }
-  progress.show(order.size(), order.size());
-  if (totals.images == 0) throw BagError(options.bag + ": no usable image on " + images.topic() + ": " + first_refusal);
-  output.write(track);
+  output.write(drive.track);
   output.commit();
-  if (usage_file) usage_file->write(usage.toCsv());
+  if (usage_file) usage_file->write(drive.usage.toCsv());
   if (usage_file) usage_file->commit();
-  if (!first_refusal.empty())
-    warn("localize: " + std::to_string(totals.unusable) + " images skipped, first " + first_refusal);
-  if (!totals.camera_trouble.empty()) warn("localize: camera: " + totals.camera_trouble);
-  print(totals);
-  if (truth) print(summarise(std::move(errors_m)));
-  if (!options.extend.empty()) extend(options, localizer, std::move(verified), usage);
+  print(drive, truth.has_value());
+  if (!options.extend.empty()) extend(options, localizer, std::move(drive.verified), drive.usage);
 }
 
 }  // namespace

@@ -118,13 +118,7 @@ void LocalizerNodelet::start() {
         camera_->imageFrameIs(image.header.frame_id);
         worker_->push(std::move(image));
       });
-  if (!parameters_.node.map.empty()) {
-    try {
-      useMap(parameters_.node.map);
-    } catch (const std::exception& error) {
-      throw ParameterError("parameter 'map' is not allowed: must be a map file: " + std::string(error.what()));
-    }
-  }
+  useFirstMap();
   initial_pose_ = node.subscribe("initialpose", 1, &LocalizerNodelet::onInitialPose, this);
   if (parameters_.node.use_odometry) {
     odometry_ = node.subscribe("odom", kOdometryQueue, &LocalizerNodelet::onOdometry, this);
@@ -134,6 +128,15 @@ void LocalizerNodelet::start() {
   timer_ = node.createWallTimer(ros::WallDuration(kTimerPeriod_s), &LocalizerNodelet::onTimer, this);
   worker_->start(images_->topic());
   NODELET_INFO_STREAM(getName() << " listens to " << images_->topic());
+}
+
+void LocalizerNodelet::useFirstMap() {
+  if (parameters_.node.map.empty()) return;
+  try {
+    useMap(parameters_.node.map);
+  } catch (const std::exception& error) {
+    throw ParameterError("parameter 'map' is not allowed: must be a map file: " + std::string(error.what()));
+  }
 }
 
 void LocalizerNodelet::offerServices() {

@@ -42,6 +42,7 @@ class LocalizerNodelet : public nodelet::Nodelet {
   void onInit() override;
   void start();
   void stop();
+  void useFirstMap();
   void offerServices();
 
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose);
