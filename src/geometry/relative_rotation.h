@@ -22,10 +22,10 @@ struct TwoView {
 /// from any direction of travel without a turn (Botterill, Mills and Green 2011, BMVC), with random subsets of the
 /// inliers wherever a motion is the best so far (Chum, Matas and Kittler 2003) and a robust least squares estimate at
 /// the end. `a`, `b`: normalised image coordinates of all features, to which `matches` refer. `tolerance`, same unit:
-/// farthest of an inlier from both lines together, the root of the sum of both squared distances (to first order,
-/// Sampson 1982). Of the two rotations that explain the matrix the smaller is taken: with little parallax the test of
-/// depths picks the twisted one. Nothing when fewer than `min_inliers` remain or the cameras turn by more than
-/// `max_rotation_rad`. The result depends on the input alone.
+/// the most of an inlier's distance from both lines together, twice that of Sampson (1982). Of the two rotations that
+/// explain the matrix the smaller is taken: with little parallax the test of depths picks the twisted one. Nothing when
+/// fewer than `min_inliers` remain or the cameras turn by more than `max_rotation_rad`. The result depends on the input
+/// alone.
 std::optional<TwoView> verifyTwoViews(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
                                       const std::vector<FeatureMatch>& matches, double tolerance,
                                       std::size_t min_inliers, double max_rotation_rad);

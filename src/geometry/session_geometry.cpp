@@ -326,7 +326,7 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                   100);
   visitor.real({"geometry/match_ratio", "1", "largest ratio of the angles to the nearest and second nearest"},
                match_ratio, 0.1, 1.0);
-  visitor.real({"geometry/epipolar_tolerance", "px", "farthest of a match from its epipolar line"},
+  visitor.real({"geometry/epipolar_tolerance", "px", "farthest of a match from both epipolar lines together"},
                epipolar_tolerance_px, 0.01, 100.0);
   visitor.integer({"geometry/min_pair_inliers", "1", "two images with fewer verified matches do not count as a pair"},
                   min_pair_inliers, 6, 10000);

@@ -86,7 +86,7 @@ class MotionSampler {
       const double share = static_cast<double>(inliersOf(*best_).size()) / static_cast<double>(count());
       samples = samplesNeeded(share, kSampleSize, kLeastSamples, kMostSamples);
     }
-    if (best_) best_ = refined(*best_, kLastSteps);
+    if (best_) keepIfBest(refined(*best_, kLastSteps));
     return best_;
   }
 
@@ -104,7 +104,8 @@ class MotionSampler {
 
   std::size_t count() const { return static_cast<std::size_t>(a_.cols()); }
 
-  /// Squared distances from both epipolar lines together, in squared tolerances. Not a number at an epipole in both.
+  /// Four times Sampson's errors (1982), in squared tolerances: where a match is as far from both epipoles, the sum of
+  /// the squared distances from both epipolar lines. Not a number at an epipole in both.
   Eigen::ArrayXd squaredErrors(const Motion& motion) const {
     const Eigen::Matrix3d essential = motion.essential();
     const Eigen::Matrix3Xd lines_b = essential * a_;
@@ -159,9 +160,10 @@ class MotionSampler {
   }
 
   bool keepIfBest(const Motion& motion) {
+    const Eigen::ArrayXd squared = squaredErrors(motion);
     double support = 0.0;
-    for (const double squared : squaredErrors(motion)) {
-      if (squared <= kReach) support += supportOf(squared);
+    for (Eigen::Index i = 0; i < squared.size(); ++i) {
+      if (squared[i] <= kReach) support += supportOf(squared[i]);
     }
     if (!(support > support_)) return false;
     best_ = motion;

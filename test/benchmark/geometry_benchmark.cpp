@@ -2,6 +2,7 @@
 // matches of two images, beside OpenCV's.
 #include <benchmark/benchmark.h>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core/version.hpp>
 #include <sys/resource.h>
 
 #include "geometry/relative_rotation.h"
@@ -81,6 +82,7 @@ void verifyMatches(benchmark::State& state) {
 }
 BENCHMARK(verifyMatches)->Arg(0)->Arg(30)->Arg(60)->Unit(benchmark::kMillisecond);
 
+#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 5
 void verifyMatchesByOpenCv(benchmark::State& state) {
   const Matches matches(state.range(0));
   std::vector<cv::Point2d> a;
@@ -94,6 +96,7 @@ void verifyMatchesByOpenCv(benchmark::State& state) {
   }
 }
 BENCHMARK(verifyMatchesByOpenCv)->Arg(0)->Arg(30)->Arg(60)->Unit(benchmark::kMillisecond);
+#endif
 
 }  // namespace
 }  // namespace visual_localization
