@@ -35,10 +35,10 @@ constexpr double kMotions_m[] = {0.1, 0.3};  ///< of landmarks since the day of 
 constexpr double kMovingGain = 12.0;         ///< of the logarithm of the likelihood, over that of a rigid scene
 constexpr double kMovingStretch = 1.5;       ///< keypoints on what moves are found less well
 constexpr double kMovingAlike = 1.5;         ///< plants move in groups: this multiple of the sigmas of one by one
-constexpr double kWrongDensity = 1.0;        ///< of wrong matches in an image as wide and high as its focal length
+constexpr double kWrongDensity = 1.0;        ///< of wrong matches, by normalised area: 320 x 240 pixels at 266 have 1.1
 constexpr double kLeastShare = 0.02;         ///< of right matches, and of wrong ones
 constexpr double kLeastWeight = 1e-6;
-constexpr double kFarthestStep_m = 5.0;
+constexpr double kFarthest_m = 5.0;  ///< from the pose in a rigid scene
 constexpr int kExpectations = 8;
 
 double errorOf(const LandmarkMatch& match, const CameraPose& pose) {
@@ -254,6 +254,7 @@ std::optional<SolvedPose> solvedFrom(const std::vector<LandmarkMatch>& matches, 
   std::vector<double> errors;
   for (const std::size_t i : inliers) errors.push_back(errorOf(matches[i], pose));
   solved.median_error = median(errors);
+  solved.agreeing = inliers.size();
   solved.inliers = std::move(inliers);
   return solved.covariance.allFinite() ? std::optional<SolvedPose>(solved) : std::nullopt;
 }
@@ -284,14 +285,16 @@ class SceneFit {
     expect(rightShare(static_cast<double>(start.inliers.size())));
     for (int i = 0; i < kExpectations; ++i) {
       const std::optional<Vector6> step = equations_.step();
-      if (!step || !(step->head<3>().norm() < kFarthestStep_m)) return;
+      if (!step) return;
       pose_ = moved(pose_, *step);
+      if (!((pose_.position_m - start.camera.position_m).norm() < kFarthest_m)) return;
       expect(rightShare(right_));
     }
     ended_ = true;
   }
 
-  double logLikelihood() const { return ended_ ? log_likelihood_ : -std::numeric_limits<double>::infinity(); }
+  /// Nothing when it led away.
+  std::optional<double> logLikelihood() const { return ended_ ? std::optional<double>(log_likelihood_) : std::nullopt; }
 
   std::optional<SolvedPose> solved() const { return solvedFrom(matches_, pose_, inliers_, equations_); }
   std::size_t inliers() const { return inliers_.size(); }
@@ -339,16 +342,22 @@ class SceneFit {
 /// rigid one, all of them decide, near ones less. Nothing elsewhere.
 std::optional<SolvedPose> inMovingScene(const std::vector<LandmarkMatch>& matches, const SolvedPose& rigid,
                                         std::size_t min_inliers) {
-  double best = SceneFit(matches, rigid, {}).logLikelihood() + kMovingGain;
+  const std::optional<double> of_rigid = SceneFit(matches, rigid, {}).logLikelihood();
+  if (!of_rigid) return std::nullopt;
+  double best = *of_rigid + kMovingGain;
   std::optional<SolvedPose> moving;
   for (const double motion_m : kMotions_m) {
     const SceneFit fit(matches, rigid, {kMovingStretch, motion_m});
-    if (!(fit.logLikelihood() > best) || fit.inliers() < min_inliers) continue;
-    best = fit.logLikelihood();
-    moving = fit.solved();
+    const std::optional<double> likelihood = fit.logLikelihood();
+    if (!likelihood || !(*likelihood > best) || fit.inliers() < min_inliers) continue;
+    const std::optional<SolvedPose> solved = fit.solved();
+    if (!solved) continue;
+    best = *likelihood;
+    moving = solved;
   }
   if (!moving) return moving;
   moving->covariance *= kMovingAlike * kMovingAlike;
+  moving->agreeing = rigid.agreeing;
   moving->focal_scale = rigid.focal_scale;  // a wrong calibration must not pass for motion
   moving->focal_sigma = rigid.focal_sigma;
   return moving;

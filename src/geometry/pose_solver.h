@@ -23,7 +23,8 @@ struct SolvedPose {
   CameraPose camera;
   /// Position (map frame, metres), then rotation about the map's axes (radians).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  std::vector<std::size_t> inliers;  ///< of the matches
+  std::vector<std::size_t> inliers;  ///< of the matches; where landmarks moved, those more probably right than wrong
+  std::size_t agreeing = 0;          ///< matches within the tolerance of one pose: how little that is chance
   double median_error = 0.0;         ///< distance of an inlier from its landmark's projection, normalised coordinates
   /// What the inliers would rather have as focal length, as a share of the calibration's, and its standard deviation.
   double focal_scale = 1.0;

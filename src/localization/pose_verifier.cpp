@@ -177,7 +177,7 @@ std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& im
   pose.camera = solved->camera;
   pose.base = mount_.baseInMap(pose.camera);
   pose.covariance = config_.sigma_factor * config_.sigma_factor * atBase(solved->covariance, pose);
-  pose.inliers = solved->inliers.size();
+  pose.inliers = solved->agreeing;
   pose.reprojection_px = solved->median_error * focal_px_;
   if (const auto geometry = map_.geometry(images.front())) pose.map_covariance = atBase(geometry->covariance, pose);
   focal_.add(solved->focal_scale, solved->focal_sigma);

@@ -218,6 +218,8 @@ TEST(PoseSolver, IsNotSurerThanLeavesInTheWindAllow) {
   const CameraPose truth = somePose();
   constexpr int kRuns = 100;
   int within = 0;
+  int few_agree = 0;
+  double nees = 0.0;
   std::vector<double> errors_m;
   for (int run = 0; run < kRuns; ++run) {
     std::vector<LandmarkMatch> matches = exactMatches(truth, 150, 3.0, 15.0, random);
@@ -228,11 +230,19 @@ TEST(PoseSolver, IsNotSurerThanLeavesInTheWindAllow) {
     if (!solved) continue;
     const Eigen::Vector2d error = errorOf(solved->camera, truth).head<2>();
     const Eigen::Matrix2d covariance = solved->covariance.topLeftCorner<2, 2>();
-    within += error.dot(covariance.inverse() * error) <= 9.21 ? 1 : 0;  // 99 % of them
+    const double squared_sigmas = error.dot(covariance.inverse() * error);
+    within += squared_sigmas <= 9.21 ? 1 : 0;  // 99 % of them
+    nees += squared_sigmas;
+    few_agree += solved->agreeing < solved->inliers.size() / 2 ? 1 : 0;
+    EXPECT_GE(solved->agreeing, kMinInliers);
     errors_m.push_back(error.norm());
   }
   ASSERT_GT(errors_m.size(), 80U);
-  EXPECT_GE(within, static_cast<int>(0.95 * static_cast<double>(errors_m.size())));
+  const auto runs = static_cast<double>(errors_m.size());
+  EXPECT_GE(within, static_cast<int>(0.95 * runs));
+  EXPECT_GT(nees / runs, 0.4) << "2 would be right for leaves that move one by one; 0.9 for those that move in groups";
+  EXPECT_LT(nees / runs, 2.0);
+  EXPECT_GT(few_agree, static_cast<int>(0.9 * runs)) << "what shows that a pose is no chance counts to the pixel";
   EXPECT_LT(median(errors_m), 0.1);
 }
 
