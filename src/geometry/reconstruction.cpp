@@ -27,7 +27,6 @@ Eigen::Vector2d velocityAt_m_s(const std::vector<TrajectoryPoint>& path, std::si
   return (after.position_m - before.position_m) / elapsed_s;
 }
 
-constexpr double kBelieved_m = 1.0;        ///< a fix farther from the cleaned path has no altitude to believe either
 constexpr double kReach_m = 20.0;          ///< along the path
 constexpr double kSlope = 0.1;             ///< of usual roads, one sigma
 constexpr double kUsualSigma_m = 1.0;      ///< of an altitude whose receiver says nothing
@@ -57,7 +56,9 @@ std::vector<Altitude> altitudesOf(const std::vector<TrajectoryPoint>& images, co
   std::size_t next = 1;
   for (const MapFix& fix : fixes) {
     const std::optional<TrajectoryPoint> then = path.at(fix.stamp_ns);
-    if (!then || !std::isfinite(fix.up_m) || !((fix.position_m - then->position_m).norm() <= kBelieved_m)) continue;
+    if (!then || !std::isfinite(fix.up_m) ||
+        !((fix.position_m - then->position_m).norm() <= Reconstruction::kBelievedFix_m))
+      continue;
     while (next + 1 < images.size() && images[next].stamp_ns < fix.stamp_ns) ++next;
     const double way_m = (then->position_m - images[next - 1].position_m).norm();
     const double sigma_m = fix.sigma_up_m > 0.0 ? fix.sigma_up_m : kUsualSigma_m;
@@ -244,10 +245,13 @@ void Reconstruction::useFixes(double farthest_m, double loss) {
   bundle_.position_loss = loss;
   problem_.positions.clear();
   for (const PositionObservation& fix : fixes_) {
-    if ((fix.east_north_m - images_[fix.image].cleaned.position_m).norm() <= farthest_m) {
-      problem_.positions.push_back(fix);
-    }
+    if (isWithin(farthest_m, fix)) problem_.positions.push_back(fix);
   }
+}
+
+/// Of the cleaned path.
+bool Reconstruction::isWithin(double farthest_m, const PositionObservation& fix) const {
+  return (fix.east_north_m - images_[fix.image].cleaned.position_m).norm() <= farthest_m;
 }
 
 void Reconstruction::triangulateAll(double gate_px, std::size_t max_views) {

@@ -40,7 +40,8 @@ PathHeights pathHeights(const std::vector<TrajectoryPoint>& images, const std::v
 /// Images of one session or several, and what they show, while they are adjusted.
 class Reconstruction {
  public:
-  static constexpr std::size_t kMinViews = 3;  ///< of a landmark, in the end
+  static constexpr std::size_t kMinViews = 3;    ///< of a landmark, in the end
+  static constexpr double kBelievedFix_m = 1.0;  ///< from the cleaned path, of a fix that confirms it
 
   explicit Reconstruction(const GeometryConfig& config) : config_(config) {}
 
@@ -104,7 +105,8 @@ class Reconstruction {
   std::vector<std::set<std::uint32_t>> tiedSessions() const;
   double fixBias_m(const std::set<std::uint32_t>& tied) const;
   ImageGeometry imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const;
-  std::vector<bool> confirmedByFixes() const;
+  bool isWithin(double farthest_m, const PositionObservation& fix) const;
+  std::vector<bool> confirmedByFixes(std::size_t sessions) const;
   void addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;

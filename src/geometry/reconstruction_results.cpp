@@ -14,7 +14,7 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kConfirming_m = 1.0;         ///< from the cleaned path, of a fix that confirms it
+constexpr double kLeastConfirmed = 0.2;       ///< of a session's images, for these to speak for all
 constexpr double kFar_m = 3.0;                ///< an image moved by more than this is far from the cleaned path
 constexpr std::size_t kEnoughTracked = 20;    ///< features of an image on average, for their share to say anything
 constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
@@ -88,18 +88,27 @@ ImageGeometry Reconstruction::imageAt(std::size_t image, const std::set<std::uin
   return geometry;
 }
 
-/// Where fixes are missing or err, the cleaned path is a guess: an image moved away from it says nothing there.
-std::vector<bool> Reconstruction::confirmedByFixes() const {
+/// Where fixes are missing or err, the cleaned path is a guess: an image moved away from it says nothing there. Of a
+/// session of which fixes confirm little, all images.
+std::vector<bool> Reconstruction::confirmedByFixes(std::size_t sessions) const {
   std::vector<bool> confirmed(images_.size());
-  for (const PositionObservation& fix : fixes_) {
-    confirmed[fix.image] = (fix.east_north_m - images_[fix.image].cleaned.position_m).norm() <= kConfirming_m;
+  for (const PositionObservation& fix : fixes_) confirmed[fix.image] = isWithin(kBelievedFix_m, fix);
+  std::vector<std::size_t> counts(sessions);
+  std::vector<std::size_t> images(sessions);
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    ++images[sessionOf(i)];
+    counts[sessionOf(i)] += confirmed[i] ? 1 : 0;
+  }
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    const std::size_t k = sessionOf(i);
+    if (static_cast<double>(counts[k]) < kLeastConfirmed * static_cast<double>(images[k])) confirmed[i] = true;
   }
   return confirmed;
 }
 
 /// Images with enough landmarks, and how far they were moved.
 void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const {
-  const std::vector<bool> confirmed = confirmedByFixes();
+  const std::vector<bool> confirmed = confirmedByFixes(geometries.size());
   std::vector<double> confirmed_images(geometries.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     SessionGeometry& geometry = geometries[sessionOf(i)];

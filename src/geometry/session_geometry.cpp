@@ -21,7 +21,6 @@ constexpr std::uint32_t kRotationSpan = 3;  ///< images farther apart say little
 constexpr double kMostFar = 0.05;           ///< share of images far from the cleaned path in a session to be believed
 constexpr double kFocalTolerance = 0.01;
 constexpr double kLeastAgreeing = 2.0 / 3.0;  ///< share of the tracked features that must agree with the adjustment
-constexpr double kBelievedFix_m = 1.0;        ///< from the cleaned path: what the first adjustment takes
 constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 /// Relative changes of the cost at which adjustments end. The whole path turns and shifts along a flat valley of the
 /// cost: thousands of sightings hardly feel it. With 100 times as much it stops on the way, metres off where the camera
@@ -140,7 +139,7 @@ class SessionAdjuster {
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
   void adjust() {
-    reconstruction_.useFixes(kBelievedFix_m, kCoarseLoss * config_.fix_loss);
+    reconstruction_.useFixes(Reconstruction::kBelievedFix_m, kCoarseLoss * config_.fix_loss);
     reconstruction_.triangulateAll(20.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
     reconstruction_.bringBack();

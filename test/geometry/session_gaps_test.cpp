@@ -133,6 +133,27 @@ TEST(SessionGeometry, IsBelievedWhereTheCleanedPathGuessed) {
   EXPECT_EQ(imagesIn(geometry), drive.truth.size());
 }
 
+// Fixes that agree with each other and are wrong by 5 m look like images that were bent by a wrong calibration.
+TEST(SessionGeometry, IsNotBelievedWhereImagesLeaveConfirmedFixes) {
+  test::StreetDrive street;
+  street.images = 90;
+  RecordedDrive drive = recorded(street, 15);
+  UnadjustedSession session = withTruePath(drive);
+  constexpr double kMost_m = 8.0;
+  const std::int64_t begin_ns = session.images[25].stamp_ns;
+  const std::int64_t end_ns = session.images[65].stamp_ns;
+  const auto aside_m = [&](std::int64_t stamp_ns) {
+    if (stamp_ns < begin_ns || stamp_ns > end_ns) return 0.0;
+    const double share = static_cast<double>(stamp_ns - begin_ns) / static_cast<double>(end_ns - begin_ns);
+    return kMost_m * std::pow(std::sin(M_PI * share), 2);
+  };
+  for (auto& image : session.images) image.position_m.y() += aside_m(image.stamp_ns);
+  for (MapFix& fix : session.fixes) fix.position_m.y() += aside_m(fix.stamp_ns);
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  EXPECT_GT(geometry.far_share, 0.05);
+  EXPECT_TRUE(geometry.contradicts_calibration);
+}
+
 void expectFinite(const SessionGeometry& geometry) {
   for (const auto& image : geometry.images) {
     if (!image) continue;

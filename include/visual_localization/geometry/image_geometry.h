@@ -38,7 +38,8 @@ struct SessionLandmarks {
   double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
   double mean_shift_m = 0.0;             ///< of these images from the cleaned path
   double largest_shift_m = 0.0;
-  double far_share = 0.0;       ///< of the images that fixes confirm (to 1 m): moved by more than 3 m
+  /// Of the images that fixes confirm (to 1 m), or of all when these are less than a fifth: moved by more than 3 m.
+  double far_share = 0.0;
   double fix_delay_s = 0.0;     ///< fixes say where the antenna was this long before their stamps
   double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
   double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
