@@ -224,15 +224,16 @@ ParameterValues flatten(const XmlRpcValue& tree) {
 
 bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values) {
   // Not NodeHandle::setParam(): that waits without end for a master that is gone.
-  return std::all_of(values.begin(), values.end(), [&private_node](const auto& parameter) {
+  for (const auto& [name, value] : values) {
     XmlRpcValue request;
     XmlRpcValue response;
     XmlRpcValue payload;
     request[0] = ros::this_node::getName();
-    request[1] = private_node.resolveName(parameter.first);
-    request[2] = toXmlRpc(parameter.second);
-    return ros::master::execute("setParam", request, response, payload, false);
-  });
+    request[1] = private_node.resolveName(name);
+    request[2] = toXmlRpc(value);
+    if (!ros::master::execute("setParam", request, response, payload, false)) return false;
+  }
+  return true;
 }
 
 bool belongsToOthers(const std::string& name) {

@@ -221,7 +221,7 @@ bool ReconfigureServer::onSet(dynamic_reconfigure::Reconfigure::Request& request
     if (!values.empty()) apply_(changed, values);
     parameters_ = changed;
     if (!storeParameters(private_node_, values))
-      warn_("the new values are in force, but there is no master to store them");
+      warn_("the new values are in force, but the parameter server did not take them");
   } catch (const std::exception& error) {
     warn_(std::string("not changed: ") + error.what());
   }
