@@ -56,9 +56,8 @@ std::vector<Altitude> altitudesOf(const std::vector<TrajectoryPoint>& images, co
   std::size_t next = 1;
   for (const MapFix& fix : fixes) {
     const std::optional<TrajectoryPoint> then = path.at(fix.stamp_ns);
-    if (!then || !std::isfinite(fix.up_m) ||
-        !((fix.position_m - then->position_m).norm() <= Reconstruction::kBelievedFix_m))
-      continue;
+    if (!then || !std::isfinite(fix.up_m)) continue;
+    if (!((fix.position_m - then->position_m).norm() <= Reconstruction::kBelievedFix_m)) continue;
     while (next + 1 < images.size() && images[next].stamp_ns < fix.stamp_ns) ++next;
     const double way_m = (then->position_m - images[next - 1].position_m).norm();
     const double sigma_m = fix.sigma_up_m > 0.0 ? fix.sigma_up_m : kUsualSigma_m;

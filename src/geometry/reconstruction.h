@@ -106,7 +106,8 @@ class Reconstruction {
   double fixBias_m(const std::set<std::uint32_t>& tied) const;
   ImageGeometry imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const;
   bool isWithin(double farthest_m, const PositionObservation& fix) const;
-  std::vector<bool> confirmedByFixes(std::size_t sessions) const;
+  std::vector<bool> confirmedByFixes() const;
+  double farShare(const SessionGeometry& geometry, std::size_t begin, const std::vector<bool>& confirmed) const;
   void addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;

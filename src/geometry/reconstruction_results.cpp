@@ -88,31 +88,33 @@ ImageGeometry Reconstruction::imageAt(std::size_t image, const std::set<std::uin
   return geometry;
 }
 
-/// Where fixes are missing or err, the cleaned path is a guess: an image moved away from it says nothing there. Of a
-/// session of which fixes confirm little, all images.
-std::vector<bool> Reconstruction::confirmedByFixes(std::size_t sessions) const {
+std::vector<bool> Reconstruction::confirmedByFixes() const {
   std::vector<bool> confirmed(images_.size());
   for (const PositionObservation& fix : fixes_) confirmed[fix.image] = isWithin(kBelievedFix_m, fix);
-  std::vector<std::size_t> counts(sessions);
-  std::vector<std::size_t> images(sessions);
-  for (std::size_t i = 0; i < images_.size(); ++i) {
-    ++images[sessionOf(i)];
-    counts[sessionOf(i)] += confirmed[i] ? 1 : 0;
-  }
-  for (std::size_t i = 0; i < images_.size(); ++i) {
-    const std::size_t k = sessionOf(i);
-    if (static_cast<double>(counts[k]) < kLeastConfirmed * static_cast<double>(images[k])) confirmed[i] = true;
-  }
   return confirmed;
+}
+
+/// Of the images that fixes confirm: elsewhere the cleaned path is a guess, and an image moved away from it says
+/// nothing. Of a session of which fixes confirm little, all images. `geometry`: its images; `begin`: the first of them.
+double Reconstruction::farShare(const SessionGeometry& geometry, std::size_t begin,
+                                const std::vector<bool>& confirmed) const {
+  const auto first = confirmed.begin() + static_cast<std::ptrdiff_t>(begin);
+  const std::size_t images = geometry.images.size();
+  auto counted = static_cast<double>(std::count(first, first + static_cast<std::ptrdiff_t>(images), true));
+  const bool all = counted < kLeastConfirmed * static_cast<double>(images);
+  if (all) counted = static_cast<double>(images);
+  double far = 0.0;
+  for (std::size_t k = 0; k < images; ++k) {
+    const bool counts = geometry.images[k] && (all || confirmed[begin + k]);
+    if (counts && shiftOf_m(begin + k).head<2>().norm() > kFar_m) far += 1.0;
+  }
+  return far / std::max(1.0, counted);
 }
 
 /// Images with enough landmarks, and how far they were moved.
 void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const {
-  const std::vector<bool> confirmed = confirmedByFixes(geometries.size());
-  std::vector<double> confirmed_images(geometries.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     SessionGeometry& geometry = geometries[sessionOf(i)];
-    confirmed_images[sessionOf(i)] += confirmed[i] ? 1.0 : 0.0;
     const auto least = static_cast<std::size_t>(config_.min_landmarks);
     if (images[i].landmarks.size() < least || isAstray(i)) {
       geometry.images.emplace_back();
@@ -125,12 +127,12 @@ void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vect
     const double shift_m = shiftOf_m(i).head<2>().norm();
     geometry.mean_shift_m += shift_m;
     geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
-    geometry.far_share += confirmed[i] && shift_m > kFar_m ? 1.0 : 0.0;
   }
+  const std::vector<bool> confirmed = confirmedByFixes();
   for (std::size_t k = 0; k < geometries.size(); ++k) {
     SessionGeometry& geometry = geometries[k];
     if (geometry.located > 0) geometry.mean_shift_m /= static_cast<double>(geometry.located);
-    geometry.far_share /= std::max(1.0, confirmed_images[k]);
+    geometry.far_share = farShare(geometry, begin(k), confirmed);
   }
 }
 

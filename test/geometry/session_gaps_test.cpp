@@ -111,44 +111,56 @@ TEST(SessionGeometry, BridgesImagesWithoutFixes) {
   EXPECT_LT(pathError_m(adjusted(drive), drive.truth), kPathError_m);
 }
 
+/// How far aside a bump lies: 0 at the images `begin` and `end` of a session and beyond, `most_m` midway.
+struct Bump {
+  std::int64_t begin_ns;
+  std::int64_t end_ns;
+  double most_m;
+
+  Bump(const UnadjustedSession& session, std::size_t begin, std::size_t end, double most)
+      : begin_ns(session.images[begin].stamp_ns), end_ns(session.images[end].stamp_ns), most_m(most) {}
+
+  bool holds(std::int64_t stamp_ns) const { return stamp_ns >= begin_ns && stamp_ns <= end_ns; }
+
+  double aside_m(std::int64_t stamp_ns) const {
+    if (!holds(stamp_ns)) return 0.0;
+    const double share = static_cast<double>(stamp_ns - begin_ns) / static_cast<double>(end_ns - begin_ns);
+    return most_m * std::pow(std::sin(M_PI * share), 2);
+  }
+
+  void applyTo(std::vector<TrajectoryPoint>& images) const {
+    for (TrajectoryPoint& image : images) image.position_m.y() += aside_m(image.stamp_ns);
+  }
+};
+
+RecordedDrive longDrive() {
+  test::StreetDrive street;
+  street.images = 90;
+  return recorded(street, 15);
+}
+
 // A cleaned path crosses a gap in a straight line, however the road bends. The images know better, and that is no sign
 // of a wrong calibration.
 TEST(SessionGeometry, IsBelievedWhereTheCleanedPathGuessed) {
-  test::StreetDrive street;
-  street.images = 90;
-  RecordedDrive drive = recorded(street, 15);
+  RecordedDrive drive = longDrive();
   UnadjustedSession session = withTruePath(drive);
-  constexpr double kMost_m = 5.0;
-  for (std::size_t i = 25; i < 65; ++i) {
-    const double share = (static_cast<double>(i) - 25.0) / 40.0;
-    session.images[i].position_m.y() += kMost_m * std::pow(std::sin(M_PI * share), 2);
-  }
-  const auto is_in_gap = [&](const MapFix& fix) {
-    return fix.stamp_ns >= session.images[25].stamp_ns && fix.stamp_ns <= session.images[65].stamp_ns;
-  };
+  const Bump bump(session, 25, 65, 5.0);
+  bump.applyTo(session.images);
+  const auto is_in_gap = [&](const MapFix& fix) { return bump.holds(fix.stamp_ns); };
   session.fixes.erase(std::remove_if(session.fixes.begin(), session.fixes.end(), is_in_gap), session.fixes.end());
   const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
-  EXPECT_GT(geometry.largest_shift_m, 0.8 * kMost_m);
+  EXPECT_GT(geometry.largest_shift_m, 0.8 * bump.most_m);
   EXPECT_FALSE(geometry.contradicts_calibration) << "far: " << geometry.far_share;
   EXPECT_EQ(imagesIn(geometry), drive.truth.size());
 }
 
-// Fixes that agree with each other and are wrong by 5 m look like images that were bent by a wrong calibration.
+// Fixes that agree with each other and are wrong by 8 m look like images that were bent by a wrong calibration.
 TEST(SessionGeometry, IsNotBelievedWhereImagesLeaveConfirmedFixes) {
-  test::StreetDrive street;
-  street.images = 90;
-  RecordedDrive drive = recorded(street, 15);
+  RecordedDrive drive = longDrive();
   UnadjustedSession session = withTruePath(drive);
-  constexpr double kMost_m = 8.0;
-  const std::int64_t begin_ns = session.images[25].stamp_ns;
-  const std::int64_t end_ns = session.images[65].stamp_ns;
-  const auto aside_m = [&](std::int64_t stamp_ns) {
-    if (stamp_ns < begin_ns || stamp_ns > end_ns) return 0.0;
-    const double share = static_cast<double>(stamp_ns - begin_ns) / static_cast<double>(end_ns - begin_ns);
-    return kMost_m * std::pow(std::sin(M_PI * share), 2);
-  };
-  for (auto& image : session.images) image.position_m.y() += aside_m(image.stamp_ns);
-  for (MapFix& fix : session.fixes) fix.position_m.y() += aside_m(fix.stamp_ns);
+  const Bump bump(session, 25, 65, 8.0);
+  bump.applyTo(session.images);
+  for (MapFix& fix : session.fixes) fix.position_m.y() += bump.aside_m(fix.stamp_ns);
   const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
   EXPECT_GT(geometry.far_share, 0.05);
   EXPECT_TRUE(geometry.contradicts_calibration);
