@@ -134,11 +134,11 @@ class Adjustment {
 
   /// Landmarks first. Left to itself Ceres eliminates the mounting as well, which ties every camera to every other.
   /// Within a group Ceres goes by address, so a group is of one array, or the result would depend on where memory is.
+  /// One thread: more add up in the order in which they end, and two are no faster.
   ceres::Solver::Options solverOptions() {
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_SCHUR;
     options.max_num_iterations = config_.max_iterations;
-    options.num_threads = config_.threads;
     options.logging_type = ceres::SILENT;
     options.function_tolerance = config_.tolerance;
     options.use_nonmonotonic_steps = true;  // along a flat valley it takes a third fewer

@@ -79,7 +79,6 @@ struct BundleConfig {
   int max_iterations = 30;
   double tolerance = 1e-4;  ///< relative change of the cost at which it ends
   bool focal_is_free = false;
-  int threads = 1;  ///< the last digits depend on it: Ceres adds up in the order in which threads end
 };
 
 /// Moves cameras, landmarks, mountings, biases and delays, and the focal length when it is free, to where all

@@ -23,11 +23,12 @@ constexpr double kFocalTolerance = 0.01;
 constexpr double kLeastAgreeing = 2.0 / 3.0;  ///< share of the tracked features that must agree with the adjustment
 constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 /// Relative changes of the cost at which adjustments end. The whole path turns and shifts along a flat valley of the
-/// cost: thousands of sightings hardly feel it. With 100 times as much it stops on the way, metres off where the camera
-/// looks aside or the road climbs.
-constexpr double kCoarse = 1e-5;
+/// cost: thousands of sightings hardly feel it. One that ends early leaves it metres off where the camera looks aside
+/// or the road climbs, so only those may that another one follows.
+constexpr double kRough = 1e-3;
+constexpr double kCoarse = 1e-4;
 constexpr double kFine = 1e-6;
-constexpr double kRough = 1e-3;  ///< tells a focal length that is a hundredth off
+constexpr double kFocal = 1e-5;  ///< of the focal length that a calibration gets
 /// Landmarks that many images show tie all of these to each other, which costs time. Until positions are about right
 /// their tracks are cut.
 constexpr std::size_t kCoarseViews = 20;
@@ -99,7 +100,7 @@ class SessionAdjuster {
   /// Of a single session; landmark ids begin with `first_id`.
   SessionGeometry result(std::uint32_t first_id) const {
     SessionGeometry geometry = std::move(reconstruction_.results(first_id).front());
-    geometry.focal_scale = reconstruction_.freeFocalScale(kRough);
+    geometry.focal_scale = reconstruction_.freeFocalScale(kRough);  // tells one that is a hundredth off
     geometry.contradicts_calibration = !isBelievable(geometry);
     return geometry;
   }
@@ -141,14 +142,14 @@ class SessionAdjuster {
   void adjust() {
     reconstruction_.useFixes(Reconstruction::kBelievedFix_m, kCoarseLoss * config_.fix_loss);
     reconstruction_.triangulateAll(20.0, kCoarseViews);
-    reconstruction_.adjustAndPrune(kCoarse, 2);
+    reconstruction_.adjustAndPrune(kRough, 2);
     reconstruction_.bringBack();
     reconstruction_.useFixes(kAllFixes_m, config_.fix_loss);
     reconstruction_.triangulateAll(4.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
     reconstruction_.bringBack();
     reconstruction_.triangulateAll(4.0, kAllViews);
-    reconstruction_.adjustAndPrune(kCoarse, 2);
+    reconstruction_.adjustAndPrune(kRough, 2);
     reconstruction_.adjustAndPrune(kFine, Reconstruction::kMinViews);
   }
 
@@ -192,7 +193,7 @@ class SessionTier {
     together_.setMatches(matches_);
     together_.useFixes(kAllFixes_m, config_.fix_loss);
     together_.triangulateAll(20.0, kCoarseViews);
-    together_.adjustAndPrune(kCoarse, 2);
+    together_.adjustAndPrune(kRough, 2);
     together_.triangulateAll(4.0, kCoarseViews);
     together_.adjustAndPrune(kCoarse, 2);
     together_.adjustAndPrune(kFine, Reconstruction::kMinViews);
@@ -257,7 +258,7 @@ std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>
 }
 
 double focalScaleOf(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads) {
-  return SessionAdjuster(session, config, threads).reconstruction().freeFocalScale(kCoarse);
+  return SessionAdjuster(session, config, threads).reconstruction().freeFocalScale(kFocal);
 }
 
 namespace {

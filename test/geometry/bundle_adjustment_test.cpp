@@ -147,22 +147,6 @@ TEST(BundleAdjustment, BelievesTheImagesWhereFixesBend) {
   EXPECT_LT(pathError_m(problem, poses), 0.15);
 }
 
-// But for the last digits.
-TEST(BundleAdjustment, DoesNotDependOnTheNumberOfThreads) {
-  std::mt19937 random(4);
-  BundleProblem one = truthOf(test::drive({}), kSigma, random);
-  disturb(one, random);
-  BundleProblem two = one;
-  BundleConfig config;
-  config.tolerance = 1e-6;
-  const double cost = adjust(one, config);
-  config.threads = 2;
-  EXPECT_NEAR(adjust(two, config), cost, 1e-6 * cost);
-  for (std::size_t i = 0; i < one.cameras.size(); ++i) {
-    EXPECT_LT((one.cameras[i].position_m - two.cameras[i].position_m).norm(), 1e-6) << i;
-  }
-}
-
 TEST(BundleAdjustment, GivesLandmarksBehindACameraNoSay) {
   std::mt19937 random(5);
   test::StreetDrive street;
