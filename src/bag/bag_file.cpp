@@ -260,17 +260,24 @@ std::vector<Message> BagFile::messages(const std::set<std::uint32_t>& connection
   return messages;
 }
 
+/// The content of a compressed chunk, checked.
+const MemoryBytes& BagFile::unpacked(std::uint64_t at, const Chunk& chunk) {
+  const auto found = unpacked_.find(at);
+  if (found != unpacked_.end()) return *found->second;
+  if (unpacked_bytes_ + chunk.size > kMostUnpacked) {
+    unpacked_.clear();
+    unpacked_bytes_ = 0;
+  }
+  auto content = std::make_unique<MemoryBytes>(unpack(*file_, chunk.data, chunk.compression, chunk.size));
+  checkMessages(*content, {0, chunk.size}, chunk);
+  unpacked_bytes_ += chunk.size;
+  return *unpacked_.emplace(at, std::move(content)).first->second;
+}
+
 std::string BagFile::read(const Message& message) {
   const Chunk& chunk = chunks_.at(message.chunk);
   const bool is_packed = chunk.compression != "none";
-  if (is_packed && (!unpacked_ || unpacked_at_ != message.chunk)) {
-    unpacked_.reset();  // never two at once
-    auto unpacked = std::make_unique<MemoryBytes>(unpack(*file_, chunk.data, chunk.compression, chunk.size));
-    checkMessages(*unpacked, {0, chunk.size}, chunk);
-    unpacked_ = std::move(unpacked);
-    unpacked_at_ = message.chunk;
-  }
-  const Bytes& bytes = is_packed ? static_cast<const Bytes&>(*unpacked_) : *file_;
+  const Bytes& bytes = is_packed ? static_cast<const Bytes&>(unpacked(message.chunk, chunk)) : *file_;
   const Range range = is_packed ? Range{0, chunk.size} : chunk.data;
   require(message.offset < range.size(), "an index points beside its messages");
   const Record record = readRecord(bytes, {range.begin + message.offset, range.end});

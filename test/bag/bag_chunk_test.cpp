@@ -1,5 +1,7 @@
 // Chunks made byte by byte: their indices, their messages and their compression.
 
+#include <algorithm>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -158,6 +160,49 @@ TEST_F(BagFileTest, ALz4BlockLargerThanItsFrameAllowsIsRefused) {
   const std::string path = writeBytes(oneChunk("lz4", content.size(), frame));
   EXPECT_EQ(signalWhileReading(path), 0);
   EXPECT_EQ(refusal(path), "a block of a compressed chunk is too long");
+}
+
+/// Counts what is read of a bag.
+class CountedBytes : public bag::Bytes {
+ public:
+  CountedBytes(const std::string& path, std::uint64_t& read) : file_(path), read_(read) {}
+  std::uint64_t size() const override { return file_.size(); }
+  void read(std::uint64_t offset, std::size_t count, char* to) const override {
+    read_ += count;
+    file_.read(offset, count, to);
+  }
+
+ private:
+  bag::FileBytes file_;
+  std::uint64_t& read_;
+};
+
+void readAll(BagFile& bag) {
+  for (const bag::Message& message : bag.messages({0})) bag.read(message);
+}
+
+TEST_F(BagFileTest, AShortRecordingIsUnpackedOnce) {
+  std::uint64_t read = 0;
+  BagFile bag(std::make_unique<CountedBytes>(writeLargeMessages(4), read));
+  readAll(bag);
+  const std::uint64_t once = read;
+  readAll(bag);
+  EXPECT_EQ(read, once);
+}
+
+TEST_F(BagFileTest, NotMoreChunksAreKeptThanAllowed) {
+  std::uint64_t read = 0;
+  BagFile bag(std::make_unique<CountedBytes>(writeLargeMessages(40), read));
+  std::uint64_t most = 0;
+  for (const bag::Message& message : bag.messages({0})) {
+    bag.read(message);
+    most = std::max(most, bag.unpackedBytes());
+  }
+  EXPECT_LE(most, BagFile::kMostUnpacked);
+  EXPECT_GT(most, BagFile::kMostUnpacked / 2);
+  const std::uint64_t once = read;
+  readAll(bag);
+  EXPECT_GT(read, once);
 }
 
 }  // namespace

@@ -46,6 +46,19 @@ class BagFileTest : public testing::Test {
     return path;
   }
 
+  /// Images of 1 MB, each in a compressed chunk of its own.
+  std::string writeLargeMessages(int count) {
+    const std::string path = folder_ / "large.bag";
+    rosbag::Bag bag(path, rosbag::bagmode::Write);
+    bag.setCompression(rosbag::compression::LZ4);
+    bag.setChunkThreshold(1000);
+    sensor_msgs::CompressedImage image;
+    image.data.resize(1'000'000);
+    for (int i = 0; i < count; ++i) bag.write("/camera/compressed", ros::Time(1000.0 + i), image);
+    bag.close();
+    return path;
+  }
+
   std::string writeBytes(const std::string& bytes) {
     const std::string path = folder_ / "mutated.bag";
     writeAll(path, bytes);
