@@ -5,6 +5,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import rosbag
+
 PROGRAMS = Path(sys.argv[1]).resolve()
 
 
@@ -12,6 +14,17 @@ def run(program: str, *arguments, **options) -> subprocess.CompletedProcess:
     """Runs a program to its end."""
     command = [str(PROGRAMS / program), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, **options)
+
+
+def first_images(bag: Path, count: int, part: Path) -> Path:
+    """Writes what a bag has up to so many images, as `part`."""
+    with rosbag.Bag(str(bag)) as whole, rosbag.Bag(str(part), 'w') as first:
+        for topic, message, stamp in whole.read_messages(raw=True):
+            count -= topic.endswith('/compressed')
+            if count < 0:
+                break
+            first.write(topic, message, stamp, raw=True)
+    return part
 
 
 class ProgramTest(unittest.TestCase):

@@ -5,10 +5,11 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 
-from program_runner import PROGRAMS, ProgramTest, run
+from program_runner import PROGRAMS, ProgramTest, first_images, run
 
 MAP, DRIVE, CONFIG, CALIBRATION = (Path(argument) for argument in sys.argv[2:6])
 HEADER = ('stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,'
@@ -30,10 +31,17 @@ def positions(rows: list) -> list:
 class ProgramsTest(ProgramTest):
     """All programs but `evaluate`."""
 
-    def localize(self, *arguments) -> list:
-        """A run over the drive; its rows."""
+    @classmethod
+    def setUpClass(cls):
+        """A short drive, for what shows within a few images."""
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.short = first_images(DRIVE, 80, Path(folder.name) / 'short.bag')
+
+    def localize(self, *arguments, bag=DRIVE) -> list:
+        """A run over a drive; its rows."""
         track = self.folder / 'track.csv'
-        result = run('localize', '--map', MAP, '--bag', DRIVE, '--output', track, *arguments)
+        result = run('localize', '--map', MAP, '--bag', bag, '--output', track, *arguments)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.output = result.stdout
         return read_track(track)
@@ -60,17 +68,17 @@ class ProgramsTest(ProgramTest):
     def test_the_preset_is_the_papers_to_the_letter(self):
         config = self.folder / 'config.yaml'
         config.write_text('dpso: {confine: corridor}\n', encoding='utf-8')
-        papers = positions(self.localize('--preset', 'paper'))
-        self.assertEqual(papers, positions(self.localize('--preset', 'paper', '--config', config)))
-        self.assertNotEqual(papers, positions(self.localize('--pose-source', 'place')))
-        self.assertEqual({row['source'] for row in self.localize('--preset', 'paper')} - {'PLACE', 'NONE'}, set())
+        papers = positions(self.localize('--preset', 'paper', bag=self.short))
+        self.assertEqual(papers, positions(self.localize('--preset', 'paper', '--config', config, bag=self.short)))
+        self.assertNotEqual(papers, positions(self.localize('--pose-source', 'place', bag=self.short)))
+        self.assertEqual({row['source'] for row in papers} - {'PLACE', 'NONE'}, set())
         result = run('localize', '--map', MAP, '--bag', DRIVE, '--preset', 'thesis', '--output', self.folder / 'out')
         self.assert_refused(result, 2, "--preset: preset 'thesis' is not allowed: must be one of paper")
 
     def test_same_seed_gives_the_same_track_another_seed_another_one(self):
-        first = positions(self.localize('--seed', 5))
-        self.assertEqual(first, positions(self.localize('--seed', 5)))
-        self.assertNotEqual(first, positions(self.localize('--seed', 6)))
+        first = positions(self.localize('--seed', 5, bag=self.short))
+        self.assertEqual(first, positions(self.localize('--seed', 5, bag=self.short)))
+        self.assertNotEqual(first, positions(self.localize('--seed', 6, bag=self.short)))
 
     def test_start_index_wraps_around_the_drive(self):
         rows = self.localize('--start-index', 400, '--config', CONFIG)
@@ -152,11 +160,11 @@ class ProgramsTest(ProgramTest):
     def test_the_calibration_is_that_of_option_bag_or_map(self):
         other = self.folder / 'other.yaml'
         other.write_text(CALIBRATION.read_text(encoding='utf-8').replace('266.2847172', '300.0'), encoding='utf-8')
-        self.localize()
+        self.localize(bag=self.short)
         self.assertIn('camera: 320 x 240 px, focal length 266.3 x 266.3 px, no distortion, from /stereo/left/camera_info\n',
                       self.output)
         self.assertNotIn("not the map's", self.output)
-        self.localize('--camera-info', other)
+        self.localize('--camera-info', other, bag=self.short)
         self.assertIn(f'focal length 300 x 300 px, no distortion, from {other}\n', self.output)
         self.assertIn("camera: not the map's: fx 300 instead of 266.285", self.output)
         self.assertIn('cameras:     320 x 240 px, focal length 266.3', run('map_info', MAP).stdout)
