@@ -7,6 +7,7 @@
 #include <iomanip>
 #include <iostream>
 #include <set>
+#include <unordered_set>
 #include <utility>
 
 #include <pwd.h>
@@ -248,8 +249,26 @@ void mergeInto(const std::string& path, const std::vector<NamedMap>& maps, const
   mergeAndPrint(path, maps, edit, threads);
 }
 
+void requireNewRecording(const std::string& path, const std::string& image_topic, const NamedMap& map) {
+  const BagReader bag(path);
+  const BagImages images = bag.images(image_topic);
+  if (images.size() == 0) return;
+  // Most recordings are of another time: then two images tell.
+  const std::int64_t first_ns = images.read(0).stamp_ns;
+  const std::int64_t last_ns = images.read(images.size() - 1).stamp_ns;
+  const auto is_between = [=](std::int64_t stamp_ns) { return first_ns <= stamp_ns && stamp_ns <= last_ns; };
+  if (!knownSession(*map.map, is_between)) return;
+  std::unordered_set<std::int64_t> stamps_ns;
+  for (std::size_t i = 0; i < images.size(); ++i) stamps_ns.insert(images.read(i).stamp_ns);
+  const auto session = knownSession(*map.map, [&](std::int64_t stamp_ns) { return stamps_ns.count(stamp_ns) != 0; });
+  if (!session) return;
+  throw BagError(path + ": is in " + map.name + " already, as session '" + map.map->header().sessions[*session].name +
+                 "' (the same times): remove that first");
+}
+
 void addSessions(const NamedMap& map, const MapBuilderOptions& options, const MapUsage* usage,
                  const std::string& output, const std::string& edit) {
+  for (const std::string& bag : options.bags) requireNewRecording(bag, options.image_topic, map);
   MapBuilderConfig config = readConfig(options);
   MapBuilder builder = builderFor(*map.map, options, config, output);
   std::vector<PlottedSession> sessions;

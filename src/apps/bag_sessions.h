@@ -56,6 +56,9 @@ std::shared_ptr<const TrainingMap> openMap(const std::string& path, std::size_t 
 void mergeInto(const std::string& path, const std::vector<NamedMap>& maps, const std::string& edit,
                std::size_t threads);
 
+/// Throws BagError when a session of the map is this recording: before the work, where merging would find it after.
+void requireNewRecording(const std::string& bag, const std::string& image_topic, const NamedMap& map);
+
 /// Adds the recordings of `options.bags` to a map, as sessions. Says what became of them. `usage`: see addDrive; null:
 /// no image is left out.
 void addSessions(const NamedMap& map, const MapBuilderOptions& options, const MapUsage* usage,

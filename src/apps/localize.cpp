@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -219,13 +220,26 @@ Fix toFix(const Estimate& estimate) {
 }
 
 /// Refuses what could only fail after the work.
-void requireExtension(const LocalizeOptions& options, const std::vector<std::string>& inputs) {
+void requireExtension(const LocalizeOptions& options, const LocalizerConfig& config,
+                      const std::vector<std::string>& inputs) {
   if (options.extend.empty()) return;
   if (options.kidnap_at || options.start_index > 0) {
     throw UsageError("--extend needs the drive as it was recorded, without --start-index and --kidnap-at");
   }
+  if (config.metric.pose_source != "metric") throw UsageError("--extend needs --pose-source metric");
   requireNoInput("--extend", options.extend, inputs);
   const PartialFile attempt(options.extend);
+}
+
+/// The same, once map and camera are there.
+void requireExtensible(const LocalizeOptions& options, const Localizer& localizer,
+                       const std::shared_ptr<const TrainingMap>& map) {
+  if (options.extend.empty()) return;
+  if (!map->hasGeometry()) {
+    throw std::runtime_error("--extend: " + options.map + " has no landmarks, so it verifies no pose");
+  }
+  if (!localizer.camera()) throw std::runtime_error("--extend: without calibration no pose is verified");
+  requireNewRecording(options.bag, options.image_topic, {options.map, map});
 }
 
 /// The map with the drive in it.
@@ -300,26 +314,28 @@ void print(const DriveResult& result, bool has_truth) {
   if (has_truth) print(summarise(result.errors_m));
 }
 
-void requireOutputs(const LocalizeOptions& options) {
+void requireOutputs(const LocalizeOptions& options, const LocalizerConfig& config) {
   std::vector<std::string> inputs{options.map, options.bag, options.config, options.camera_info, options.mask};
   requireNoInput("--output", options.output, inputs);
   inputs.push_back(options.output);
   if (!options.usage.empty()) requireNoInput("--usage", options.usage, inputs);
-  requireExtension(options, inputs);
+  requireExtension(options, config, inputs);
 }
 
 void run(const LocalizeOptions& options) {
   const NodeParameters config = configOf(options);
-  requireOutputs(options);
+  requireOutputs(options, config.localizer);
   PartialFile output(options.output);  // fails now, not after the run
   std::optional<PartialFile> usage_file;
   if (!options.usage.empty()) usage_file.emplace(options.usage);
   const auto warn_of_map = [](const std::string& reason) { warn("localize: " + reason); };
-  Localizer localizer(loadMap(options.map, config.node.mapLoading(warn_of_map)), config.localizer);
+  const std::shared_ptr<const TrainingMap> map = loadMap(options.map, config.node.mapLoading(warn_of_map));
+  Localizer localizer(map, config.localizer);
   const BagReader bag(options.bag);
   const BagImages images = bag.images(options.image_topic);
   const std::vector<std::size_t> order = orderOf(options, images.size());
   setCamera(options, config.node, bag, images, localizer);
+  requireExtensible(options, localizer, map);
   std::optional<Trajectory> truth;
   if (!options.truth_topic.empty()) truth = trueTrajectory(bag, options.truth_topic, localizer.map().frame());
 

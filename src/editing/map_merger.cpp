@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <set>
@@ -263,31 +264,23 @@ class KnownSessions {
   /// Throws MergeError when most images of a session are there.
   void add(const NamedMap& of) {
     const TrainingMap& map = *of.map;
-    std::vector<Shared> shared(map.header().sessions.size());
-    for (std::size_t i = 0; i < map.size(); ++i) {
-      Shared& session = shared[static_cast<std::size_t>(map.pose(i).session)];
-      ++session.images;
-      const auto owner = owners_.find(map.pose(i).stamp_ns);
-      if (owner == owners_.end()) continue;
-      ++session.known;
-      session.owner = owner->second;
-    }
-    for (std::size_t s = 0; s < shared.size(); ++s) {
-      if (2 * shared[s].known <= shared[s].images) continue;
-      throw MergeError(of.name + ": its session '" + map.header().sessions[s].name + "' is in " +
-                       maps_[shared[s].owner] + " already (the same times): remove it from one of them");
+    const auto session = knownSession(map, [this](std::int64_t stamp_ns) { return owners_.count(stamp_ns) != 0; });
+    if (session) {
+      throw MergeError(of.name + ": its session '" + map.header().sessions[*session].name + "' is in " +
+                       maps_[ownerOf(map, *session)] + " already (the same times): remove it from one of them");
     }
     for (std::size_t i = 0; i < map.size(); ++i) owners_.emplace(map.pose(i).stamp_ns, maps_.size());
     maps_.push_back(of.name);
   }
 
  private:
-  /// What a session has in common with the maps before.
-  struct Shared {
-    std::size_t images = 0;
-    std::size_t known = 0;
-    std::size_t owner = 0;  ///< of the last one that is known
-  };
+  /// Of the first image that is known; the session has one.
+  std::size_t ownerOf(const TrainingMap& map, std::size_t session) const {
+    for (std::size_t i = 0;; ++i) {
+      const auto owner = owners_.find(map.pose(i).stamp_ns);
+      if (static_cast<std::size_t>(map.pose(i).session) == session && owner != owners_.end()) return owner->second;
+    }
+  }
 
   std::vector<std::string> maps_;
   std::unordered_map<std::int64_t, std::size_t> owners_;  ///< which map has an image of this time
@@ -388,6 +381,20 @@ std::vector<MergedMap> mergeTo(const Target& target, const std::vector<NamedMap>
 }
 
 }  // namespace
+
+std::optional<std::size_t> knownSession(const TrainingMap& map, const std::function<bool(std::int64_t)>& known) {
+  std::vector<std::size_t> images(map.header().sessions.size());
+  std::vector<std::size_t> known_images(images.size());
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const auto session = static_cast<std::size_t>(map.pose(i).session);
+    ++images[session];
+    if (known(map.pose(i).stamp_ns)) ++known_images[session];
+  }
+  for (std::size_t s = 0; s < images.size(); ++s) {
+    if (2 * known_images[s] > images[s]) return s;
+  }
+  return std::nullopt;
+}
 
 std::vector<NamedMap> inOrderOfTime(std::vector<NamedMap> maps) {
   std::vector<std::pair<decltype(ageOf(*maps.front().map)), std::size_t>> ages;

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -68,6 +70,9 @@ struct NamedMap {
   std::string name;
   std::shared_ptr<const TrainingMap> map;
 };
+
+/// The first session of which most images have a stamp that is `known`: it is the same recording.
+std::optional<std::size_t> knownSession(const TrainingMap& map, const std::function<bool(std::int64_t)>& known);
 
 /// Where a map came to lie in the new one.
 struct MergedMap {

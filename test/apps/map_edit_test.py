@@ -41,12 +41,13 @@ class MapEditTest(ProgramTest):
         self.assertEqual(run('map_info', '--check', self.output).returncode, 0)
         return result.stdout
 
-    def refuse(self, code: int, *arguments, words=(), **options):
-        """Runs a command that must fail in a line with these words, and leave nothing behind."""
+    def refuse(self, code: int, *arguments, words=(), **options) -> str:
+        """Runs a command that must fail in a line with these words, and leave nothing behind; what it said before."""
         before = sorted(path.name for path in self.folder.iterdir())
         result = run('map_edit', *arguments, '--output', self.output, **options)
         self.assert_refused(result, code, 'map_edit: ', *words)
         self.assertEqual(before, sorted(path.name for path in self.folder.iterdir()))
+        return result.stdout
 
     def images(self, path: Path) -> list:
         """Rows of map_info's table of images."""
@@ -178,7 +179,8 @@ class MapEditTest(ProgramTest):
                 (2, MAP, ['--start-index', 5, '--extend', self.output], ('--extend', '--start-index')),
                 (2, MAP, ['--extend', MAP], ('--extend', str(MAP))),
                 (1, MAP, ['--extend', '/absent/new.map'], ('/absent/new.map',)),
-                (1, places, ['--extend', self.output], ('no verified pose',))):
+                (2, MAP, ['--pose-source', 'place', '--extend', self.output], ('--pose-source',)),
+                (1, places, ['--extend', self.output], (f'--extend: {places} has no landmarks',))):
             with self.subTest(arguments=arguments):
                 result = run('localize', '--map', map_file, '--bag', CLOUDY, '--output', self.folder / 'track.csv',
                              *arguments)
@@ -201,7 +203,9 @@ class MapEditTest(ProgramTest):
         copy = self.folder / 'copy.map'
         shutil.copy(MAP, copy)
         self.refuse(1, 'merge', MAP, copy, words=("its session 'campus_sunny_1' is in", 'the same times'))
-        self.refuse(1, 'add', '--map', MAP, '--bag', SUNNY, words=('campus_sunny_1', 'the same times'))
+        said = self.refuse(1, 'add', '--map', MAP, '--bag', SUNNY,
+                           words=(f"{SUNNY}: is in {MAP} already, as session 'campus_sunny_1' (the same times)",))
+        self.assertEqual(said, '')  # before the work
         self.refuse(1, 'merge', MAP, self.folder / 'absent.map', words=('absent.map: ',))
         damaged = self.folder / 'damaged.map'
         damaged.write_bytes(MAP.read_bytes()[:-5000])
