@@ -26,15 +26,12 @@ import rospy
 from camera_info import TOPIC as CAMERA_INFO_TOPIC
 from camera_info import read_camera_info
 from geometry_msgs.msg import PoseStamped, Quaternion
+from local_frame import metres_per_degree
 from sensor_msgs.msg import CameraInfo, CompressedImage, NavSatFix, NavSatStatus
 from wheel_odometry import events as odometry_events
 
 # Origin of the local east-north frame.
 LATITUDE_DEG, LONGITUDE_DEG, ALTITUDE_M = 48.53450, 9.07130, 445.0
-# WGS84.
-SEMI_MAJOR_M = 6378137.0
-FLATTENING = 1 / 298.257223563
-ECCENTRICITY2 = FLATTENING * (2 - FLATTENING)
 
 STAMP_JITTER_S = .004
 GPS_PERIOD_S = .2
@@ -74,12 +71,8 @@ class Track:
 
 def to_geodetic(east: float, north: float) -> Tuple[float, float]:
     """Latitude and longitude in degrees; exact to millimetres within a few hundred metres of the origin."""
-    sine = math.sin(math.radians(LATITUDE_DEG))
-    prime_vertical = SEMI_MAJOR_M / math.sqrt(1 - ECCENTRICITY2 * sine * sine)
-    meridian = SEMI_MAJOR_M * (1 - ECCENTRICITY2) / (1 - ECCENTRICITY2 * sine * sine) ** 1.5
-    parallel_radius = (prime_vertical + ALTITUDE_M) * math.cos(math.radians(LATITUDE_DEG))
-    return (LATITUDE_DEG + math.degrees(north / (meridian + ALTITUDE_M)),
-            LONGITUDE_DEG + math.degrees(east / parallel_radius))
+    east_m, north_m = metres_per_degree(LATITUDE_DEG, ALTITUDE_M)
+    return LATITUDE_DEG + north / north_m, LONGITUDE_DEG + east / east_m
 
 
 def read_round(folder: Path, rng: np.random.Generator) -> Round:

@@ -23,6 +23,9 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import NavSatFix
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from local_frame import metres_per_degree  # noqa: E402
+
 try:
     from visual_localization.msg import LocalizationStatus
 except ImportError:
@@ -37,12 +40,8 @@ SAME_STAMP_S = 0.05  # a truth this near to an image belongs to it
 
 def metres_between(latitude1: float, longitude1: float, latitude2: float, longitude2: float) -> float:
     """Distance of two near positions given in degrees, on the WGS84 ellipsoid."""
-    sine = math.sin(math.radians(latitude1))
-    ratio = 1 - 0.00669437999014 * sine * sine
-    prime_vertical = 6378137.0 / math.sqrt(ratio)
-    meridian = prime_vertical * (1 - 0.00669437999014) / ratio
-    return math.hypot(math.radians(latitude2 - latitude1) * meridian,
-                      math.radians(longitude2 - longitude1) * prime_vertical * math.cos(math.radians(latitude1)))
+    east_m, north_m = metres_per_degree(latitude1)
+    return math.hypot((longitude2 - longitude1) * east_m, (latitude2 - latitude1) * north_m)
 
 
 class Truth:

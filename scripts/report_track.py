@@ -18,6 +18,8 @@ import matplotlib
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from local_frame import metres_per_degree  # noqa: E402
 
 STATES = ['INITIALIZING', 'TRACKING', 'UNCERTAIN', 'RECOVERING', 'OFF_MAP']
 COLOURS = {'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e', 'RECOVERING': '#d62728',
@@ -54,14 +56,9 @@ class Track:
         if not known.size:
             return np.full(self.count, math.nan), np.full(self.count, math.nan)
         tie = known[0]
-        sine = math.sin(math.radians(latitude[tie]))
-        ratio = 1 - 0.00669437999014 * sine * sine
-        prime_vertical = 6378137.0 / math.sqrt(ratio)
-        meridian = prime_vertical * (1 - 0.00669437999014) / ratio
-        north = np.radians(self._column(rows, 'true_latitude_deg') - latitude[tie]) * meridian
-        east = np.radians(self._column(rows, 'true_longitude_deg') - longitude[tie])
-        east = east * prime_vertical * math.cos(math.radians(latitude[tie]))
-        return self.east[tie] + east, self.north[tie] + north
+        east_m, north_m = metres_per_degree(latitude[tie])
+        return (self.east[tie] + (self._column(rows, 'true_longitude_deg') - longitude[tie]) * east_m,
+                self.north[tie] + (self._column(rows, 'true_latitude_deg') - latitude[tie]) * north_m)
 
 
 class Counts:
