@@ -7,6 +7,8 @@ from .data import Group, Number, Outcome, Results
 KIDNAPPED = ', kidnapped'
 CONSTANT: Group = ('constant', 'constant')
 CHANGING: Group = ('changing', 'changing')
+# Experiments of [H] on its two data sets, whose cost is compared by illumination.
+HYBRID = ('hybrid', 'hybrid_set2')
 GRID_NAME = re.compile(r'\brot (\S+) acc (\S+) v (\S+)')
 SPEED_NAME = re.compile(r'^(.*) ([\d.]+)x$')
 COUNT_NAME = re.compile(r'^(.*) (\d+)$')

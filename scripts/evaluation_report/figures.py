@@ -7,6 +7,7 @@ from .bars import bars_figure, cost_figure
 from .curves import (counts_figure, diversity_figure, diversity_parts, kidnapped_figure, runs_figure, speed_figure,
                      steps_figure, thresholds_figure)
 from .data import Results
+from .experiments import HYBRID
 from .files import written_whole
 from .grids import motion_figure
 from .papers import Papers
@@ -56,8 +57,8 @@ class Figures:
         """The experiment's figures, or the general ones."""
         own: Dict[str, Callable[[], List[Drawing]]] = {
             'speed': self._speed, 'single_run': self._single_run, 'kidnapped': self._kidnapped,
-            'motion_grid': self._motion_grid, 'hybrid': self._hybrid, 'hybrid_particles': self._hybrid_particles,
-            'thresholds': self._thresholds}
+            'motion_grid': self._motion_grid, 'hybrid_particles': self._hybrid_particles,
+            'thresholds': self._thresholds, **dict.fromkeys(HYBRID, self._hybrid)}
         return own.get(self._results.experiment, self._general)()
 
     def _bars(self, name: str, caption: str, metric: str, label: str, decimals: int, spread: Optional[str] = None,

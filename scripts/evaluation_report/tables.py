@@ -2,8 +2,8 @@
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Set
 
 from .data import Group, Number, Outcome, Results
-from .experiments import (CHANGING, CONSTANT, GridPoint, by_illumination, grid_point, group_title, speed_of,
-                          thresholds_of)
+from .experiments import (CHANGING, CONSTANT, HYBRID, GridPoint, by_illumination, grid_point, group_title,
+                          speed_of, thresholds_of)
 from .papers import PaperValue, Papers
 
 
@@ -239,7 +239,8 @@ def cost_tables(results: Results, papers: Papers) -> str:
 
 
 SHAPES: Dict[str, Callable[[Results, Papers], str]] = {
-    'speed': speed_table, 'motion_grid': motion_tables, 'thresholds': threshold_tables, 'hybrid': cost_tables}
+    'speed': speed_table, 'motion_grid': motion_tables, 'thresholds': threshold_tables,
+    **dict.fromkeys(HYBRID, cost_tables)}
 
 
 def result_tables(results: Results, papers: Papers) -> str:

@@ -5,7 +5,7 @@ from statistics import NormalDist
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from .data import Group, Outcome, Results
-from .experiments import by_illumination, count_of, group_title, marginals, ratio_pairs, tested_pairs
+from .experiments import HYBRID, by_illumination, count_of, group_title, marginals, ratio_pairs, tested_pairs
 from .papers import Papers
 
 # Ratios this close count as equal: images and robot are not the papers'.
@@ -244,6 +244,6 @@ def in_words(results: Results, papers: Papers) -> str:
         compare_counts(words, results, papers)
     for group in results.groups():
         compare(words, results.experiment, group, results.of(group), papers)
-    if results.experiment == 'hybrid':
+    if results.experiment in HYBRID:
         compare_cost(words, results, papers)
     return words.text()
