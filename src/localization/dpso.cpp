@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "localization/motion_model.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/localization/particles.h"
 
@@ -93,6 +92,7 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
       particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
     }
     confine(particle);
+    keepOut(particle);
   }
   seen_an_image_ = true;
   const std::size_t best = evaluate(input);
@@ -107,6 +107,22 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
   if (!last_centre_m_ || input.travel.seconds > 0.0) last_centre_m_ = centre_of_mass_m_;
   result.tuning = tuning_;
   return result;
+}
+
+void Dpso::resize(std::size_t particles) {
+  const std::size_t before = particles_.size();
+  if (particles == before) return;
+  particles_.resize(particles);
+  for (std::size_t i = before; i < particles; ++i) particles_[i] = particles_[i % before];
+  fitness_.resize(particles);
+  normaliseWeights(particles_);
+  assignKinds();
+  if (centre_of_mass_m_) last_centre_m_ = centre_of_mass_m_ = centreOfMass();
+}
+
+void Dpso::exclude(const std::vector<Eigen::Vector2d>& places_m, double radius_m) {
+  excluded_m_ = places_m;
+  exclusion_radius_m_ = radius_m;
 }
 
 /// A share of the swarm moves with the robot; the rest finds out when the wheels slip.
@@ -322,6 +338,15 @@ Area wholeFrame() {
 }
 
 }  // namespace
+
+/// Back to the best particle, unless that is there as well.
+void Dpso::keepOut(Particle& particle) const {
+  if (!attractor_m_) return;
+  for (const Eigen::Vector2d& place_m : excluded_m_) {
+    const bool is_in = (particle.position_m - place_m).norm() < exclusion_radius_m_;
+    if (is_in && (*attractor_m_ - place_m).norm() >= exclusion_radius_m_) particle.position_m = *attractor_m_;
+  }
+}
 
 /// The papers let particles go where they will; nothing is known of positions outside of the map's frame.
 void Dpso::confine(Particle& particle) const {

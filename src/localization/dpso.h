@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -24,10 +25,15 @@ class Dpso final : public Tracker {
   void attract(const Eigen::Vector2d& position_m) override;
   const std::vector<Particle>& particles() const override { return particles_; }
   TrackerTuning tuning() const override { return tuning_; }
+  /// Fewer particles, or copies of those that are there.
+  void resize(std::size_t particles);
+  /// Where the particles of the next images must not be: discs of this radius about other swarms' places.
+  void exclude(const std::vector<Eigen::Vector2d>& places_m, double radius_m);
 
  private:
   void assignKinds();
   void confine(Particle& particle) const;
+  void keepOut(Particle& particle) const;
   void shift(const OdometryIncrement& odometry);
   void move(Particle& particle);
   Eigen::Vector2d limited(const Eigen::Vector2d& velocity_m, double limit) const;
@@ -62,6 +68,8 @@ class Dpso final : public Tracker {
   bool ground_speed_known_ = false;
   bool position_unknown_ = true;  ///< nothing was recognised since a reset without a prior
   int bad_images_ = 0;
+  std::vector<Eigen::Vector2d> excluded_m_;
+  double exclusion_radius_m_ = 0.0;
 };
 
 }  // namespace visual_localization

@@ -14,8 +14,9 @@ constexpr bool kAtStartOnly = true;
 }  // namespace
 
 void LocalizerConfig::declare(ParameterVisitor& visitor) {
-  visitor.choice({"tracker", "", "dynamic particle swarm, or particle filter with Gaussian or linear motion"}, tracker,
-                 {"dpso", "pf_gaussian", "pf_linear"});
+  visitor.choice(
+      {"tracker", "", "dynamic particle swarm, several swarms, or particle filter with Gaussian or linear motion"},
+      tracker, {"dpso", "dpso_multi", "pf_gaussian", "pf_linear"});
   visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
                  features, {"sift", "global", "hybrid"});
   visitor.choice(
@@ -53,6 +54,10 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   dpso.declare(visitor);
   pf.declare(visitor);
   odometry.declare(visitor);
+  constexpr int kLeastOfSwarm = 4;
+  visitor.require(tracker != "dpso_multi" || dpso.particles >= kLeastOfSwarm * dpso.swarms, "dpso/particles",
+                  parameters::toString(dpso.particles),
+                  "at least 4 for each of 'dpso/swarms' = " + parameters::toString(dpso.swarms));
 }
 
 FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 
 #include "base/numbers.h"
 #include "visual_localization/geo/trajectory.h"
@@ -19,6 +20,10 @@ bool isOnLocalMap(const Eigen::Vector2d& position_m) {
 }
 
 }  // namespace
+
+Eigen::Vector2d wayInMap(const TrainingMap& map, const Eigen::Vector2d& position_m, const OdometryIncrement& odometry) {
+  return Eigen::Rotation2Dd(map.yaw_rad(map.nearest(position_m).image)) * odometry.translation_m;
+}
 
 CloudMoments momentsOf(const std::vector<Particle>& particles) {
   CloudMoments moments;

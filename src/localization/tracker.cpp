@@ -1,6 +1,7 @@
 #include "visual_localization/localization/tracker.h"
 
 #include "localization/dpso.h"
+#include "localization/multi_swarm.h"
 #include "localization/particle_filter.h"
 #include "localization/session_choice.h"
 #include "visual_localization/localization/tracker_config.h"
@@ -69,6 +70,11 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
       phi0_max, 0.0, 10.0);
   visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
                1000.0);
+  visitor.integer({"dpso/swarms", "1", "dpso_multi: swarms at most, which share the particles"}, swarms, 2, 5);
+  visitor.real({"dpso/exclusion_radius", "m", "dpso_multi: swarms this close to each other become one"},
+               exclusion_radius_m, 0.1, 1000.0);
+  visitor.real({"dpso/rival_share", "1", "dpso_multi: a rival must match so well in relation to the leader"},
+               rival_share, 0.01, 1.0);
   visitor.atMost("dpso/v0_min", v0_min, "dpso/v0", v0);
   visitor.atMost("dpso/v0", v0, "dpso/v0_max", v0_max);
   visitor.atMost("dpso/quantum_share", quantum_share, "dpso/quantum_share_max", quantum_share_max);
@@ -101,6 +107,7 @@ Neighbour TrackerInput::nearest(const TrainingMap& map, const Eigen::Vector2d& p
 
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) {
   if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed, config.odometry);
+  if (config.tracker == "dpso_multi") return std::make_unique<MultiSwarm>(map, config, seed);
   return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf, map, config.odometry),
                                           config.pf, config.fitness, seed);
 }

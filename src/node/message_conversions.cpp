@@ -167,6 +167,7 @@ LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& he
   message.v0 = estimate.tracked.tuning.v0;
   message.speed_ema = estimate.tracked.tuning.speed_ema;
   message.swarm_speed = estimate.tracked.tuning.speed_mps;
+  message.rival_weight = estimate.tracked.rival_weight;
   message.quantum_share = estimate.tracked.tuning.quantum_share;
   message.phi2 = estimate.tracked.tuning.phi2;
   message.sigma_x = estimate.tracked.spread_m.x();

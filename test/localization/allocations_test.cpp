@@ -16,7 +16,7 @@ class SteadyState : public test::WallStreet,
                     public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {};
 
 INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, SteadyState,
-                         ::testing::Combine(::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+                         ::testing::Combine(::testing::Values("dpso", "dpso_multi", "pf_gaussian", "pf_linear"),
                                             ::testing::Values("sift", "global", "hybrid")),
                          [](const auto& instance) {
                            return std::string(std::get<0>(instance.param)) + "_" + std::get<1>(instance.param);

@@ -101,7 +101,7 @@ class EveryChoiceOfFeatures : public Drive, public ::testing::WithParamInterface
 };
 
 INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, EveryChoiceOfFeatures,
-                         ::testing::Combine(::testing::Values("dpso", "pf_gaussian"),
+                         ::testing::Combine(::testing::Values("dpso", "dpso_multi", "pf_gaussian"),
                                             ::testing::Values("sift", "global", "hybrid")),
                          [](const auto& combination) {
                            return std::string(std::get<0>(combination.param)) + "_" + std::get<1>(combination.param);
@@ -172,7 +172,7 @@ class FrozenCamera : public EveryChoiceOfFeatures {
 };
 
 INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, FrozenCamera,
-                         ::testing::Combine(::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+                         ::testing::Combine(::testing::Values("dpso", "dpso_multi", "pf_gaussian", "pf_linear"),
                                             ::testing::Values("sift", "global", "hybrid")),
                          [](const auto& combination) {
                            return std::string(std::get<0>(combination.param)) + "_" + std::get<1>(combination.param);

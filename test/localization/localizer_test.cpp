@@ -40,7 +40,7 @@ class EveryCombination : public test::WallStreet,
                          public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {};
 
 INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, EveryCombination,
-                         ::testing::Combine(::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+                         ::testing::Combine(::testing::Values("dpso", "dpso_multi", "pf_gaussian", "pf_linear"),
                                             ::testing::Values("sift", "global", "hybrid")),
                          [](const auto& combination) {
                            return std::string(std::get<0>(combination.param)) + "_" + std::get<1>(combination.param);
@@ -97,7 +97,7 @@ TEST_F(LocalizerTest, TheSameSeedGivesTheSameTrack) {
 /// By SIFT only: by global features two walls of the same blocks are alike.
 TEST_F(LocalizerTest, AnotherPlaceIsNeverATrackedPosition) {
   const cv::Mat elsewhere = test::wall(1000, 240, 99);
-  for (const char* tracker : {"dpso", "pf_gaussian", "pf_linear"}) {
+  for (const char* tracker : {"dpso", "dpso_multi", "pf_gaussian", "pf_linear"}) {
     LocalizerConfig config;
     config.tracker = tracker;
     Localizer localizer(map(), config);

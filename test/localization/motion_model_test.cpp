@@ -1,5 +1,3 @@
-#include "localization/motion_model.h"
-
 #include <cmath>
 #include <memory>
 #include <utility>

@@ -37,8 +37,8 @@ double follow(Tracker& tracker, World& world, int begin, int steps) {
 class Handover : public ::testing::TestWithParam<std::tuple<const char*, const char*>> {};
 
 INSTANTIATE_TEST_SUITE_P(Trackers, Handover,
-                         ::testing::Combine(::testing::Values("dpso", "pf_gaussian", "pf_linear"),
-                                            ::testing::Values("dpso", "pf_gaussian", "pf_linear")),
+                         ::testing::Combine(::testing::Values("dpso", "dpso_multi", "pf_gaussian", "pf_linear"),
+                                            ::testing::Values("dpso", "dpso_multi", "pf_gaussian", "pf_linear")),
                          [](const auto& pair) {
                            return std::string(std::get<0>(pair.param)) + "_to_" + std::get<1>(pair.param);
                          });
@@ -58,7 +58,7 @@ TEST_P(Handover, TheTrackGoesOnWithAnotherTrackerOrFewerParticles) {
 
 class Configure : public ::testing::TestWithParam<const char*> {};
 
-INSTANTIATE_TEST_SUITE_P(Trackers, Configure, ::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+INSTANTIATE_TEST_SUITE_P(Trackers, Configure, ::testing::Values("dpso", "dpso_multi", "pf_gaussian", "pf_linear"),
                          [](const auto& tracker) { return std::string(tracker.param); });
 
 TEST_P(Configure, TheSameParametersChangeNothing) {

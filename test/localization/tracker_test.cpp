@@ -6,8 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "localization/dpso.h"
-#include "localization/particle_filter.h"
 #include "test/support/world.h"
 
 namespace visual_localization {
@@ -21,16 +19,13 @@ using test::World;
 class TrackerTest : public ::testing::TestWithParam<const char*> {
  protected:
   static std::unique_ptr<Tracker> makeTracker(const World& world, std::uint32_t seed) {
-    if (GetParam() == std::string("dpso")) {
-      return std::make_unique<Dpso>(world.map(), DpsoConfig(), FitnessConfig(), seed);
-    }
-    const ParticleFilterConfig config;
-    return std::make_unique<ParticleFilter>(world.map(), makeMotionModel(GetParam(), config, world.map()), config,
-                                            FitnessConfig(), seed);
+    TrackerConfig config;
+    config.tracker = GetParam();
+    return visual_localization::makeTracker(world.map(), config, seed);
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Trackers, TrackerTest, ::testing::Values("dpso", "pf_gaussian", "pf_linear"),
+INSTANTIATE_TEST_SUITE_P(Trackers, TrackerTest, ::testing::Values("dpso", "dpso_multi", "pf_gaussian", "pf_linear"),
                          [](const auto& tracker) { return std::string(tracker.param); });
 
 TEST_P(TrackerTest, TheSameSeedGivesTheSameTrack) {

@@ -33,6 +33,9 @@ struct Travel {
   double seconds = 0.0;                            ///< 0: unknown
 };
 
+/// The way of a robot at `position_m` that looks where the nearest training image does, in the map frame, metres.
+Eigen::Vector2d wayInMap(const TrainingMap& map, const Eigen::Vector2d& position_m, const OdometryIncrement& odometry);
+
 /// Mean and covariance of a weighted cloud, metres.
 struct CloudMoments {
   Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();

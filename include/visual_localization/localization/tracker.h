@@ -37,6 +37,9 @@ struct TrackerEstimate {
   std::size_t best_image = 0;                                     ///< the training image of `best`
   double best_distance_m = 0.0;                                   ///< from `position_m` to `best_image`
   TrackerTuning tuning;                                           ///< for the next image
+  /// Of several swarms: how well the best rival matches, share of all that they match. Above a half another place fits
+  /// better than `position_m`, but not for long enough yet.
+  double rival_weight = 0.0;
 };
 
 class SessionChoice;

@@ -45,6 +45,9 @@ struct DpsoConfig {
   double phi2_min = 0.01;
   double phi0_max = 0.0;
   double mode_radius_m = 5.0;
+  int swarms = 3;
+  double exclusion_radius_m = 15.0;
+  double rival_share = 0.5;
 
   void declare(ParameterVisitor& visitor);
 };
@@ -71,7 +74,9 @@ struct TrackerConfig {
   OdometryConfig odometry;
 
   /// Number of particles of the chosen tracker.
-  std::size_t particles() const { return static_cast<std::size_t>(tracker == "dpso" ? dpso.particles : pf.particles); }
+  std::size_t particles() const { return static_cast<std::size_t>(isSwarm() ? dpso.particles : pf.particles); }
+  /// Whether it is one or several swarms.
+  bool isSwarm() const { return tracker == "dpso" || tracker == "dpso_multi"; }
 };
 
 }  // namespace visual_localization

@@ -1,0 +1,178 @@
+#include "localization/multi_swarm.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace visual_localization {
+namespace {
+
+constexpr double kMemory = 0.8;          ///< share of a swarm's strength that an image leaves
+constexpr double kStronger = 1.1;        ///< so much stronger than the leader a rival takes its place
+constexpr std::size_t kRivalsShare = 7;  ///< a rival has this part of all particles
+constexpr std::size_t kLeastImages = 3;  ///< before a rival may lead or is given up
+constexpr double kStart_m = 2.0;         ///< spread of a rival that begins
+
+}  // namespace
+
+MultiSwarm::MultiSwarm(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed)
+    : map_(map), config_(config.dpso), random_(seed) {
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    swarms_.push_back({std::make_unique<Dpso>(map, config.dpso, config.fitness, seed + i, config.odometry)});
+  }
+  particles_.reserve(static_cast<std::size_t>(config_.particles));
+  reset();
+}
+
+void MultiSwarm::reset() {
+  dissolveRivals();
+  swarms_.front().dpso->reset();
+  gather();
+}
+
+void MultiSwarm::reset(const Prior& prior) {
+  dissolveRivals();
+  swarms_.front().dpso->reset(prior);
+  gather();
+}
+
+void MultiSwarm::configure(const TrackerConfig& config) {
+  config_ = config.dpso;
+  while (active_ > static_cast<std::size_t>(config_.swarms)) dissolve(active_ - 1);
+  for (Swarm& swarm : swarms_) swarm.dpso->configure(config);
+  share();
+}
+
+void MultiSwarm::attract(const Eigen::Vector2d& position_m) { swarms_.front().dpso->attract(position_m); }
+
+TrackerEstimate MultiSwarm::update(const TrackerInput& input) {
+  if (input.verified_m) dissolveRivals();
+  exclude();
+  follow(input);
+  if (!input.verified_m) {
+    chooseLeader();
+    for (std::size_t i = active_; i-- > 1;) {
+      if (isSuperfluous(i)) dissolve(i);
+    }
+    scout(input);
+  }
+  return estimate();
+}
+
+/// A rival has a fixed part of the particles, the leader the rest.
+void MultiSwarm::share() {
+  const auto all = static_cast<std::size_t>(config_.particles);
+  const std::size_t of_rival = std::max<std::size_t>(2, all / kRivalsShare);
+  for (std::size_t i = 1; i < active_; ++i) swarms_[i].dpso->resize(of_rival);
+  swarms_.front().dpso->resize(all - (active_ - 1) * of_rival);
+}
+
+void MultiSwarm::exclude() {
+  for (std::size_t i = 0; i < active_; ++i) {
+    others_m_.clear();
+    for (std::size_t k = 0; k < active_; ++k) {
+      if (k != i) others_m_.push_back(swarms_[k].estimate.position_m);
+    }
+    swarms_[i].dpso->exclude(others_m_, config_.exclusion_radius_m);
+  }
+}
+
+void MultiSwarm::follow(const TrackerInput& input) {
+  for (std::size_t i = 0; i < active_; ++i) {
+    Swarm& swarm = swarms_[i];
+    swarm.estimate = swarm.dpso->update(input);
+    const double matched = swarm.estimate.best.weight;
+    swarm.strength = swarm.images == 0 ? matched : kMemory * swarm.strength + (1.0 - kMemory) * matched;
+    swarm.unrecognised = swarm.estimate.best.recognised ? 0 : swarm.unrecognised + 1;
+    ++swarm.images;
+  }
+}
+
+void MultiSwarm::chooseLeader() {
+  std::size_t strongest = 0;
+  for (std::size_t i = 1; i < active_; ++i) {
+    if (swarms_[i].images < kLeastImages) continue;
+    const double needed = strongest == 0 ? kStronger * swarms_.front().strength : swarms_[strongest].strength;
+    if (swarms_[i].strength > needed) strongest = i;
+  }
+  if (strongest == 0) return;
+  std::swap(swarms_.front(), swarms_[strongest]);
+  share();
+}
+
+/// The swarm waits; its particles are the leader's.
+void MultiSwarm::dissolve(std::size_t swarm) {
+  --active_;
+  std::swap(swarms_[swarm], swarms_[active_]);
+  share();
+}
+
+void MultiSwarm::dissolveRivals() {
+  active_ = 1;
+  share();
+}
+
+/// Lost, weak, or where a swarm before it is.
+bool MultiSwarm::isSuperfluous(std::size_t swarm) const {
+  const Swarm& rival = swarms_[swarm];
+  for (std::size_t i = 0; i < swarm; ++i) {
+    const double apart_m = (swarms_[i].estimate.position_m - rival.estimate.position_m).norm();
+    if (apart_m < config_.exclusion_radius_m) return true;
+  }
+  if (rival.unrecognised >= static_cast<std::size_t>(config_.recovery_patience)) return true;
+  return rival.images >= kLeastImages && rival.strength < config_.rival_share * swarms_.front().strength;
+}
+
+bool MultiSwarm::isTaken(const Eigen::Vector2d& position_m) const {
+  return std::any_of(swarms_.begin(), swarms_.begin() + static_cast<std::ptrdiff_t>(active_), [&](const Swarm& swarm) {
+    return (swarm.estimate.position_m - position_m).norm() < config_.exclusion_radius_m;
+  });
+}
+
+/// A leader that is lost needs its particles to find its place again.
+void MultiSwarm::scout(const TrackerInput& input) {
+  const bool lost = !swarms_.front().estimate.best.recognised || tuning().recovering;
+  if (lost || active_ == static_cast<std::size_t>(config_.swarms)) return;
+  const std::size_t image = input.sweep.draw(input.scores, random_);
+  const Eigen::Vector2d& position_m = map_.position_m(image);
+  if (isTaken(position_m)) return;
+  const Score found = input.scores[image];
+  if (!found.recognised || found.weight < config_.rival_share * swarms_.front().estimate.best.weight) return;
+  Swarm& rival = swarms_[active_++];
+  rival.strength = found.weight;
+  rival.images = 1;
+  rival.unrecognised = 0;
+  share();
+  rival.dpso->reset(normallyDistributed(position_m, kStart_m * kStart_m * Eigen::Matrix2d::Identity()));
+  rival.estimate = {};
+  rival.estimate.position_m = position_m;
+  rival.estimate.best = found;
+}
+
+/// The leader's, with the cloud of all.
+TrackerEstimate MultiSwarm::estimate() {
+  gather();
+  TrackerEstimate result = swarms_.front().estimate;
+  result.cloud_covariance_m2 = scatterAbout(result.position_m, particles_);
+  result.spread_m = momentsOf(particles_).spread();
+  double all = 0.0;
+  double best_rival = 0.0;
+  for (std::size_t i = 0; i < active_; ++i) all += swarms_[i].strength;
+  for (std::size_t i = 1; i < active_; ++i) best_rival = std::max(best_rival, swarms_[i].strength);
+  result.rival_weight = all > 0.0 ? best_rival / all : 0.0;
+  result.tuning = tuning();
+  return result;
+}
+
+/// Each swarm's weights sum to its share of the strength of all.
+void MultiSwarm::gather() {
+  particles_.clear();
+  for (std::size_t i = 0; i < active_; ++i) {
+    for (Particle particle : swarms_[i].dpso->particles()) {
+      particle.weight *= swarms_[i].strength;
+      particles_.push_back(particle);
+    }
+  }
+  normaliseWeights(particles_);
+}
+
+}  // namespace visual_localization
