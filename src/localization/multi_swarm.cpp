@@ -16,21 +16,22 @@ constexpr double kStart_m = 2.0;         ///< spread of a rival that begins
 
 MultiSwarm::MultiSwarm(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed)
     : map_(map), config_(config.dpso), random_(seed) {
-  for (std::uint32_t i = 0; i < 5; ++i) {
-    swarms_.push_back({std::make_unique<Dpso>(map, config.dpso, config.fitness, seed + i, config.odometry)});
+  for (int i = 0; i < DpsoConfig::kMostSwarms; ++i) {
+    swarms_.push_back({std::make_unique<Dpso>(map, config.dpso, config.fitness, seed + static_cast<std::uint32_t>(i),
+                                              config.odometry)});
   }
   particles_.reserve(static_cast<std::size_t>(config_.particles));
   reset();
 }
 
 void MultiSwarm::reset() {
-  dissolveRivals();
+  restart();
   swarms_.front().dpso->reset();
   gather();
 }
 
 void MultiSwarm::reset(const Prior& prior) {
-  dissolveRivals();
+  restart();
   swarms_.front().dpso->reset(prior);
   gather();
 }
@@ -45,7 +46,7 @@ void MultiSwarm::configure(const TrackerConfig& config) {
 void MultiSwarm::attract(const Eigen::Vector2d& position_m) { swarms_.front().dpso->attract(position_m); }
 
 TrackerEstimate MultiSwarm::update(const TrackerInput& input) {
-  if (input.verified_m) dissolveRivals();
+  if (input.verified_m) restart();
   exclude();
   follow(input);
   if (!input.verified_m) {
@@ -56,6 +57,16 @@ TrackerEstimate MultiSwarm::update(const TrackerInput& input) {
     scout(input);
   }
   return estimate();
+}
+
+/// The leader alone, as if it had followed no image yet: where geometry verified a pose, or after a reset, what it
+/// matched before says nothing.
+void MultiSwarm::restart() {
+  active_ = 1;
+  swarms_.front().strength = 0.0;
+  swarms_.front().images = 0;
+  swarms_.front().unrecognised = 0;
+  share();
 }
 
 /// A rival has a fixed part of the particles, the leader the rest.
@@ -80,6 +91,7 @@ void MultiSwarm::follow(const TrackerInput& input) {
   for (std::size_t i = 0; i < active_; ++i) {
     Swarm& swarm = swarms_[i];
     swarm.estimate = swarm.dpso->update(input);
+    if (input.verified_m) continue;  // nothing was compared
     const double matched = swarm.estimate.best.weight;
     swarm.strength = swarm.images == 0 ? matched : kMemory * swarm.strength + (1.0 - kMemory) * matched;
     swarm.unrecognised = swarm.estimate.best.recognised ? 0 : swarm.unrecognised + 1;
@@ -103,11 +115,6 @@ void MultiSwarm::chooseLeader() {
 void MultiSwarm::dissolve(std::size_t swarm) {
   --active_;
   std::swap(swarms_[swarm], swarms_[active_]);
-  share();
-}
-
-void MultiSwarm::dissolveRivals() {
-  active_ = 1;
   share();
 }
 
@@ -168,7 +175,7 @@ void MultiSwarm::gather() {
   particles_.clear();
   for (std::size_t i = 0; i < active_; ++i) {
     for (Particle particle : swarms_[i].dpso->particles()) {
-      particle.weight *= swarms_[i].strength;
+      if (active_ > 1) particle.weight *= swarms_[i].strength;
       particles_.push_back(particle);
     }
   }

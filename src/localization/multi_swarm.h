@@ -44,12 +44,12 @@ class MultiSwarm final : public Tracker {
     std::size_t unrecognised = 0;  ///< in a row, the last ones
   };
 
+  void restart();
   void share();
   void exclude();
   void follow(const TrackerInput& input);
   void chooseLeader();
   void dissolve(std::size_t swarm);
-  void dissolveRivals();
   bool isSuperfluous(std::size_t swarm) const;
   bool isTaken(const Eigen::Vector2d& position_m) const;
   void scout(const TrackerInput& input);

@@ -70,7 +70,8 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
       phi0_max, 0.0, 10.0);
   visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
                1000.0);
-  visitor.integer({"dpso/swarms", "1", "dpso_multi: swarms at most, which share the particles"}, swarms, 2, 5);
+  visitor.integer({"dpso/swarms", "1", "dpso_multi: swarms at most, which share the particles"}, swarms, 2,
+                  kMostSwarms);
   visitor.real({"dpso/exclusion_radius", "m", "dpso_multi: swarms this close to each other become one"},
                exclusion_radius_m, 0.1, 1000.0);
   visitor.real({"dpso/rival_share", "1", "dpso_multi: a rival must match so well in relation to the leader"},

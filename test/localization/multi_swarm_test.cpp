@@ -145,6 +145,27 @@ TEST(MultiSwarm, AVerifiedPoseAndAResetEndAllRivals) {
   EXPECT_EQ(tracker.swarms(), 1U);
 }
 
+TEST(MultiSwarm, StaysAtThePlaceAfterVerifiedPoses) {
+  TwinStreet street(1.0, 0.8);
+  Dpso one(street.map(), DpsoConfig(), FitnessConfig(), 1);
+  MultiSwarm several(street.map(), config(), 1);
+  one.reset();  // as the several do at their start: both draw the same
+  for (Tracker* tracker : {static_cast<Tracker*>(&one), static_cast<Tracker*>(&several)}) {
+    tracker->reset(around(TwinStreet::at(0.0), 3.0));
+  }
+  for (double along_m = 0.0; along_m < 25.0; along_m += kStep_m) {
+    TrackerInput verified = street.from(along_m);
+    verified.verified_m = TwinStreet::at(along_m);
+    const TrackerEstimate expected = one.update(verified);
+    EXPECT_NEAR(several.update(verified).spread_m.x(), expected.spread_m.x(), 1e-9) << along_m;
+  }
+  for (double along_m = 25.0; along_m < 60.0; along_m += kStep_m) {
+    const TrackerEstimate estimate = several.update(street.from(along_m));
+    EXPECT_LT((estimate.position_m - TwinStreet::at(along_m)).norm(), 5.0) << along_m;
+    EXPECT_LT(estimate.rival_weight, 0.55) << along_m;
+  }
+}
+
 TEST(MultiSwarm, FewerSwarmsCanBeConfigured) {
   TwinStreet street(1.0, 0.9);
   MultiSwarm tracker(street.map(), config(5), 1);

@@ -45,6 +45,7 @@ struct DpsoConfig {
   double phi2_min = 0.01;
   double phi0_max = 0.0;
   double mode_radius_m = 5.0;
+  static constexpr int kMostSwarms = 5;
   int swarms = 3;
   double exclusion_radius_m = 15.0;
   double rival_share = 0.5;
