@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import List, Tuple
 
 import numpy as np
-import rosbag
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from local_frame import metres_per_degree  # noqa: E402
-from make_round_bag import ALTITUDE_M, LATITUDE_DEG, LONGITUDE_DEG  # noqa: E402
+from local_frame import LocalFrame  # noqa: E402
+from make_round_bag import LATITUDE_DEG, LONGITUDE_DEG  # noqa: E402
+from map_error import truth_of  # noqa: E402
 from worlds.town_course import TWIN_ROWS, TownPlan  # noqa: E402
 
 JUNCTION_M = 8  # no house is nearer to the end of a street
 STREET_M = 6  # from its middle
+TOWN = LocalFrame({'latitude_deg': LATITUDE_DEG, 'longitude_deg': LONGITUDE_DEG, 'east_m': 0, 'north_m': 0})
 
 
 def arguments() -> argparse.Namespace:
@@ -33,12 +34,6 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def in_town(latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:
-    """Rows of east and north in the frame of the renderer."""
-    east_m, north_m = metres_per_degree(LATITUDE_DEG, ALTITUDE_M)
-    return np.column_stack(((longitude - LONGITUDE_DEG) * east_m, (latitude - LATITUDE_DEG) * north_m))
-
-
 def inside(points: np.ndarray, street: Tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """Which points are beside the houses of a street."""
     along = (street[1] - street[0]) / np.linalg.norm(street[1] - street[0])
@@ -48,20 +43,13 @@ def inside(points: np.ndarray, street: Tuple[np.ndarray, np.ndarray]) -> np.ndar
             & (np.abs(aside) < STREET_M))
 
 
-def truth_of(bag: Path, topic: str) -> np.ndarray:
-    """Rows of stamp, latitude and longitude."""
-    with rosbag.Bag(str(bag)) as recording:
-        return np.array([(fix.header.stamp.to_sec(), fix.latitude, fix.longitude)
-                         for _, fix, _ in recording.read_messages([topic])])
-
-
 def positions(track: Path, truth: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Estimated and true ones."""
     with open(track, newline='', encoding='utf-8') as file:
         rows = np.array([[float(row[name]) for name in ('stamp', 'latitude_deg', 'longitude_deg')]
                          for row in csv.DictReader(file)])
     true = [np.interp(rows[:, 0], truth[:, 0], truth[:, axis]) for axis in (1, 2)]
-    return in_town(rows[:, 1], rows[:, 2]), in_town(*true)
+    return TOWN.position(rows[:, 1], rows[:, 2]), np.column_stack(true)
 
 
 def percent(which: List[np.ndarray]) -> str:
@@ -74,7 +62,7 @@ def main() -> None:
     args = arguments()
     nodes = TownPlan(args.seed).nodes
     rows = [tuple(np.array(nodes[name]) for name in row) for row in TWIN_ROWS]
-    truth = truth_of(args.bag, args.truth_topic)
+    truth = truth_of(args.bag, args.truth_topic, TOWN)
     at_twin, far_there, far = [], [], []
     for track in args.tracks:
         found, true = positions(track, truth)
