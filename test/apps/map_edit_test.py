@@ -170,6 +170,13 @@ class MapEditTest(ProgramTest):
         self.assertLess(of_cloudy, of_sunny + .05, errors)
         self.assertLess(float(re.search(r'apart mean ([\d.]+)', errors).group(1)), .1, errors)
 
+    def test_the_drive_that_made_the_map_does_not_extend_it(self):
+        before = sorted(self.folder.iterdir())
+        result = run('localize', '--map', MAP, '--bag', SUNNY, '--output', self.folder / 'track.csv', '--extend',
+                     self.output)
+        self.assert_refused(result, 1, 'localize: ', f"{SUNNY}: is in {MAP} already, as session 'campus_sunny_1'")
+        self.assertEqual(sorted(self.folder.iterdir()), before)
+
     def test_an_extension_that_makes_no_sense_is_refused(self):
         places = self.folder / 'places.map'
         options = self.folder / 'places.yaml'
