@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -337,43 +338,48 @@ class SceneFit {
   bool ended_ = false;
 };
 
+/// What the matches say of a scene that moves.
+struct MovingScene {
+  double gain = 0.0;  ///< of the logarithm of the likelihood, over that of a rigid one; 0: unknown
+  std::optional<SolvedPose> pose;
+};
+
 /// Plants stand elsewhere than on the day of the map, near ones by many pixels. The few that agree with one pose by
-/// chance, to the pixel, are no better than the others: where a scene that moves explains the matches far better than a
-/// rigid one, all of them decide, near ones less. Nothing elsewhere.
-std::optional<SolvedPose> inMovingScene(const std::vector<LandmarkMatch>& matches, const SolvedPose& rigid,
-                                        std::size_t min_inliers) {
+/// chance, to the pixel, are no better than the others: in a scene that moves all of them decide, near ones less.
+MovingScene inMovingScene(const std::vector<LandmarkMatch>& matches, const SolvedPose& rigid, std::size_t min_inliers) {
+  MovingScene moving;
   const std::optional<double> of_rigid = SceneFit(matches, rigid, {}).logLikelihood();
-  if (!of_rigid) return std::nullopt;
-  double best = *of_rigid + kMovingGain;
-  std::optional<SolvedPose> moving;
+  if (!of_rigid) return moving;
   for (const double motion_m : kMotions_m) {
     const SceneFit fit(matches, rigid, {kMovingStretch, motion_m});
     const std::optional<double> likelihood = fit.logLikelihood();
-    if (!likelihood || !(*likelihood > best) || fit.inliers() < min_inliers) continue;
-    const std::optional<SolvedPose> solved = fit.solved();
-    if (!solved) continue;
-    best = *likelihood;
-    moving = solved;
+    if (!likelihood || fit.inliers() < min_inliers) continue;
+    const double gain = *likelihood - *of_rigid;
+    if (moving.pose && gain <= moving.gain) continue;
+    std::optional<SolvedPose> solved = fit.solved();
+    if (solved) moving = {gain, std::move(solved)};
   }
-  if (!moving) return moving;
-  moving->covariance *= kMovingAlike * kMovingAlike;
-  moving->agreeing = rigid.agreeing;
-  moving->focal_scale = rigid.focal_scale;  // a wrong calibration must not pass for motion
-  moving->focal_sigma = rigid.focal_sigma;
+  if (!moving.pose) return moving;
+  moving.pose->covariance *= kMovingAlike * kMovingAlike;
+  moving.pose->agreeing = rigid.agreeing;
+  moving.pose->focal_scale = rigid.focal_scale;  // a wrong calibration must not pass for motion
+  moving.pose->focal_sigma = rigid.focal_sigma;
   return moving;
 }
 
 }  // namespace
 
 std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, double tolerance,
-                                    std::size_t min_inliers) {
+                                    std::size_t min_inliers, double moving_evidence) {
   min_inliers = std::max(min_inliers, kLeast);
   if (matches.size() < min_inliers) return std::nullopt;
   const std::optional<CameraPose> start = PoseSampler(matches, tolerance).best();
-  const std::optional<SolvedPose> rigid = start ? refined(matches, *start, tolerance, min_inliers) : std::nullopt;
-  if (!rigid) return std::nullopt;
-  const std::optional<SolvedPose> moving = inMovingScene(matches, *rigid, min_inliers);
-  return moving ? moving : rigid;
+  std::optional<SolvedPose> solved = start ? refined(matches, *start, tolerance, min_inliers) : std::nullopt;
+  if (!solved) return std::nullopt;
+  MovingScene moving = inMovingScene(matches, *solved, min_inliers);
+  if (moving.pose && moving_evidence + moving.gain > kMovingGain) solved = std::move(moving.pose);
+  solved->moving_gain = moving.gain;
+  return solved;
 }
 
 }  // namespace visual_localization

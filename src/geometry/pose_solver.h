@@ -29,14 +29,17 @@ struct SolvedPose {
   /// What the inliers would rather have as focal length, as a share of the calibration's, and its standard deviation.
   double focal_scale = 1.0;
   double focal_sigma = 0.0;
+  /// Logarithm of how many times as likely the matches are where landmarks moved as in a rigid scene; 0: unknown.
+  double moving_gain = 0.0;
 };
 
 /// The pose from which most matches are right, the nearer the better: AP3P in RANSAC, then least squares on all
 /// inliers, each weighed by its own and its landmark's covariance (Cauchy loss). Where landmarks that moved since the
 /// day of the map explain the matches far better, all matches decide, and the covariance grows. `tolerance`: farthest
-/// of an inlier from its landmark's projection, normalised coordinates. Nothing with fewer than `min_inliers` (at least
-/// 4), or when they leave the pose open. The result depends on the input alone.
+/// of an inlier from its landmark's projection, normalised coordinates. `moving_evidence`: what images before tell of
+/// that, added to the gain of this one. Nothing with fewer than `min_inliers` (at least 4), or when they leave the pose
+/// open. The result depends on the input alone.
 std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, double tolerance,
-                                    std::size_t min_inliers);
+                                    std::size_t min_inliers, double moving_evidence = 0.0);
 
 }  // namespace visual_localization

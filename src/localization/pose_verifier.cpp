@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "base/numbers.h"
 #include "base/time.h"
@@ -64,6 +65,8 @@ bool FocalCheck::contradicts() const {
 
 bool FocalCheck::confirms() const { return !images_.empty() && sigma() <= kSureFocalSigma && !contradicts(); }
 
+void MotionEvidence::add(double gain) { sum_ = std::clamp(sum_ + std::min(gain, kMostOfOne), 0.0, kMost); }
+
 void PoseVerifier::configure(const MetricConfig& config) {
   config_ = config;
   focal_.configure(config.max_focal_error);
@@ -72,6 +75,8 @@ void PoseVerifier::configure(const MetricConfig& config) {
 void PoseVerifier::reset() {
   last_.reset();
   elsewhere_ = 0;
+  moving_ = {};
+  moving_gain_ = 0.0;
 }
 
 void PoseVerifier::doubtMotion() {
@@ -86,6 +91,7 @@ void PoseVerifier::useOdometry(const OdometryTrack& track, const OdometryConfig&
 void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
                               const SensorMount& mount) {
   ++images_since_;
+  moving_.add(std::exchange(moving_gain_, 0.0));
   stamp_ns_ = stamp_ns;
   features_ = &features;
   rays_ = raysOf(features, camera, config_.keypoint_sigma_px);
@@ -165,8 +171,9 @@ std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& im
       sights.push_back(match.sight);
     }
   }
-  const auto solved = solvePose(sights, config_.tolerance_px / focal_px_, min_inliers);
+  const auto solved = solvePose(sights, config_.tolerance_px / focal_px_, min_inliers, moving_.sum());
   if (!solved) return std::nullopt;
+  moving_gain_ = solved->moving_gain;
   std::vector<Pair> inliers;
   for (const std::size_t i : solved->inliers) inliers.push_back(seen[i]);
   const std::vector<std::size_t> agreeing = keepMatched(images, std::move(inliers));

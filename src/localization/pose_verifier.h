@@ -48,6 +48,23 @@ class FocalCheck {
   std::vector<Image> images_;  ///< the last ones
 };
 
+/// Whether plants stand elsewhere than on the day of the map, by all images of a drive: one image may agree with a
+/// rigid scene to the pixel by chance, and with a wrong pose. A cumulative sum (Page 1954) of what each image tells:
+/// one that passes by a car tells little, and a few of houses undo what many of plants told.
+class MotionEvidence {
+ public:
+  static constexpr double kMost = 30.0;
+  static constexpr double kMostOfOne = 6.0;
+
+  /// `gain`: SolvedPose::moving_gain of an image.
+  void add(double gain);
+  /// At least 0; for solvePose().
+  double sum() const { return sum_; }
+
+ private:
+  double sum_ = 0.0;
+};
+
 /// Solves the camera's pose from the landmarks of training images: of those near the pose that the motion so far
 /// predicts, or else of those that look most alike. The solved pose is judged, not the image that it came from.
 class PoseVerifier {
@@ -138,6 +155,8 @@ class PoseVerifier {
   SessionChoice& sessions_;
   std::optional<Known> last_;
   FocalCheck focal_;
+  MotionEvidence moving_;     ///< of the images before
+  double moving_gain_ = 0.0;  ///< of the pose last solved in the image
   const OdometryTrack* odometry_ = nullptr;
   OdometryConfig odometry_config_;
   std::size_t distrust_ = 0;   ///< verified poses that odometry must agree with before it is believed again

@@ -246,6 +246,53 @@ TEST(PoseSolver, IsNotSurerThanLeavesInTheWindAllow) {
   EXPECT_LT(median(errors_m), 0.1);
 }
 
+double squaredSigmas(const SolvedPose& solved, const CameraPose& truth) {
+  const Eigen::Vector2d error = errorOf(solved.camera, truth).head<2>();
+  return error.dot(solved.covariance.topLeftCorner<2, 2>().inverse() * error);
+}
+
+// Plants that moved by 0.05 m are a pixel off at 20 m. One image of 25 cannot tell, and is far too sure; what the
+// images before told makes it honest.
+TEST(PoseSolver, BelievesEarlierImagesThatPlantsMoved) {
+  std::mt19937 random(9);
+  const CameraPose truth = somePose();
+  constexpr int kRuns = 100;
+  double nees_alone = 0.0;
+  double nees = 0.0;
+  int undecided = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    std::vector<LandmarkMatch> matches = exactMatches(truth, 25, 10.0, 80.0, random);
+    move(matches, 0.05, random);
+    giveCovariances(matches, truth);
+    addNoise(matches, random);
+    const auto alone = solvePose(matches, kTolerance, kMinInliers);
+    const auto informed = solvePose(matches, kTolerance, kMinInliers, 30.0);
+    ASSERT_TRUE(alone && informed);
+    EXPECT_EQ(alone->moving_gain, informed->moving_gain) << "of this image alone";
+    undecided += std::abs(alone->moving_gain) < 12.0 ? 1 : 0;
+    nees_alone += squaredSigmas(*alone, truth) / kRuns;
+    nees += squaredSigmas(*informed, truth) / kRuns;
+  }
+  EXPECT_GT(undecided, kRuns / 2);
+  EXPECT_GT(nees_alone, 4.0) << "2 would be right";
+  EXPECT_GT(nees, 0.1);
+  EXPECT_LT(nees, 2.0);
+}
+
+// Houses outweigh what the images before told.
+TEST(PoseSolver, SeesThatNothingMoved) {
+  std::mt19937 random(10);
+  const CameraPose truth = somePose();
+  std::vector<LandmarkMatch> matches = exactMatches(truth, 100, 4.0, 25.0, random);
+  giveCovariances(matches, truth);
+  addNoise(matches, random);
+  const auto alone = solvePose(matches, kTolerance, kMinInliers);
+  const auto informed = solvePose(matches, kTolerance, kMinInliers, 30.0);
+  ASSERT_TRUE(alone && informed);
+  EXPECT_LT(alone->moving_gain, -30.0);
+  EXPECT_EQ(informed->covariance, alone->covariance);
+}
+
 // The camera may turn around the row and sees the same.
 TEST(PoseSolver, DoesNotPretendToKnowThePoseFromARow) {
   const CameraPose truth = somePose();

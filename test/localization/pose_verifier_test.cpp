@@ -222,6 +222,33 @@ TEST_F(PoseVerifierTest, ConfirmsAPoseByTheNextOne) {
   EXPECT_TRUE(second->confirmed);
 }
 
+TEST_F(PoseVerifierTest, RemembersThatPlantsMovedUntilHousesSayOtherwise) {
+  constexpr double kWind_m = 0.03;
+  // So little wind that 15 landmarks cannot tell.
+  const SiftFeatures few = street_.fewOf(street_.seenInWind(street_.trueNear(14, kBeside_m), 0.013), 14);
+  double time_s = 0.0;
+  const auto sigmaOf_m = [&](const SiftFeatures& features) {
+    const auto pose = verify(++time_s, features, {13, 14, 15});
+    return pose ? pose->sigma_m() : 0.0;
+  };
+  const auto drive = [&](double wind_m, int images) {
+    for (int i = 0; i < images; ++i) sigmaOf_m(street_.seenInWind(street_.trueNear(14, kBeside_m), wind_m));
+  };
+  drive(0.0, 1);
+  const double alone_m = sigmaOf_m(few);
+  ASSERT_GT(alone_m, 0.0);
+  drive(kWind_m, 1);
+  EXPECT_NEAR(sigmaOf_m(few), alone_m, 0.1 * alone_m) << "one image is not enough";
+  drive(kWind_m, 6);
+  EXPECT_GT(sigmaOf_m(few), 2.0 * alone_m);
+  drive(0.0, 3);
+  EXPECT_NEAR(sigmaOf_m(few), alone_m, 0.1 * alone_m);
+  drive(kWind_m, 6);
+  verifier_.reset();
+  drive(0.0, 1);
+  EXPECT_NEAR(sigmaOf_m(few), alone_m, 0.1 * alone_m);
+}
+
 TEST_F(PoseVerifierTest, DoesNotBelieveWhatIsTooUncertain) {
   MetricConfig config;
   config.max_sigma_m = 1e-4;

@@ -28,9 +28,20 @@ class StreetMap {
   SiftFeatures seenFrom(const CameraPose& pose) {
     return viewOf(world_, camera_, pose, kKeypointSigma_px, random_).features;
   }
+  /// Where each landmark stands `sigma_m` along each axis from where it stood on the day of the map.
+  SiftFeatures seenInWind(const CameraPose& pose, double sigma_m) {
+    std::normal_distribution<double> normal(0.0, sigma_m);
+    std::vector<WorldPoint> blown = world_;
+    for (WorldPoint& point : blown) {
+      for (double& coordinate : point.position_m) coordinate += normal(random_);
+    }
+    return viewOf(blown, camera_, pose, kKeypointSigma_px, random_).features;
+  }
   /// Only the first few features that show landmarks of training image `i`.
   SiftFeatures fewSeenFrom(const CameraPose& pose, std::size_t i, std::size_t count = kFew) {
-    const SiftFeatures all = seenFrom(pose);
+    return fewOf(seenFrom(pose), i, count);
+  }
+  SiftFeatures fewOf(const SiftFeatures& all, std::size_t i, std::size_t count = kFew) const {
     std::vector<std::size_t> landmarks;
     for (const SeenLandmark& landmark : map_->geometry(i)->landmarks) landmarks.push_back(landmark.feature);
     std::vector<std::size_t> chosen;
