@@ -238,14 +238,17 @@ class FaultsTest(unittest.TestCase):
         self.assertEqual(rospy.get_param('/localizer/map'), rospy.get_param('~map'))
 
     def test_9_many_clients_relocalize_at_once(self):
+        """Each over its own connection that stays: of new ones roscpp drops a few in 100 000 (doc/faults.md)."""
+        clients = [rospy.ServiceProxy('/localizer/relocalize', Relocalize, persistent=True) for _ in range(8)]
+        self.addCleanup(lambda: [client.close() for client in clients])
+
         def ask(number):
-            relocalize = rospy.ServiceProxy('/localizer/relocalize', Relocalize)
-            return all(relocalize(RelocalizeRequest(use_centre=bool(number % 2), radius=1000.0)).success
+            return all(clients[number](RelocalizeRequest(use_centre=bool(number % 2), radius=1000.0)).success
                        for _ in range(5))
 
         def work():
-            with concurrent.futures.ThreadPoolExecutor(8) as clients:
-                self.assertTrue(all(clients.map(ask, range(8))))
+            with concurrent.futures.ThreadPoolExecutor(len(clients)) as threads:
+                self.assertTrue(all(threads.map(ask, range(len(clients)))))
         self.while_images_arrive(work)
         self.restart_drive()
         print('TRACKING again after %d images' % self.drive_until_tracking())
