@@ -29,9 +29,10 @@ constexpr double kRoughness_m = 0.01;  ///< of a level road, from one image to t
 /// The problem as Ceres takes it. Losses and parameters must live as long as Ceres works on it.
 class Adjustment {
  public:
-  Adjustment(BundleProblem& problem, const BundleConfig& config)
+  Adjustment(BundleProblem& problem, const BundleConfig& config, const BundleWindow& window)
       : problem_(problem),
         config_(config),
+        window_(window),
         sighting_loss_(config.landmark_loss),
         tilt_loss_(kTiltLoss),
         position_loss_(config.position_loss),
@@ -49,6 +50,7 @@ class Adjustment {
     addPositions();
     addHeights();
     addPriors();
+    holdOthers();
   }
 
   double solve() {
@@ -57,6 +59,7 @@ class Adjustment {
     const QuietCeres quiet;
     ceres::Solve(options, &ceres_, &summary);
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      if (!window_.moves(i)) continue;
       const Eigen::Map<const Eigen::Vector3d> turn(cameras_[i].data());
       const Eigen::Map<const Eigen::Vector3d> position(cameras_[i].data() + 3);
       problem_.cameras[i] = {Eigen::Quaterniond(Eigen::Matrix3d(starts_[i] * exponential(turn))).normalized(),
@@ -77,9 +80,23 @@ class Adjustment {
     return options;
   }
 
+  /// A camera that moves shows it, and another one that is known.
+  bool isSeen(const Landmark& landmark) const {
+    std::size_t known = 0;
+    bool moves = false;
+    for (const LandmarkSighting& sighting : landmark.sightings) {
+      known += window_.knows(sighting.image) ? 1 : 0;
+      moves = moves || window_.moves(sighting.image);
+    }
+    return moves && known >= 2;
+  }
+
   void addSightings() {
     for (Landmark& landmark : problem_.landmarks) {
+      if (!isSeen(landmark)) continue;
+      landmarks_.push_back(landmark.position_m.data());
       for (const LandmarkSighting& sighting : landmark.sightings) {
+        if (!window_.knows(sighting.image)) continue;
         ceres_.AddResidualBlock(new SightingCost(starts_[sighting.image], sighting), &sighting_loss_,
                                 cameras_[sighting.image].data(), landmark.position_m.data(), &problem_.focal_scale);
       }
@@ -90,6 +107,7 @@ class Adjustment {
 
   void addPositions() {
     for (const PositionObservation& position : problem_.positions) {
+      if (!window_.moves(position.image)) continue;
       BundleSession& session = problem_.sessions[sessions_[position.image]];
       const PositionResidual residual{position, starts_[position.image], session.antenna_m};
       ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6, 2, 1>(residual), &position_loss_,
@@ -97,16 +115,17 @@ class Adjustment {
     }
     for (BundleSession& session : problem_.sessions) {
       double* bias = session.fix_bias_m.data();
+      double* delay = &session.fix_delay_s;
+      if (!ceres_.HasParameterBlock(bias)) continue;
       ceres_.AddResidualBlock(automatic<ZeroResidual<2>, 2, 2>({config_.fix_bias_sigma_m}), nullptr, bias);
       if (problem_.sessions.size() == 1) ceres_.SetParameterBlockConstant(bias);
-      double* delay = &session.fix_delay_s;
-      if (!ceres_.HasParameterBlock(delay)) continue;
       ceres_.AddResidualBlock(automatic<ZeroResidual<1>, 1, 1>({config_.fix_delay_sigma_s}), nullptr, delay);
     }
   }
 
   void addHeights() {
     for (const HeightObservation& height : problem_.heights) {
+      if (!window_.moves(height.image)) continue;
       BundleSession& session = problem_.sessions[sessions_[height.image]];
       const AltitudeResidual residual{height, starts_[height.image], session.antenna_m};
       ceres_.AddResidualBlock(automatic<AltitudeResidual, 1, 6, 1>(residual), &altitude_loss_,
@@ -116,19 +135,49 @@ class Adjustment {
 
   void addPriors() {
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      const auto [yaw_rad, slope] = problem_.road[i];
-      const MountingResidual mounting(problem_.cameras[i].rotation, uprightCamera(yaw_rad, slope),
-                                      config_.tilt_sigma_rad);
-      ceres_.AddResidualBlock(automatic<CameraMountingResidual, 3, 6, 3>({mounting}), &tilt_loss_, cameras_[i].data(),
-                              problem_.sessions[sessions_[i]].mounting_rad.data());
-      if (i + 1 == cameras_.size() || sessions_[i + 1] != sessions_[i]) continue;
-      const double run_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i].position_m).head<2>().norm();
-      const SlopeResidual climb{slope * run_m, config_.slope_sigma * run_m + kRoughness_m};
-      ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>(climb), nullptr, cameras_[i].data(),
-                              cameras_[i + 1].data());
+      if (window_.moves(i)) addMounting(i);
+      if (i + 1 < cameras_.size() && sessions_[i + 1] == sessions_[i]) addSlope(i);
     }
-    if (!cameras_.empty()) {
-      ceres_.AddResidualBlock(automatic<HeightResidual, 1, 6>({}), nullptr, cameras_.front().data());
+    anchorHeights();
+  }
+
+  /// The first camera of all is at no height; where nothing stands still, the first one that moves keeps its own.
+  void anchorHeights() {
+    std::size_t first = cameras_.size();
+    bool anchored = false;
+    for (std::size_t i = cameras_.size(); i-- > 0;) {
+      if (window_.moves(i)) {
+        first = i;
+      } else {
+        anchored = anchored || window_.knows(i);
+      }
+    }
+    if (first == cameras_.size() || (first > 0 && anchored)) return;
+    const double up_m = first == 0 ? 0.0 : problem_.cameras[first].position_m.z();
+    ceres_.AddResidualBlock(automatic<HeightResidual, 1, 6>({up_m}), nullptr, cameras_[first].data());
+  }
+
+  void addMounting(std::size_t i) {
+    const auto [yaw_rad, slope] = problem_.road[i];
+    const MountingResidual mounting(problem_.cameras[i].rotation, uprightCamera(yaw_rad, slope),
+                                    config_.tilt_sigma_rad);
+    ceres_.AddResidualBlock(automatic<CameraMountingResidual, 3, 6, 3>({mounting}), &tilt_loss_, cameras_[i].data(),
+                            problem_.sessions[sessions_[i]].mounting_rad.data());
+  }
+
+  /// From a camera to the next one.
+  void addSlope(std::size_t i) {
+    if (!(window_.moves(i) || window_.moves(i + 1)) || !(window_.knows(i) && window_.knows(i + 1))) return;
+    const double run_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i].position_m).head<2>().norm();
+    const SlopeResidual climb{problem_.road[i].slope * run_m, config_.slope_sigma * run_m + kRoughness_m};
+    ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>(climb), nullptr, cameras_[i].data(),
+                            cameras_[i + 1].data());
+  }
+
+  void holdOthers() {
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      double* camera = cameras_[i].data();
+      if (!window_.moves(i) && ceres_.HasParameterBlock(camera)) ceres_.SetParameterBlockConstant(camera);
     }
   }
 
@@ -143,24 +192,24 @@ class Adjustment {
     options.function_tolerance = config_.tolerance;
     options.use_nonmonotonic_steps = true;  // along a flat valley it takes a third fewer
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    for (Landmark& landmark : problem_.landmarks) {
-      if (!landmark.sightings.empty()) options.linear_solver_ordering->AddElementToGroup(landmark.position_m.data(), 0);
-    }
-    for (auto& camera : cameras_) options.linear_solver_ordering->AddElementToGroup(camera.data(), 1);
+    const auto add = [&](double* block, int group) {
+      if (ceres_.HasParameterBlock(block)) options.linear_solver_ordering->AddElementToGroup(block, group);
+    };
+    for (double* landmark : landmarks_) add(landmark, 0);
+    for (auto& camera : cameras_) add(camera.data(), 1);
     for (BundleSession& session : problem_.sessions) {
-      options.linear_solver_ordering->AddElementToGroup(session.mounting_rad.data(), 2);
-      options.linear_solver_ordering->AddElementToGroup(session.fix_bias_m.data(), 3);
-      double* delay = &session.fix_delay_s;
-      if (ceres_.HasParameterBlock(delay)) options.linear_solver_ordering->AddElementToGroup(delay, 4);
-      double* height = &session.fix_height_m;
-      if (ceres_.HasParameterBlock(height)) options.linear_solver_ordering->AddElementToGroup(height, 5);
+      add(session.mounting_rad.data(), 2);
+      add(session.fix_bias_m.data(), 3);
+      add(&session.fix_delay_s, 4);
+      add(&session.fix_height_m, 5);
     }
-    options.linear_solver_ordering->AddElementToGroup(&problem_.focal_scale, 6);
+    add(&problem_.focal_scale, 6);
     return options;
   }
 
   BundleProblem& problem_;
   const BundleConfig& config_;
+  const BundleWindow& window_;
   ceres::CauchyLoss sighting_loss_;
   ceres::CauchyLoss tilt_loss_;
   GemanMcClureLoss position_loss_;
@@ -168,12 +217,15 @@ class Adjustment {
   std::vector<std::size_t> sessions_;  ///< of the cameras
   std::vector<Eigen::Matrix3d> starts_;
   std::vector<std::array<double, 6>> cameras_;  ///< as in SightingCost
+  std::vector<double*> landmarks_;              ///< those that are seen
   ceres::Problem ceres_;
 };
 
 }  // namespace
 
-double adjust(BundleProblem& problem, const BundleConfig& config) { return Adjustment(problem, config).solve(); }
+double adjust(BundleProblem& problem, const BundleConfig& config, const BundleWindow& window) {
+  return Adjustment(problem, config, window).solve();
+}
 
 double reprojectionError(const CameraPose& camera, const Eigen::Vector3d& landmark_m, const Eigen::Vector2d& seen) {
   const Eigen::Vector3d point = camera.toCamera(landmark_m);

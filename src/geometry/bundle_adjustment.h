@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -81,9 +82,25 @@ struct BundleConfig {
   bool focal_is_free = false;
 };
 
-/// Moves cameras, landmarks, mountings, biases and delays, and the focal length when it is free, to where all
-/// observations agree best. Returns the final cost.
-double adjust(BundleProblem& problem, const BundleConfig& config);
+/// Cameras that are adjusted together. Those that are known and do not move stand still; what others saw does not
+/// count. All of them unless said otherwise.
+struct BundleWindow {
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+
+  const std::vector<std::size_t>* ranks = nullptr;  ///< of the cameras, which the limits are about; none: their indices
+  std::size_t begin = 0;                            ///< the first camera that moves
+  std::size_t end = kAll;                           ///< the one behind the last that moves
+  std::size_t known_begin = 0;
+  std::size_t known_end = kAll;
+
+  std::size_t rank(std::size_t camera) const { return ranks != nullptr ? (*ranks)[camera] : camera; }
+  bool moves(std::size_t camera) const { return rank(camera) >= begin && rank(camera) < end; }
+  bool knows(std::size_t camera) const { return rank(camera) >= known_begin && rank(camera) < known_end; }
+};
+
+/// Moves the cameras of the window, the landmarks that they see, mountings, biases and delays of their sessions, and
+/// the focal length when it is free, to where all observations agree best. Returns the final cost.
+double adjust(BundleProblem& problem, const BundleConfig& config, const BundleWindow& window = {});
 
 /// Distance of where a landmark is seen from where it projects to, normalised coordinates; infinite behind the camera.
 double reprojectionError(const CameraPose& camera, const Eigen::Vector3d& landmark_m, const Eigen::Vector2d& seen);

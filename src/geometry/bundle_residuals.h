@@ -208,9 +208,11 @@ struct CameraMountingResidual {
 };
 
 struct HeightResidual {
+  double up_m;
+
   template <class T>
   bool operator()(const T* camera, T* residual) const {
-    residual[0] = camera[5] / T(0.01);
+    residual[0] = (camera[5] - T(up_m)) / T(0.01);
     return true;
   }
 };

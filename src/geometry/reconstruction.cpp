@@ -163,6 +163,8 @@ constexpr double kAstray_m = 2.0;       ///< an image moved by this more or less
 constexpr double kAstray_rad = 0.1;     ///< so did one that was turned by this more or less
 constexpr double kFarthest_m = 1000.0;  ///< a landmark farther away has no position to rely on
 constexpr int kMostFocalSteps = 100;
+constexpr std::size_t kFocalWindows = 5;  ///< that are asked for the focal length, about
+constexpr std::size_t kOverlap = 4;       ///< a window shares this part of its images with the next one
 
 }  // namespace
 
@@ -188,6 +190,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
     images_.push_back({static_cast<std::uint32_t>(sessions_.size()), image, std::move(rays[i]), start, up_m});
     problem_.cameras.push_back({start, antenna_in_map_m - start * antenna_m});
     problem_.road.push_back({image.yaw_rad, heights.slope[i]});
+    ranks_.push_back(ranks_.size());
     if (!heights.measured) continue;
     problem_.heights.push_back(
         {begin + static_cast<std::uint32_t>(i), up_m, config_.fix_correlation * heights.sigma_m});
@@ -201,6 +204,7 @@ void Reconstruction::append(const Reconstruction& other) {
   for (Image image : other.images_) {
     image.session += session;
     images_.push_back(std::move(image));
+    ranks_.push_back(ranks_.size());
   }
   for (PositionObservation fix : other.fixes_) {
     fix.image += begin;
@@ -276,9 +280,23 @@ void Reconstruction::triangulateAll(double gate_px, std::size_t max_views) {
   }
 }
 
+/// All images at once, or so many at a time, each window with the last ones of the window before. What is behind a
+/// window is left out: it would hold the window where it was.
+std::vector<BundleWindow> Reconstruction::windows() const {
+  const auto most = static_cast<std::size_t>(config_.window);
+  if (images_.size() <= most) return {{}};
+  const std::size_t step = most - most / kOverlap;
+  std::vector<BundleWindow> windows;
+  for (std::size_t begin = 0; windows.empty() || windows.back().end < images_.size(); begin += step) {
+    const std::size_t end = std::min(begin + most, images_.size());
+    windows.push_back({&ranks_, begin, end, 0, end});
+  }
+  return windows;
+}
+
 void Reconstruction::adjustAndPrune(double tolerance, std::size_t min_views) {
   bundle_.tolerance = tolerance;
-  adjust(problem_, bundle_);
+  for (const BundleWindow& window : windows()) adjust(problem_, bundle_, window);
   for (Landmark& landmark : problem_.landmarks) {
     auto& all = landmark.sightings;
     const auto disagrees = [&](const LandmarkSighting& sighting) {
@@ -352,13 +370,21 @@ void Reconstruction::bringBack() {
 }
 
 double Reconstruction::freeFocalScale(double tolerance) const {
-  BundleProblem problem = problem_;
   BundleConfig config = bundle_;
   config.focal_is_free = true;
   config.tolerance = tolerance;
   config.max_iterations = kMostFocalSteps;
-  adjust(problem, config);
-  return problem.focal_scale;
+  const std::vector<BundleWindow> all = windows();
+  std::vector<double> scales;
+  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / kFocalWindows) {
+    BundleProblem problem = problem_;
+    BundleWindow window = all[i];
+    window.known_begin = window.begin;  // the others keep to the focal length that they have
+    window.known_end = window.end;
+    adjust(problem, config, window);
+    scales.push_back(problem.focal_scale);
+  }
+  return median(scales);
 }
 
 /// In normalised coordinates.

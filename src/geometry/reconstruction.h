@@ -66,6 +66,8 @@ class Reconstruction {
 
   /// Moves the images of a session, and the landmarks that they were the first to see.
   void move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m);
+  /// Windows have images of later sessions together with those that `ties` tie them to, from now on.
+  void orderBy(const std::vector<ImagePair>& ties);
   /// What landmarks come from, from now on: matches that join at least three images.
   void setMatches(const std::vector<ImagePair>& matches);
   /// Fixes count from now on: all of them, or those that are at most `farthest_m` from the cleaned path. `loss`: scale
@@ -74,7 +76,8 @@ class Reconstruction {
   /// Landmarks from tracks, anew; of tracks cut into pieces of at most `max_views`. Sightings farther than `gate_px`
   /// from their landmark are left out.
   void triangulateAll(double gate_px, std::size_t max_views);
-  /// Adjusts everything, then drops sightings that disagree and landmarks that fewer than `min_views` images see.
+  /// Adjusts everything, window by window, then drops sightings that disagree and landmarks that fewer than `min_views`
+  /// images see.
   void adjustAndPrune(double tolerance, std::size_t min_views);
   /// A single image may end in a minimum of its own, metres off. It starts again among its neighbours.
   void bringBack();
@@ -105,6 +108,7 @@ class Reconstruction {
   std::vector<std::set<std::uint32_t>> tiedSessions() const;
   double fixBias_m(const std::set<std::uint32_t>& tied) const;
   ImageGeometry imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const;
+  std::vector<BundleWindow> windows() const;
   bool isWithin(double farthest_m, const PositionObservation& fix) const;
   std::vector<bool> confirmedByFixes() const;
   double farShare(const SessionGeometry& geometry, std::size_t begin, const std::vector<bool>& confirmed) const;
@@ -118,6 +122,7 @@ class Reconstruction {
   std::vector<PositionObservation> fixes_;  ///< all of them
   std::vector<FeatureTrack> tracks_;
   BundleProblem problem_;
+  std::vector<std::size_t> ranks_;  ///< of the images, in windows
 };
 
 /// Moves each session of `reconstruction` to where those before it have what both see: its landmarks beside theirs, by

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <unordered_map>
 
@@ -194,7 +195,39 @@ std::vector<Eigen::Vector3d> shiftsAlong(std::size_t images, const std::vector<O
   return shifts_m;
 }
 
+/// Where the images of a session stand in the order of those before it, `places`: by their ties, or else as the image
+/// before; behind all others without any.
+std::vector<double> placesAlong(std::size_t begin, std::size_t images, const std::vector<ImagePair>& ties,
+                                const std::vector<double>& places) {
+  std::vector<std::vector<double>> tied(images);
+  for (const ImagePair& tie : ties) {
+    if (tie.a < begin && tie.b >= begin && tie.b < begin + images) tied[tie.b - begin].push_back(places[tie.a]);
+  }
+  const auto first = std::find_if(tied.begin(), tied.end(), [](const auto& here) { return !here.empty(); });
+  double place = first == tied.end() ? static_cast<double>(begin) : median(*first);
+  std::vector<double> along;
+  for (const std::vector<double>& here : tied) {
+    if (!here.empty()) place = median(here);
+    along.push_back(place);
+  }
+  return along;
+}
+
 }  // namespace
+
+void Reconstruction::orderBy(const std::vector<ImagePair>& ties) {
+  std::vector<double> places;
+  for (std::size_t session = 0; session < sessions_.size(); ++session) {
+    const std::vector<double> along = placesAlong(begin(session), imagesIn(session), ties, places);
+    places.insert(places.end(), along.begin(), along.end());
+    if (session > 0) continue;
+    std::iota(places.begin(), places.end(), 0.0);
+  }
+  std::vector<std::size_t> order(images_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return places[a] < places[b]; });
+  for (std::size_t rank = 0; rank < order.size(); ++rank) ranks_[order[rank]] = rank;
+}
 
 std::vector<double> alignSessions(const std::vector<ImagePair>& ties, Reconstruction& reconstruction) {
   const SeenLandmarks landmarks(reconstruction);  // moves with them

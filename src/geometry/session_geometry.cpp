@@ -76,7 +76,7 @@ class PairMatcher {
     pair.view = verifyTwoViews(a.rays->normalised, b.rays->normalised, usable(matches, *a.rays, *b.rays),
                                config_.epipolar_tolerance_px / std::min(a.focal_px, b.focal_px),
                                static_cast<std::size_t>(config_.min_pair_inliers), turn_rad);
-    if (pair.view) pair.matches.matches = pair.view->inliers;
+    if (pair.view) pair.matches.matches = std::move(pair.view->inliers);
   }
 
   const GeometryConfig& config_;
@@ -92,8 +92,8 @@ class SessionAdjuster {
     for (std::size_t i = 0; i < session.images.size(); ++i) {
       rays.push_back(raysOf(*session.features(i), *session.camera, config.keypoint_sigma_px));
     }
-    matchPairs(rays);
-    start(std::move(rays));
+    std::vector<Pair> pairs = matchPairs(rays);
+    start(std::move(rays), std::move(pairs));
     adjust();
   }
 
@@ -109,7 +109,7 @@ class SessionAdjuster {
   const std::vector<ImagePair>& matches() const { return matches_; }
 
  private:
-  void matchPairs(const std::vector<KeypointRays>& rays) {
+  std::vector<Pair> matchPairs(const std::vector<KeypointRays>& rays) const {
     const auto count = static_cast<std::uint32_t>(rays.size());
     const auto span = static_cast<std::uint32_t>(config_.pair_span);
     std::vector<Indices> indices;
@@ -119,19 +119,19 @@ class SessionAdjuster {
     std::vector<PathImage> path;
     for (const TrajectoryPoint& image : session_.images) path.push_back({0, image});
     for (const Indices& pair : revisits(path)) indices.push_back(pair);
-    pairs_ = matcher_.match(indices, [&](std::uint32_t i) {
+    return matcher_.match(indices, [&](std::uint32_t i) {
       return PairMatcher::View{session_.features(i), &rays[i], session_.camera->intrinsics().fx};
     });
   }
 
-  void start(std::vector<KeypointRays> rays) {
+  void start(std::vector<KeypointRays> rays, std::vector<Pair> pairs) {
     std::vector<double> yaws_rad;
     for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
     std::vector<RelativeRotation> relative;
-    for (const Pair& pair : pairs_) {
+    for (Pair& pair : pairs) {
       const auto& [a, b, inliers] = pair.matches;
       if (b - a <= kRotationSpan) relative.push_back({a, b, pair.view->b_from_a});
-      matches_.push_back(pair.matches);
+      matches_.push_back(std::move(pair.matches));
     }
     // Level, whatever the altitudes say: a camera turned aside by much would explain how a robot leans across a slope.
     reconstruction_.add(session_, std::move(rays), averageRotations(yaws_rad, relative));
@@ -164,7 +164,6 @@ class SessionAdjuster {
   const GeometryConfig& config_;
   PairMatcher matcher_;
   Reconstruction reconstruction_;
-  std::vector<Pair> pairs_;
   std::vector<ImagePair> matches_;
 };
 
@@ -189,6 +188,7 @@ class SessionTier {
     const std::vector<ImagePair> ties = matchTies();
     if (ties.empty()) return std::nullopt;
     const std::vector<double> apart_m = alignSessions(ties, together_);
+    together_.orderBy(ties);
     matches_.insert(matches_.end(), ties.begin(), ties.end());
     together_.setMatches(matches_);
     together_.useFixes(kAllFixes_m, config_.fix_loss);
@@ -345,6 +345,10 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"geometry/fix_bias", "1",
                 "what slow errors of the receiver leave in the map, per axis, as a multiple of a fix's sigma"},
                fix_bias, 0.0, 100.0);
+  visitor.integer(
+      {"geometry/window", "1",
+       "images adjusted at a time: more of them, alone or tied, one stretch after the other; limits memory"},
+      window, 200, 1000000);
   visitor.integer({"geometry/min_landmarks", "1", "an image with fewer landmarks has a place only"}, min_landmarks, 4,
                   10000);
   visitor.real(

@@ -44,7 +44,14 @@ void adjustStreet(benchmark::State& state) {
       static_cast<double>(state.range(0)), benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-BENCHMARK(adjustStreet)->Arg(100)->Arg(400)->Arg(1600)->Arg(6400)->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(adjustStreet)
+    ->Arg(400)
+    ->Arg(1600)
+    ->Arg(6400)
+    ->Arg(10000)
+    ->Arg(100000)  // half an hour
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 
 constexpr double kPixel = 1.0 / 450.0;
 

@@ -161,6 +161,39 @@ TEST(BundleAdjustment, GivesLandmarksBehindACameraNoSay) {
   EXPECT_LT(pathError_m(problem, poses), 1e-3);
 }
 
+// What stands still says where the window is; what is not known says nothing, however wrong it is.
+TEST(BundleAdjustment, MovesOnlyItsWindow) {
+  std::mt19937 random(6);
+  const auto poses = test::drive({});
+  BundleProblem problem = truthOf(poses, 0.0, random);
+  const BundleProblem truth = problem;
+  BundleProblem disturbed = problem;
+  disturb(disturbed, random);
+  const BundleWindow window{nullptr, 15, 30, 0, 30};
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (i >= window.begin) problem.cameras[i] = disturbed.cameras[i];
+  }
+  problem.positions.clear();
+  const BundleProblem before = problem;
+  EXPECT_LT(adjust(problem, thorough(), window), 1e-6);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (window.moves(i)) {
+      EXPECT_LT((problem.cameras[i].position_m - truth.cameras[i].position_m).norm(), 1e-4) << i;
+      EXPECT_LT(problem.cameras[i].rotation.angularDistance(truth.cameras[i].rotation), 1e-5) << i;
+    } else {
+      EXPECT_EQ(problem.cameras[i].position_m, before.cameras[i].position_m) << i;
+      EXPECT_EQ(problem.cameras[i].rotation.coeffs(), before.cameras[i].rotation.coeffs()) << i;
+    }
+  }
+  for (std::size_t i = 0; i < truth.landmarks.size(); ++i) {
+    const auto& sightings = truth.landmarks[i].sightings;
+    const bool seen = std::any_of(sightings.begin(), sightings.end(),
+                                  [&](const LandmarkSighting& sighting) { return window.moves(sighting.image); });
+    if (seen) continue;
+    EXPECT_EQ(problem.landmarks[i].position_m, before.landmarks[i].position_m) << i;
+  }
+}
+
 TEST(BundleAdjustment, OfNothingChangesNothing) {
   BundleProblem problem;
   problem.sessions.emplace_back();

@@ -13,6 +13,7 @@ namespace visual_localization::test {
 namespace {
 
 constexpr double kSight_m = 25.0;
+constexpr double kFarSight_m2 = (kSight_m + 1.0) * (kSight_m + 1.0);
 constexpr int kFixesPerImage = 5;
 constexpr std::int64_t kFixInterval_ns = 200'000'000;
 
@@ -69,6 +70,7 @@ View viewOf(const std::vector<WorldPoint>& world, const CameraModel& camera, con
   View view;
   for (std::size_t i = 0; i < world.size(); ++i) {
     const Eigen::Vector3d position_m = world[i].position_m + static_cast<double>(image) * world[i].motion_m;
+    if ((position_m - pose.position_m).squaredNorm() > kFarSight_m2) continue;  // most of a long street
     const Eigen::Vector3d point = pose.toCamera(position_m);
     if (point.z() < 1.0 || point.norm() > kSight_m) continue;
     const Eigen::Vector2d pixel = camera.project(point);
