@@ -60,6 +60,28 @@ TEST(MeasureSpeed, AFewSpikesAreNoMotion) {
   EXPECT_DOUBLE_EQ(driven.median_mps, 1.0) << "more than 2 %";
 }
 
+TEST(MeasureSpeed, AParkedRobotMovesWhereItIsClearlyFasterThanItsNoise) {
+  const SpeedStatistics clear = measureSpeed(atSpeeds(joined(repeated(90, 0.1), repeated(10, 0.5))), 1.0);
+  EXPECT_NEAR(clear.median_mps, 0.5, 1e-9) << "five times the noise";
+  const SpeedStatistics drifting =
+      measureSpeed(atSpeeds(joined(joined(repeated(80, 0.01), repeated(12, 0.1)), repeated(8, 1.0))), 1.0);
+  EXPECT_NEAR(drifting.median_mps, 1.0, 1e-9) << "a drift of 0.1 m/s is no motion, however small the noise";
+  const SpeedStatistics slow = measureSpeed(atSpeeds(joined(repeated(80, 0.3), repeated(20, 2.0))), 1.0);
+  EXPECT_NEAR(slow.median_mps, 0.3, 1e-9) << "who drives at 0.3 m/s is not parked";
+}
+
+TEST(MeasureSpeed, TwoInAHundredAreMotion) {
+  const SpeedStatistics speed = measureSpeed(atSpeeds(joined(repeated(98, 0.01), repeated(2, 1.0))), 1.0);
+  EXPECT_NEAR(speed.median_mps, 1.0, 1e-9);
+}
+
+TEST(MeasureSpeed, TheMiddleOfTheMotionTellsWhatStandsStill) {
+  const SpeedStatistics speed =
+      measureSpeed(atSpeeds(joined(joined(repeated(90, 0.01), repeated(5, 0.25)), repeated(5, 2.0))), 1.0);
+  EXPECT_NEAR(speed.median_mps, 2.0, 1e-9);
+  EXPECT_NEAR(speed.std_mps, 0.0, 1e-9) << "0.25 m/s is less than a quarter of 2 m/s";
+}
+
 TEST(MeasureSpeed, AGapSaysNothing) {
   std::vector<PathSample> samples = atSpeeds(repeated(20, 2.0));
   samples.push_back({samples.back().time_s + 50.0, samples.back().position_m});

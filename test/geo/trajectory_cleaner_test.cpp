@@ -1,7 +1,9 @@
 #include "visual_localization/geo/trajectory_cleaner.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -67,6 +69,51 @@ TEST(TrajectoryCleaner, HeadingIsTheDirectionOfTravel) {
     ASSERT_TRUE(point);
     EXPECT_LT(std::abs(angleDifference(std::atan2(ahead.y(), ahead.x()), point->yaw_rad)), 0.15);
   }
+}
+
+/// Counter-clockwise on a circle of 20 m radius.
+Eigen::Vector2d onRound(double along_m) {
+  return 20.0 * Eigen::Vector2d(std::cos(along_m / 20.0), std::sin(along_m / 20.0));
+}
+
+TEST(TrajectoryCleaner, HeadingIsTheDirectionFromThePointBeforeToTheOneBehind) {
+  const CleanedTrajectory cleaned = clean(record([](double time_s) { return onRound(2.0 * time_s); }, 40.0, 10.0, 0.0));
+  const std::vector<TrajectoryPoint>& points = cleaned.trajectory.points();
+  ASSERT_GT(points.size(), 50U);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::size_t behind = std::min(k + 1, points.size() - 1);  // at the ends from or to the point itself
+    const Eigen::Vector2d way_m = points[behind].position_m - points[k == 0 ? 0 : k - 1].position_m;
+    EXPECT_NEAR(angleDifference(std::atan2(way_m.y(), way_m.x()), points[k].yaw_rad), 0.0, 1e-9) << k;
+  }
+}
+
+TEST(TrajectoryCleaner, WhereTheRobotStandsItKeepsOneHeading) {
+  const Path stopping = [](double time_s) { return onRound(2.0 * std::min(time_s, 30.0)); };
+  const CleanedTrajectory cleaned = clean(record(stopping, 60.0, 10.0, 0.0));
+  const double yaw_rad = cleaned.trajectory.at(stampOf(45.0))->yaw_rad;
+  EXPECT_NEAR(angleDifference(60.0 / 20.0 + 0.5 * kPi, yaw_rad), 0.0, 0.2) << "the one it came with";
+  for (const TrajectoryPoint& point : cleaned.trajectory.points()) {
+    if (point.stamp_ns > stampOf(40.0)) {
+      EXPECT_EQ(point.yaw_rad, yaw_rad);
+    }
+  }
+}
+
+TEST(TrajectoryCleaner, ATenthOfTheSpeedIsStanding) {
+  for (const double crawl_mps : {0.1, 0.3}) {  // of 2 m/s, north, and then east
+    const Path path = [crawl_mps](double time_s) {
+      return Eigen::Vector2d(crawl_mps * std::max(0.0, time_s - 60.0), 2.0 * std::min(time_s, 60.0));
+    };
+    const CleanedTrajectory cleaned = clean(record(path, 90.0, 10.0, 0.0));
+    const auto point = cleaned.trajectory.at(stampOf(80.0));
+    ASSERT_TRUE(point);
+    EXPECT_NEAR(point->yaw_rad, crawl_mps < 0.2 ? 0.5 * kPi : 0.0, 0.4) << crawl_mps;
+  }
+}
+
+TEST(TrajectoryCleaner, WhoNeverMovesLooksEast) {
+  const CleanedTrajectory cleaned = clean(record([](double) { return Eigen::Vector2d(3.0, 4.0); }, 60.0, kRate, 0.0));
+  for (const TrajectoryPoint& point : cleaned.trajectory.points()) ASSERT_EQ(point.yaw_rad, 0.0);
 }
 
 TEST(TrajectoryCleaner, DropsSpikesAndInvalidFixes) {

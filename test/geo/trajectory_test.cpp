@@ -97,6 +97,13 @@ TEST(Trajectory, HeadingTurnsTheShorterWay) {
   EXPECT_NEAR(std::abs(yaw), kPi, 1e-9);
 }
 
+TEST(Trajectory, HeadingStaysWithinHalfATurn) {
+  const Trajectory left({point(0, 0, 0, 3.0), point(kSecond, 1, 0, -3.0)});
+  EXPECT_NEAR(left.at(kSecond / 4 * 3)->yaw_rad, -3.0 - 0.25 * (2.0 * kPi - 6.0), 1e-9);
+  const Trajectory right({point(0, 0, 0, -3.0), point(kSecond, 1, 0, 3.0)});
+  EXPECT_NEAR(right.at(kSecond / 4 * 3)->yaw_rad, 3.0 + 0.25 * (2.0 * kPi - 6.0), 1e-9);
+}
+
 TEST(Trajectory, KnowsNothingOutsideOrInAGap) {
   const Trajectory trajectory({point(0, 0, 0), point(kSecond, 1, 0), point(20 * kSecond, 2, 0)}, 10.0);
   EXPECT_FALSE(trajectory.at(-1));

@@ -63,6 +63,15 @@ TEST(FocalCheck, ForgetsOldImages) {
   EXPECT_TRUE(check.confirms());
 }
 
+TEST(FocalCheck, TheLastTwentyImagesCount) {
+  FocalCheck check(kMaxError);
+  check.add(1.1, 0.004);
+  for (int i = 0; i < 19; ++i) check.add(1.0, 0.004);
+  EXPECT_NEAR(check.scale(), 1.005, 1e-9);
+  check.add(1.0, 0.004);
+  EXPECT_NEAR(check.scale(), 1.0, 1e-9);
+}
+
 TEST(FocalCheck, IgnoresWhatIsNotFinite) {
   FocalCheck check(kMaxError);
   check.add(std::numeric_limits<double>::quiet_NaN(), 0.004);

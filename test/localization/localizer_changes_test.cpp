@@ -96,6 +96,10 @@ TEST_F(LocalizerChanges, WhatIsToldMeanwhileIsNewsToARepeatedImage) {
   localizer_->setCamera(CameraModel(lens));
   see(20.0, 0.0);
   EXPECT_GT(image_->compared, compared) << "another camera";
+  compared = image_->compared;
+  localizer_->setMask({});
+  see(20.0, 0.0);
+  EXPECT_GT(image_->compared, compared) << "another mask";
 }
 
 }  // namespace

@@ -67,6 +67,18 @@ TEST_F(LocalizerRules, ADriverThatSendsItsLastImageOnAndOnIsStuck) {
   EXPECT_TRUE(see(20.0, 0.0).frozen);
 }
 
+TEST_F(LocalizerRules, OneRepetitionMayFreezeTheCamera) {
+  LocalizerConfig config;
+  config.state.frozen_images = 1;
+  config.state.frozen_time_s = 0.0;
+  make(config);
+  settle();
+  image_->repeated = true;
+  const int compared = image_->compared;
+  EXPECT_TRUE(see(20.0, 0.1).frozen);
+  EXPECT_EQ(image_->compared, compared) << "with another stamp it is the same image";
+}
+
 TEST_F(LocalizerRules, WithoutFreezingOnlyTheSameStampIsTheSameImage) {
   LocalizerConfig config;
   config.state.frozen_images = 0;

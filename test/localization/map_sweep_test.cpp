@@ -126,6 +126,12 @@ TEST(MapSweep, SeesNoMoreThanCanBeKept) {
   EXPECT_EQ(nothing_kept.comparedBy(300).size(), 10U);
 }
 
+TEST(MapSweep, BeginsAtAsManyImagesAsCanBeKept) {
+  EXPECT_EQ(MadeUpSweep(1000, 10, 40).comparedBy(300).size(), 40U) << "4 times 10";
+  EXPECT_EQ(MadeUpSweep(1000, 10, 39).comparedBy(300).size(), 30U);
+  EXPECT_EQ(MadeUpSweep(21, 11, 21).comparedBy(4).size(), 11U) << "every second of 21, and 22 are too many";
+}
+
 TEST(MapSweep, ANewImageForgetsTheOldWeights) {
   MadeUpSweep sweep(10);
   Random random(6);

@@ -1,12 +1,22 @@
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <memory>
+#include <numeric>
 #include <optional>
+#include <set>
 #include <utility>
+#include <vector>
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "geometry/pose_solver.h"
+#include "geometry/rays.h"
 #include "localization/pose_verifier.h"
+#include "map/feature_store.h"
 #include "test/support/landmark_world.h"
+#include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
@@ -63,6 +73,132 @@ TEST_F(MatchedLandmarksTest, AgreeWhereTheProjectionIsAndDisagreeElsewhere) {
   EXPECT_GT(inliers, 20U);
   EXPECT_LE(inliers, pose->inliers);
   EXPECT_GT(matched.landmarks.size() - inliers, 3U) << "some features lie where they should not";
+}
+
+/// What is known of a landmark along the ray to it and across.
+Eigen::Matrix3d covarianceOf(const SeenLandmark& landmark) {
+  const Eigen::Matrix3d axes =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), landmark.offset_m.cast<double>()).toRotationMatrix();
+  const Eigen::Vector3d sigmas_m(landmark.sigma_along_m, landmark.sigma_across_m, landmark.sigma_across_m);
+  return axes * sigmas_m.cwiseAbs2().asDiagonal() * axes.transpose();
+}
+
+TEST_F(MatchedLandmarksTest, CountByHowWellTheyAreKnown) {
+  MetricConfig config;
+  config.training_images = 1;
+  verifier_.configure(config);
+  // A metre ahead: where the training image was taken nothing depends on how far a landmark is.
+  const SiftFeatures seen = test::viewOf(world_, camera_, poses_[kImage + 1].camera, 0.3, random_).features;
+  verifier_.startImage(0, seen, camera_);
+  const std::optional<MetricPose> pose = verifier_.nearOneOf({kImage});
+  ASSERT_TRUE(pose);
+  const auto geometry = map_->geometry(kImage);
+  std::vector<std::size_t> features;
+  for (const SeenLandmark& landmark : geometry->landmarks) features.push_back(landmark.feature);
+  const KeypointRays rays = raysOf(seen, camera_, config.keypoint_sigma_px);
+  std::vector<LandmarkMatch> sights;
+  for (const FeatureMatch& match : matchSymmetric(seen, map_->sift(kImage)->subset(features), config.match_ratio)) {
+    const SeenLandmark& landmark = geometry->landmarks[match.b];
+    sights.push_back({rays.normalised[match.a], rays.sigmas[match.a],
+                      geometry->camera.position_m + landmark.offset_m.cast<double>(), covarianceOf(landmark)});
+  }
+  const double tolerance = config.tolerance_px / camera_.intrinsics().fx;
+  const auto expected = solvePose(sights, tolerance, static_cast<std::size_t>(config.min_inliers));
+  ASSERT_TRUE(expected);
+  EXPECT_LT((pose->camera.position_m - expected->camera.position_m).norm(), 1e-7);
+  const MetricPose::Covariance covariance = std::pow(config.sigma_factor, 2) * expected->covariance;
+  EXPECT_LT((pose->covariance - covariance).norm(), 1e-6 * covariance.norm());
+  EXPECT_NEAR(pose->reprojection_px, expected->median_error * camera_.intrinsics().fx, 1e-4);
+}
+
+TEST_F(MatchedLandmarksTest, AreThoseOfTheImageThatSharesMostInliers) {
+  std::vector<TrainingImage> images;
+  for (std::size_t i = 0; i < map_->size(); ++i) {
+    images.push_back(map_->image(i));
+    std::vector<SeenLandmark>& landmarks = images.back().geometry->landmarks;
+    if (i != kImage) landmarks.resize(landmarks.size() / 3);
+  }
+  const TrainingMap map(map_->header(), std::move(images));
+  SessionChoice sessions(map, true);
+  PoseVerifier verifier(map, {}, sessions);
+  verifier.startImage(0, seen_, camera_);
+  ASSERT_TRUE(verifier.nearOneOf({kImage + 1}));
+  EXPECT_GT(verifier.compared().size(), 3U);
+  EXPECT_EQ(verifier.matched().training_image, kImage);
+}
+
+TEST_F(MatchedLandmarksTest, MayBeOneOfEachTrainingImage) {
+  MetricConfig config;
+  config.training_images = 11;
+  config.min_inliers = 6;
+  config.max_sigma_m = 100.0;
+  std::vector<TrainingImage> images;
+  for (std::size_t i = 0; i < map_->size(); ++i) images.push_back(map_->image(i));
+  const auto matchesOf = [&config](const SiftFeatures& seen, const TrainingImage& image) {
+    std::vector<std::size_t> features;
+    for (const SeenLandmark& landmark : image.geometry->landmarks) features.push_back(landmark.feature);
+    return matchSymmetric(seen, image.sift.subset(features), config.match_ratio);
+  };
+  const SiftFeatures all = test::viewOf(world_, camera_, poses_[kImage].camera, 0.3, random_).features;
+  const std::vector<FeatureMatch> ahead = matchesOf(all, images[kImage + 5]);
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < 11; ++i) chosen.push_back(ahead[i * ahead.size() / 11].a);
+  const SiftFeatures seen = all.subset(chosen);
+  for (std::size_t i = 0; i < 11; ++i) {  // each training image shows another one of these
+    TrainingImage& image = images[kImage - 5 + i];
+    std::vector<SeenLandmark>& landmarks = image.geometry->landmarks;
+    std::set<std::uint32_t> others;
+    for (const FeatureMatch& match : matchesOf(seen, image)) {
+      if (match.a != i) others.insert(landmarks[match.b].id);
+    }
+    landmarks.erase(std::remove_if(landmarks.begin(), landmarks.end(),
+                                   [&](const SeenLandmark& landmark) { return others.count(landmark.id) > 0; }),
+                    landmarks.end());
+  }
+  const TrainingMap map(map_->header(), std::move(images));
+  SessionChoice sessions(map, true);
+  PoseVerifier verifier(map, config, sessions);
+  verifier.startImage(0, seen, camera_);
+  ASSERT_TRUE(verifier.nearOneOf({kImage}));
+  const std::vector<MatchedLandmark>& matched = verifier.matched().landmarks;
+  EXPECT_EQ(std::count_if(matched.begin(), matched.end(), [](const MatchedLandmark& one) { return one.inlier; }), 1);
+}
+
+/// A map in memory of which the features of one image are read only in part.
+class HalfReadStore final : public FeatureStore {
+ public:
+  HalfReadStore(const TrainingMap& map, std::size_t image, std::size_t readable)
+      : map_(map), image_(image), readable_(readable) {}
+
+  std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override {
+    if (image != image_) return map_.sift(image);
+    std::vector<std::size_t> first(readable_);
+    std::iota(first.begin(), first.end(), std::size_t{0});
+    return std::make_shared<const SiftFeatures>(map_.sift(image)->subset(first));
+  }
+  std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override { return map_.global(image); }
+  std::vector<std::uint8_t> preview(std::size_t image) const override { return map_.preview(image); }
+  std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override { return map_.geometry(image); }
+  std::size_t geometryCount() const override { return map_.geometryCount(); }
+  std::size_t globalsKept() const override { return map_.globalsKept(); }
+
+ private:
+  const TrainingMap& map_;
+  std::size_t image_;
+  std::size_t readable_;
+};
+
+TEST_F(MatchedLandmarksTest, OfAnImageThatCannotBeReadAreLeftOut) {
+  for (const std::size_t readable : {std::size_t{0}, std::size_t{map_->geometry(kImage)->landmarks.back().feature}}) {
+    TrainingPoses poses;
+    for (std::size_t i = 0; i < map_->size(); ++i) poses.add(map_->pose(i), map_->featureCount(i));
+    const TrainingMap map(map_->header(), poses, std::make_unique<HalfReadStore>(*map_, kImage, readable));
+    SessionChoice sessions(map, true);
+    PoseVerifier verifier(map, {}, sessions);
+    verifier.startImage(0, seen_, camera_);
+    EXPECT_TRUE(verifier.nearOneOf({kImage})) << "by those beside it";
+    EXPECT_NE(verifier.matched().training_image, kImage);
+  }
 }
 
 }  // namespace

@@ -35,6 +35,15 @@ TEST(MotionConsistency, JumpingToAndFroIsItsOwnResidual) {
   EXPECT_NEAR(motion.residual_m(), 1.0, 0.02);
 }
 
+TEST(MotionConsistency, ThreePositionsHaveAResidual) {
+  for (const std::size_t length : {std::size_t{3}, std::size_t{10}}) {
+    MotionConsistency motion(length);
+    for (const int i : {0, 1, 2}) motion.add(i * kSecond, {i == 1 ? 1.0 : 0.0, 5.0});
+    // From their mean, a third, two are a third away and one two thirds.
+    EXPECT_NEAR(motion.residual_m(), std::sqrt(2.0 / 9.0), 1e-12) << length;
+  }
+}
+
 TEST(MotionConsistency, RemembersOnlyItsLengthAndForgetsAltogether) {
   MotionConsistency motion(5);
   motion.add(0, {1000.0, 0.0});

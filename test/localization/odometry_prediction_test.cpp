@@ -1,10 +1,12 @@
 // Odometry leads over images that show nothing known, and does no harm where it is wrong.
+#include <cmath>
 #include <memory>
 #include <random>
 #include <utility>
 
 #include <gtest/gtest.h>
 
+#include "base/numbers.h"
 #include "localization/pose_verifier.h"
 #include "test/localization/street_map.h"
 #include "visual_localization/localization/localizer.h"
@@ -65,6 +67,7 @@ TEST_F(DriveWithOdometry, LeadsOverAStretchOfNothing) {
     ASSERT_EQ(see(i).source, PoseSource::kMetric) << i;
   }
   double sigma_before_m = 0.0;
+  double yaw_variance_before_rad2 = 0.0;
   for (std::size_t i = 7; i <= 36; ++i) {  // round both bends
     odometryTo(i);
     const Estimate estimate = seeNothing(i);
@@ -74,11 +77,36 @@ TEST_F(DriveWithOdometry, LeadsOverAStretchOfNothing) {
     EXPECT_GT(sigma_m, sigma_before_m) << i;
     EXPECT_LT(error_m(estimate, i), 3.0 * sigma_m) << i;
     sigma_before_m = sigma_m;
+    const double yaw_rad = street_.mappedNear(i, Eigen::Vector3d::Zero()).yaw_rad();
+    EXPECT_NEAR(std::remainder(estimate.pose.yaw_rad - yaw_rad, 2.0 * kPi), 0.0, 0.1) << i;
+    EXPECT_GT(estimate.pose.yaw_variance_rad2, yaw_variance_before_rad2) << i;
+    yaw_variance_before_rad2 = estimate.pose.yaw_variance_rad2;
+    const Eigen::Vector2d geodetic_m = street_.map().frame().toEastNorth(estimate.pose.geodetic);
+    EXPECT_LT((geodetic_m - estimate.pose.position_m).norm(), 1e-3) << i;
   }
   odometryTo(37);
   const Estimate seen = see(37);
   ASSERT_EQ(seen.source, PoseSource::kMetric);
   EXPECT_TRUE(seen.metric->confirmed) << "odometry agrees";
+}
+
+TEST_F(DriveWithOdometry, LeadsWhereTheParticlesAreNot) {
+  LocalizerConfig config;
+  config.state.max_distance_m = 0.1;
+  localizer_->configure(config);
+  for (std::size_t i = 2; i <= 6; ++i) {
+    odometryTo(i);
+    ASSERT_EQ(see(i).source, PoseSource::kMetric) << i;
+  }
+  int elsewhere = 0;
+  for (std::size_t i = 7; i <= 36; ++i) {
+    odometryTo(i);
+    const Estimate estimate = seeNothing(i);
+    EXPECT_LT(error_m(estimate, i), 1.0) << i;
+    EXPECT_NE(estimate.pose.position_m, estimate.tracked.position_m) << i;
+    elsewhere += (estimate.pose.position_m - estimate.tracked.position_m).norm() > 0.1 ? 1 : 0;
+  }
+  EXPECT_GT(elsewhere, 5);
 }
 
 TEST_F(DriveWithOdometry, WithoutOdometryTheWayIsUnknown) {
@@ -155,6 +183,65 @@ TEST_F(DriveWithOdometry, WhoIsToldThatItWasCarriedIsConfirmedAtOnce) {
   localizer_->relocalize();
   image_->features = street_.seenFrom(street_.trueNear(35, Eigen::Vector3d::Zero()));
   EXPECT_TRUE(localizer_->process(11 * kSecond_ns, cv::Mat()).metric->confirmed);
+}
+
+/// A place is recognised where image `i` was taken, by too few features for a pose.
+class RecognisedPlace : public DriveWithOdometry {
+ protected:
+  Estimate recognise(std::size_t image, std::size_t i) {
+    const CameraPose here = street_.trueNear(i, Eigen::Vector3d::Zero());
+    image_->features = street_.fewSeenFrom(here, i, 10);
+    return localizer_->process(static_cast<std::int64_t>(image) * kSecond_ns, cv::Mat());
+  }
+  double apart_m(const Estimate& estimate) const {
+    return (estimate.pose.position_m - estimate.tracked.position_m).norm();
+  }
+};
+
+TEST_F(RecognisedPlace, FarFromWhereOdometryLeadsItIsThePose) {
+  for (std::size_t i = 2; i <= 6; ++i) {
+    odometryTo(i);
+    ASSERT_EQ(see(i).source, PoseSource::kMetric) << i;
+  }
+  int recognised = 0;
+  for (std::size_t i = 7; i <= 30; ++i) {
+    odometryTo(i);
+    const Estimate estimate = i < 10 ? seeNothing(i) : recognise(i, 35);
+    ASSERT_FALSE(estimate.metric) << i;
+    if (!estimate.tracked.best.recognised || error_m(estimate, i) < 6.0) continue;
+    EXPECT_EQ(estimate.source, PoseSource::kPlace) << i;
+    ++recognised;
+  }
+  EXPECT_GT(recognised, 5);
+}
+
+TEST_F(RecognisedPlace, WhereOdometryLeadsToThatIsThePose) {
+  for (std::size_t i = 2; i <= 6; ++i) {
+    odometryTo(i);
+    ASSERT_EQ(see(i).source, PoseSource::kMetric) << i;
+  }
+  int led = 0;
+  for (std::size_t i = 7; i <= 14; ++i) {
+    odometryTo(i);
+    const Estimate estimate = recognise(i, i);
+    ASSERT_FALSE(estimate.metric) << i;
+    const bool is_near = error_m(estimate, i) < 4.0;  // those that show the same lie up to 10 m apart
+    EXPECT_EQ(estimate.source, is_near ? PoseSource::kNone : PoseSource::kPlace) << i;
+    if (!is_near || !estimate.tracked.best.recognised) continue;
+    EXPECT_LT(error_m(estimate, i), 0.5) << i;
+    ++led;
+  }
+  EXPECT_GE(led, 3);
+}
+
+TEST_F(RecognisedPlace, TheVelocityAloneDoesNotLeadFarFromTheParticles) {
+  LocalizerConfig config;
+  config.state.max_distance_m = 0.1;
+  localizer_->configure(config);
+  for (std::size_t i = 2; i <= 6; ++i) ASSERT_EQ(see(i).source, PoseSource::kMetric) << i;
+  const Estimate estimate = seeNothing(7);
+  EXPECT_EQ(apart_m(estimate), 0.0) << "a metre from where the velocity leads";
+  EXPECT_GT(error_m(estimate, 7), 0.1);
 }
 
 TEST_F(DriveWithOdometry, NoReadingsNoDifference) {

@@ -76,6 +76,9 @@ TEST_F(Odometry, SilenceAndJumpsAreNoMotion) {
   EXPECT_TRUE(between(3.2, 3.9));
   add(4.1, 54.1, 0.0, 3.0);
   EXPECT_FALSE(between(3.5, 4.1)) << "3 rad in a tenth of a second";
+  add(4.2, 54.2, 0.0, 3.0);
+  add(4.3, 54.3, 0.0, 0.0);
+  EXPECT_FALSE(between(4.15, 4.3)) << "to the right";
 }
 
 TEST_F(Odometry, LateReadingsAreIgnoredAndTimeMayGoBack) {
@@ -85,6 +88,16 @@ TEST_F(Odometry, LateReadingsAreIgnoredAndTimeMayGoBack) {
   driveOn(5.0, 6.0);  // the bag began again
   EXPECT_FALSE(between(100.2, 100.8));
   EXPECT_NEAR(between(5.2, 5.8)->translation_m.x(), 0.6, 1e-6);
+}
+
+TEST_F(Odometry, OfTwoReadingsAtOneTimeTheFirstCounts) {
+  driveOn(0.0, 0.5);
+  add(0.5, 0.9, 0.0);
+  driveOn(0.6, 1.0);
+  const auto increment = between(0.2, 0.8);
+  ASSERT_TRUE(increment);
+  EXPECT_NEAR(increment->translation_m.x(), 0.6, 1e-6);
+  EXPECT_NEAR(increment->distance_m, 0.6, 1e-6);
 }
 
 TEST_F(Odometry, RefusesWhatIsNotFinite) {

@@ -158,6 +158,45 @@ TEST(ParticleFilter, TheEstimateNamesItsTrainingImages) {
   }
 }
 
+/// Standing particles, without new ones.
+ParticleFilterConfig standingConfig(int particles) {
+  ParticleFilterConfig config;
+  config.particles = particles;
+  config.gaussian_std_m = 0.0;
+  config.pull = 0.0;
+  config.random_share = 0.0;
+  return config;
+}
+
+TEST(ParticleFilter, WhoHasAllTheWeightIsDrawnAlways) {
+  World world = roundWorld();
+  for (const int heavy : {0, 1, 7, 19}) {
+    ParticleFilter filter = makeFilter(world, "pf_gaussian", 7, standingConfig(20));
+    int drawn = 0;
+    filter.reset([&drawn, heavy](Random&) { return onCircle(drawn++ == heavy ? 20.0 : 100.0); });
+    filter.update(world.from(onCircle(20.0)));
+    ASSERT_GT(filter.particles()[static_cast<std::size_t>(heavy)].weight, 1.0 - 1e-9);
+    filter.update(world.from(onCircle(20.0)));
+    for (const Particle& particle : filter.particles()) EXPECT_EQ(particle.position_m, onCircle(20.0)) << heavy;
+  }
+}
+
+TEST(ParticleFilter, EachIsDrawnAsOftenAsItsWeightSays) {
+  World world = roundWorld();
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    ParticleFilter filter = makeFilter(world, "pf_gaussian", seed, standingConfig(50));
+    filter.reset(around(onCircle(20.0), 5.0));
+    filter.update(world.from(onCircle(20.0)));
+    const std::vector<Particle> before = filter.particles();
+    filter.update(world.from(onCircle(20.0)));
+    for (const Particle& one : before) {
+      const auto drawn = std::count_if(filter.particles().begin(), filter.particles().end(),
+                                       [&](const Particle& other) { return other.position_m == one.position_m; });
+      EXPECT_LT(std::abs(static_cast<double>(drawn) - 50.0 * one.weight), 1.0 + 1e-9) << seed;
+    }
+  }
+}
+
 TEST(ParticleFilter, AVerifiedPositionWeighsTheParticles) {
   World world = roundWorld();
   ParticleFilterConfig config;

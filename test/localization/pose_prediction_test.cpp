@@ -87,6 +87,22 @@ TEST_F(PosePrediction, OdometryLeadsWhereItWentAndAWrongHeadingLeadsAside) {
   EXPECT_LT((prediction->covariance_m2 - expected_m2).cwiseAbs().maxCoeff(), 1e-5);
 }
 
+TEST_F(PosePrediction, OdometryThatTurnsOnLeadsToAHeadingWithinHalfATurn) {
+  const OdometryConfig config;
+  OdometryTrack track(config);
+  verifier_.useOdometry(track, config);
+  const auto pose = verifyNear(0.0, 22);
+  ASSERT_TRUE(pose);
+  const double yaw_rad = yawOf(pose->base);
+  ASSERT_GT(std::abs(yaw_rad), 0.5);
+  const double turn_rad = yaw_rad > 0.0 ? 2.8 : -2.8;
+  for (int i = 0; i <= 10; ++i) track.add({i * kSecond_ns / 10, {0.0, 0.0}, 0.1 * i * turn_rad});
+  verify(1.0, SiftFeatures(), {});
+  const auto prediction = verifier_.predicted();
+  ASSERT_TRUE(prediction && prediction->by_odometry);
+  EXPECT_NEAR(prediction->yaw_rad, yaw_rad + turn_rad - std::copysign(2.0 * kPi, turn_rad), 1e-9);
+}
+
 // A robot that stands, whose wheels slip once.
 TEST_F(PosePrediction, OdometryIsBelievedAgainAfterTenPosesThatItAgreesWith) {
   const OdometryConfig config;

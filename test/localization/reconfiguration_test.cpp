@@ -1,3 +1,4 @@
+#include <set>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -92,6 +93,20 @@ TEST_F(Reconfiguration, AnInvalidConfigurationChangesNothing) {
   EXPECT_THROW(localizer_.configure(invalid), ParameterError);
   EXPECT_EQ(localizer_.particles().size(), 80U);
   changeAndDriveOn({});
+}
+
+TEST(Sweep, AReconfigurationSweepsTheImageAnew) {
+  const auto map = test::mapAt(test::street(100, 1.0));
+  Scores scores(map->size());
+  scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{1.0, 1.0}; });
+  MapSweep sweep(*map, 100, 100);
+  Random random(1);
+  sweep.draw(scores, random);
+  sweep.configure(5);
+  std::set<std::size_t> drawn;
+  for (int i = 0; i < 200; ++i) drawn.insert(sweep.draw(scores, random));
+  EXPECT_EQ(drawn.size(), 5U);
+  EXPECT_LT(*drawn.rbegin(), map->size());
 }
 
 }  // namespace

@@ -49,6 +49,24 @@ TEST(SiftSimilarity, FewerThanTwoFeaturesAreNoEvidence) {
   EXPECT_EQ(similarity.compare(one, two).similarity, 0.0);
   EXPECT_EQ(similarity.compare(two, one).similarity, 0.0);
   EXPECT_EQ(similarity.compare({}, {}).similarity, 0.0);
+  EXPECT_EQ(similarity.compare({}, two).similarity, 0.0);
+  EXPECT_EQ(similarity.compare(two, {}).similarity, 0.0);
+}
+
+TEST(SiftSimilarity, TwoFeaturesAreEnough) {
+  for (const char* mode : {"symmetric", "one_way"}) {
+    const SiftSimilarity similarity({0.6, mode}, SimilarityConfig());
+    const SiftFeatures two = featuresOf({kX, kY});
+    const SiftFeatures three = featuresOf({kX, kY, kZ});
+    EXPECT_DOUBLE_EQ(similarity.compare(two, two).similarity, 1.0) << mode;
+    EXPECT_DOUBLE_EQ(similarity.compare(two, three).similarity, 1.0) << mode;
+    EXPECT_EQ(similarity.compare(three, two).matches, 2U) << mode;
+  }
+}
+
+TEST(FeatureKind, HasAName) {
+  EXPECT_EQ(toString(FeatureKind::kSift), "SIFT");
+  EXPECT_EQ(toString(FeatureKind::kGlobal), "GLOBAL");
 }
 
 TEST(Scores, ComparesEachTrainingImageOnceByEachKindAndCounts) {

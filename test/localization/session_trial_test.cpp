@@ -1,0 +1,75 @@
+// What landmarks teach about the sessions of a map.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "localization/pose_verifier.h"
+#include "test/localization/street_map.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kEvening_ns = 36'000 * kSecond_ns;
+
+/// The street on two days; on the first one, in the morning, half of its landmarks were seen.
+std::shared_ptr<const TrainingMap> twoDays(const TrainingMap& street) {
+  MapHeader header = street.header();
+  header.sessions = {header.sessions.front(), header.sessions.front()};
+  header.sessions[1].name = "evening";
+  std::vector<TrainingImage> images;
+  for (int session = 0; session < 2; ++session) {
+    for (std::size_t i = 0; i < street.size(); ++i) {
+      TrainingImage image = street.image(i);
+      image.session = session;
+      image.stamp_ns = session * kEvening_ns + static_cast<std::int64_t>(i) * kSecond_ns;
+      std::vector<SeenLandmark> seen;
+      for (const SeenLandmark& landmark : image.geometry->landmarks) {
+        if (session == 1 || landmark.id % 2 == 0) seen.push_back(landmark);
+      }
+      image.geometry->landmarks = seen;
+      images.push_back(std::move(image));
+    }
+  }
+  return std::make_shared<const TrainingMap>(header, std::move(images));
+}
+
+class SessionTrial : public testing::Test {
+ protected:
+  /// Image by image along the street, beginning at this time: the session that is chosen after each.
+  std::vector<std::size_t> chosenOnTheWay(std::int64_t begin_ns, std::size_t images) {
+    std::vector<std::size_t> chosen;
+    for (std::size_t i = 10; i < 10 + images; ++i) {
+      const std::int64_t stamp_ns = begin_ns + static_cast<std::int64_t>(i) * kSecond_ns;
+      const SiftFeatures seen = street_.seenFrom(street_.trueNear(i, Eigen::Vector3d::Zero()));
+      sessions_.startImage(stamp_ns);
+      verifier_.startImage(stamp_ns, seen, street_.camera());
+      std::optional<MetricPose> pose = verifier_.nearPrediction();
+      if (!pose) pose = verifier_.nearOneOf({*sessions_.chosen() * street_.map().size() + i});
+      EXPECT_TRUE(pose) << i;
+      chosen.push_back(*sessions_.chosen());
+    }
+    return chosen;
+  }
+
+  test::StreetMap street_;
+  std::shared_ptr<const TrainingMap> map_ = twoDays(street_.map());
+  SessionChoice sessions_{*map_, true};
+  PoseVerifier verifier_{*map_, {}, sessions_};
+};
+
+TEST_F(SessionTrial, TheSessionThatShowsMoreInliersIsChosen) {
+  EXPECT_EQ(chosenOnTheWay(0, 6), (std::vector<std::size_t>{0, 0, 0, 1, 1, 1})) << "the fourth image is a trial";
+}
+
+TEST_F(SessionTrial, TheSessionThatShowsFewerInliersIsNot) {
+  EXPECT_EQ(chosenOnTheWay(kEvening_ns, 12), std::vector<std::size_t>(12, 1));
+}
+
+}  // namespace
+}  // namespace visual_localization

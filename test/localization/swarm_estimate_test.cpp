@@ -1,0 +1,110 @@
+// What a swarm makes of particles that match nothing, and of those that are far away.
+
+#include <cstdint>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "localization/dpso.h"
+#include "test/support/synthetic.h"
+#include "test/support/world.h"
+#include "visual_localization/geo/trajectory.h"
+
+namespace visual_localization {
+namespace {
+
+using test::onCircle;
+using test::roundWorld;
+using test::World;
+
+TEST(SwarmEstimate, WhereNothingMatchesTheBestImageIsTheOneNearBy) {
+  World world = roundWorld();
+  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  for (int image = 0; image < 40; ++image) swarm.update(world.from(onCircle(50.0)));
+  const TrackerEstimate estimate = swarm.update(world.inTheDark());
+  EXPECT_EQ(estimate.best.similarity, 0.0);
+  EXPECT_EQ(estimate.best_image, world.map().nearest(estimate.position_m).image);
+  EXPECT_EQ(estimate.training_image, estimate.best_image);
+  EXPECT_GT(estimate.best_image, 0U);
+}
+
+TEST(SwarmEstimate, BeforeAnythingMatchesTheBestImageIsTheOneInTheMiddle) {
+  World world = roundWorld();
+  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+    Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), seed);
+    const TrackerEstimate estimate = swarm.update(world.inTheDark());
+    EXPECT_EQ(estimate.best_image, world.map().nearest(estimate.position_m).image) << seed;
+  }
+}
+
+TEST(SwarmEstimate, TheCentreOfTheBestIsThatOfThoseWithAnyWeight) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.position = "k_best";
+  config.best_particles = 5;
+  config.recovery = "none";
+  int few = 0;
+  for (std::uint32_t seed = 1; seed <= 40; ++seed) {
+    Dpso swarm(world.map(), config, FitnessConfig(), seed);
+    const TrackerInput input = world.inTheDark();
+    input.scores.startImage(FeatureKind::kSift, [&world](FeatureKind, std::size_t image) {
+      return (world.map().position_m(image) - onCircle(20.0)).norm() < 2.0 ? World::scoreAt(0.3) : Score{};
+    });
+    const TrackerEstimate estimate = swarm.update(input);
+    Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
+    int weighted = 0;
+    for (const Particle& particle : swarm.particles()) {
+      if (particle.weight == 0.0) continue;
+      sum_m += particle.position_m;
+      ++weighted;
+    }
+    if (weighted >= config.best_particles) continue;
+    EXPECT_LT((estimate.position_m - sum_m / weighted).norm(), 1e-9) << seed;
+    ++few;
+  }
+  EXPECT_GE(few, 10);
+}
+
+TEST(SwarmEstimate, WithoutTravellersItsSpeedIsThatOfTheWeightedCentre) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.quantum_share = 1.0;
+  config.quantum_share_max = 1.0;
+  config.high_energy_share = 0.0;
+  config.recovery = "none";
+  config.ema_alpha = 1.0;
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  swarm.update(world.from(onCircle(0.0)));
+  for (int image = 1; image < 10; ++image) {
+    const Eigen::Vector2d before_m = momentsOf(swarm.particles()).mean_m;
+    TrackerInput input = world.from(onCircle(2.0 * image));
+    input.travel.seconds = 0.5;
+    swarm.update(input);
+    const double speed_mps = (momentsOf(swarm.particles()).mean_m - before_m).norm() / 0.5;
+    EXPECT_NEAR(swarm.tuning().speed_mps, speed_mps, 1e-9) << image;
+  }
+}
+
+TEST(SwarmEstimate, WhereNothingConfinesItTheFrameEndsAfterAThousandKilometres) {
+  World world(test::mapAt({{0.0, 0.0}, {100.0, 0.0}, {100.0, 60.0}, {0.0, 60.0}}));
+  DpsoConfig config;
+  config.confine = "none";
+  config.recovery = "none";
+  config.adapt_speed = false;
+  config.phi2 = 0.6;
+  config.v0 = 1e6;
+  Dpso swarm(world.map(), config, FitnessConfig(), 7);
+  swarm.update(world.inTheDark());
+  swarm.attract({5e6, -5e6});
+  swarm.update(world.inTheDark());
+  int at_the_end = 0;
+  for (const Particle& particle : swarm.particles()) {
+    EXPECT_LE(particle.position_m.cwiseAbs().maxCoeff(), kLargestCoordinate_m);
+    at_the_end += particle.position_m.x() == kLargestCoordinate_m ? 1 : 0;
+    EXPECT_TRUE(particle.position_m.x() < kLargestCoordinate_m || particle.velocity_m.x() == 0.0);
+  }
+  EXPECT_GT(at_the_end, 20);
+}
+
+}  // namespace
+}  // namespace visual_localization
