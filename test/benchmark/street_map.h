@@ -5,8 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "base/numbers.h"
 #include "features/global_histograms.h"
@@ -16,12 +20,13 @@ namespace visual_localization::benchmark {
 
 /// A city that exists only as numbers: a grid of streets 100 m apart with an image every metre. Each image shows the
 /// landmarks around it, an eighth of them new, so that images eight metres apart share none. What an image looks like
-/// depends on its number and the seed alone.
+/// depends on its number, the visit and the seed alone.
 class StreetMap {
  public:
-  /// `images`, `features` (of an image): at least 1.
-  StreetMap(std::size_t images, std::size_t features, std::uint64_t seed)
-      : features_(features), new_features_(features / 8 + 1), seed_(seed) {
+  /// `images`, `features` (of an image): at least 1. `located`: landmarks have positions, and features are where they
+  /// project to; otherwise anywhere.
+  StreetMap(std::size_t images, std::size_t features, std::uint64_t seed, bool located = false)
+      : features_(features), new_features_(features / 8 + 1), seed_(seed), located_(located) {
     while (2 * streets_ * (streets_ - 1) * kBlock_m < images) ++streets_;
     // Bytes as they are in descriptors: many small ones, a norm of some 512.
     for (std::size_t i = 0; i < bytes_.size(); ++i) {
@@ -38,12 +43,48 @@ class StreetMap {
     return header;
   }
 
+  /// That of a map with one session, recorded by a camera of 62 degrees.
+  static MapHeader locatedHeader(const std::string& session) {
+    MapHeader located = header();
+    located.sessions = {{session, camera()}};
+    return located;
+  }
+
   /// Training image `i`.
   TrainingImage image(std::size_t i) const {
     TrainingImage image;
     static_cast<TrainingPose&>(image) = place(i);
     image.sift = view(i, 0);
     image.global = global(i);
+    return image;
+  }
+
+  /// The same as a recording of its own has it, with landmarks: at another time, and with a receiver that is off by up
+  /// to 0.3 m along each axis. `visit`: from 1.
+  TrainingImage locatedImage(std::size_t i, std::uint64_t visit) const {
+    constexpr std::int64_t kVisit_ns = 1'000'000'000'000'000;
+    TrainingImage image;
+    static_cast<TrainingPose&>(image) = place(i);
+    image.stamp_ns += static_cast<std::int64_t>(visit) * kVisit_ns;
+    image.sift = view(i, visit);
+    image.global = global(i);
+    ImageGeometry geometry;
+    geometry.camera = cameraAt(i);
+    for (std::size_t f = 0; f < features_; ++f) {
+      const std::uint64_t landmark = i * new_features_ + f;
+      if (!pixelOf(landmark, i)) continue;
+      const Eigen::Vector3d offset_m = position_m(landmark) - geometry.camera.position_m;
+      geometry.landmarks.push_back(
+          {static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(landmark), offset_m.cast<float>(), 0.1F, 0.03F});
+    }
+    const std::uint64_t off = mix(visit ^ seed_);
+    const Eigen::Vector2d bias_m(0.6 * share(off) - 0.3, 0.6 * share(off >> 16U) - 0.3);
+    geometry.camera.position_m.head<2>() += bias_m;
+    image.position_m += bias_m;
+    Eigen::Matrix<double, 6, 1> sigmas;
+    sigmas << 0.15, 0.15, 0.15, 0.004, 0.004, 0.004;
+    geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
+    image.geometry = std::move(geometry);
     return image;
   }
 
@@ -71,6 +112,12 @@ class StreetMap {
       const std::uint64_t place = mix(landmark ^ seed_);
       keypoints[f] = {static_cast<float>(place % 320), static_cast<float>(place / 320 % 240), 4.0F,
                       static_cast<float>(place >> 32U) * (360.0F / 4294967296.0F)};
+      const auto pixel = located_ ? pixelOf(landmark, i) : std::nullopt;
+      if (pixel) {
+        const std::uint64_t noise = mix(place ^ visit ^ (i << 32U));
+        keypoints[f].x_px = static_cast<float>(pixel->x() + share(noise) - 0.5);
+        keypoints[f].y_px = static_cast<float>(pixel->y() + share(noise >> 16U) - 0.5);
+      }
       describe(landmark, mix(i + (visit << 40U)), &descriptors[f * SiftFeatures::kDescriptorSize]);
     }
     return SiftFeatures(std::move(keypoints), std::move(descriptors));
@@ -91,6 +138,37 @@ class StreetMap {
 
  private:
   static constexpr std::size_t kBlock_m = 100;
+
+  static CameraModel camera() {
+    return CameraModel({{320, 240}, 266.3, 266.3, 159.5, 119.5, Distortion::kPlumbBob, {}});
+  }
+  /// From 0 to 1, by the lowest 16 bits.
+  static double share(std::uint64_t bits) { return static_cast<double>(bits & 0xFFFFU) / 65535.0; }
+
+  CameraPose cameraAt(std::size_t i) const {
+    const TrainingPose at = place(i);
+    return {levelCamera(at.yaw_rad), {at.position_m.x(), at.position_m.y(), 0.0}};
+  }
+
+  /// Beside the street, ahead of the last image that shows the landmark.
+  Eigen::Vector3d position_m(std::uint64_t landmark) const {
+    const CameraPose last = cameraAt(landmark / new_features_);
+    const std::uint64_t bits = mix(landmark + 0x51ED270B7A1C4F35U + seed_);
+    const double ahead_m = 8.0 + 12.0 * share(bits);
+    const double beside_m = ahead_m * (0.15 + 0.35 * share(bits >> 16U)) * ((bits >> 48U) % 2 == 0 ? 1.0 : -1.0);
+    const double up_m = ahead_m * (0.4 * share(bits >> 32U) - 0.1);
+    return last.position_m + last.rotation * Eigen::Vector3d(beside_m, -up_m, ahead_m);
+  }
+
+  /// Where image `i` shows it; not where the street has turned since.
+  std::optional<Eigen::Vector2d> pixelOf(std::uint64_t landmark, std::size_t i) const {
+    static const CameraModel lens = camera();
+    const Eigen::Vector3d point = cameraAt(i).toCamera(position_m(landmark));
+    if (point.z() < 1.0) return std::nullopt;
+    const Eigen::Vector2d pixel = lens.project(point);
+    const bool inside = pixel.x() > 1.0 && pixel.x() < 318.0 && pixel.y() > 1.0 && pixel.y() < 238.0;
+    return inside ? std::optional(pixel) : std::nullopt;
+  }
 
   /// Steele, Lea and Flood, Fast splittable pseudorandom number generators (2014).
   static std::uint64_t mix(std::uint64_t z) {
@@ -120,6 +198,7 @@ class StreetMap {
   std::size_t features_;
   std::size_t new_features_;  ///< of an image against the one before
   std::uint64_t seed_;
+  bool located_;
   std::size_t streets_ = 2;  ///< in each direction
   std::array<std::uint8_t, 256> bytes_{};
 };
