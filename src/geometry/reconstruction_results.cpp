@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <numeric>
 #include <optional>
 #include <unordered_map>
@@ -179,18 +180,26 @@ class SeenLandmarks {
   std::unordered_map<std::uint64_t, const Eigen::Vector3d*> positions_;
 };
 
-/// The median of the ties near each image, or of the nearest one. `offsets`: in order of the image, one at least.
+/// The median of the ties near each image, or else the nearest one. `offsets`: in order of the image, one at least.
 std::vector<Eigen::Vector3d> shiftsAlong(std::size_t images, const std::vector<Offset>& offsets) {
+  const auto from = [&offsets](std::size_t image) {
+    return std::lower_bound(offsets.begin(), offsets.end(), image,
+                            [](const Offset& offset, std::size_t i) { return offset.image < i; });
+  };
   std::vector<Eigen::Vector3d> shifts_m;
   for (std::size_t i = 0; i < images; ++i) {
     std::vector<Eigen::Vector3d> near;
-    const Offset* nearest = &offsets.front();
-    const auto apart = [i](const Offset& offset) { return offset.image > i ? offset.image - i : i - offset.image; };
-    for (const Offset& offset : offsets) {
-      if (apart(offset) <= kWindow) near.push_back(offset.shift_m);
-      if (apart(offset) < apart(*nearest)) nearest = &offset;
+    for (auto offset = from(i - std::min(i, kWindow)); offset != offsets.end() && offset->image <= i + kWindow;
+         ++offset) {
+      near.push_back(offset->shift_m);
     }
-    shifts_m.push_back(near.empty() ? nearest->shift_m : medianOf(near));
+    if (near.empty()) {
+      const auto after = from(i);
+      const auto before = after == offsets.begin() ? after : from(std::prev(after)->image);
+      const bool later = after != offsets.end() && (before == after || after->image - i < i - before->image);
+      near.push_back((later ? after : before)->shift_m);
+    }
+    shifts_m.push_back(medianOf(near));
   }
   return shifts_m;
 }
