@@ -100,6 +100,11 @@ class InstallTest(unittest.TestCase):
             result = run('bash', '-c', f'source {PREFIX}/setup.bash && exec {PROGRAMS / name} --help')
             self.assertEqual(result.returncode, 0, name + ': ' + result.stderr)
 
+    def test_programs_run_without_setup(self):
+        for name in ('map_builder', 'map_edit', 'map_info', 'localize', 'evaluate', 'localizer_node', 'map_recorder'):
+            result = run(PROGRAMS / name, '--help', env={'PATH': '/usr/bin:/bin'})
+            self.assertEqual(result.returncode, 0, name + ': ' + result.stderr)
+
 
 if __name__ == '__main__':
     unittest.main(argv=sys.argv[:1])
