@@ -49,7 +49,7 @@ BENCHMARK(adjustStreet)
     ->Arg(1600)
     ->Arg(6400)
     ->Arg(10000)
-    ->Arg(100000)  // half an hour
+    ->Arg(100000)  // more than 20 minutes
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
 
