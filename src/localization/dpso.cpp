@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "localization/session_choice.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/localization/particles.h"
 
@@ -198,7 +199,7 @@ std::size_t Dpso::evaluate(const TrackerInput& input) {
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector2d& position_m = particles_[i].position_m;
     fitness_[i] = input.verified_m ? Fitness{fitnessAbout(*input.verified_m, position_m), 0, {}}
-                                   : evaluateFitness(input.nearest(map_, position_m), input.scores, fitness_config_);
+                                   : evaluateFitness(input.sessions.nearest(position_m), input.scores, fitness_config_);
     particles_[i].weight = fitness_[i].value;
     if (fitness_[i].value > fitness_[best].value) best = i;
   }

@@ -190,9 +190,9 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
   Travel travel;
   if (tracked_ns_) travel = {odometry_.between(*tracked_ns_, stamp_ns), secondsBetween(*tracked_ns_, stamp_ns)};
   tracked_ns_ = stamp_ns;
-  if (!metric) return tracker_->update({scores_, sweep_, travel, {}, sessions_.get()});
+  if (!metric) return tracker_->update({scores_, sweep_, *sessions_, travel});
   const Eigen::Vector2d position_m = metric->base.translation().head<2>();
-  TrackerEstimate tracked = tracker_->update({scores_, sweep_, travel, position_m});
+  TrackerEstimate tracked = tracker_->update({scores_, sweep_, *sessions_, travel, position_m});
   bringTracker(tracked, *metric);
   tracked.best_image = verifier_->matched().training_image;
   tracked.best = scores_[tracked.best_image];

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "base/numbers.h"
+#include "localization/session_choice.h"
 #include "visual_localization/localization/particles.h"
 
 namespace visual_localization {
@@ -136,7 +137,7 @@ void ParticleFilter::weigh(const TrackerInput& input) {
   for (Particle& particle : particles_) {
     const Fitness fitness =
         input.verified_m ? Fitness{fitnessAbout(*input.verified_m, particle.position_m), 0, {}}
-                         : evaluateFitness(input.nearest(map_, particle.position_m), input.scores, fitness_config_);
+                         : evaluateFitness(input.sessions.nearest(particle.position_m), input.scores, fitness_config_);
     particle.weight = fitness.value;
     if (fitness.score.similarity > best_.score.similarity) best_ = fitness;
   }

@@ -3,7 +3,6 @@
 #include "localization/dpso.h"
 #include "localization/multi_swarm.h"
 #include "localization/particle_filter.h"
-#include "localization/session_choice.h"
 #include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -100,10 +99,6 @@ void ParticleFilterConfig::declare(ParameterVisitor& visitor) {
       acceleration_std, 0.0, 1.0);
   visitor.real({"pf/initial_speed", "m", "first speed of pf_linear's particles per image (v_init)"}, initial_speed_m,
                0.0, 1000.0);
-}
-
-Neighbour TrackerInput::nearest(const TrainingMap& map, const Eigen::Vector2d& position_m) const {
-  return sessions == nullptr ? map.nearest(position_m) : sessions->nearest(position_m);
 }
 
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) {

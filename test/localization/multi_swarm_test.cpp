@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "localization/session_choice.h"
 #include "test/support/world.h"
 
 namespace visual_localization {
@@ -28,7 +29,8 @@ class TwinStreet {
         twin_(twin),
         map_(test::mapAt(test::street(200, 1.0))),
         scores_(map_->size()),
-        sweep_(*map_, 100000, 100000) {}
+        sweep_(*map_, 100000, 100000),
+        sessions_(*map_, false) {}
 
   static Eigen::Vector2d at(double along_m) { return {along_m, 0.0}; }
 
@@ -42,7 +44,7 @@ class TwinStreet {
       return World::scoreAt(0.5 * std::max(like_own, like_twin));
     });
     sweep_.startImage();
-    return {scores_, sweep_};
+    return {scores_, sweep_, sessions_};
   }
 
   const TrainingMap& map() const { return *map_; }
@@ -57,6 +59,7 @@ class TwinStreet {
   std::shared_ptr<const TrainingMap> map_;
   Scores scores_;
   MapSweep sweep_;
+  SessionChoice sessions_;
 };
 
 TrackerConfig config(int swarms = 3) {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/scores.h"
 
 namespace visual_localization {
 namespace {

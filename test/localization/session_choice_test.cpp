@@ -326,7 +326,7 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
         return test::World::scoreAt((map.pose(image).session == 1 ? 0.5 : 0.1) * bell);
       });
       sweep.startImage();
-      const TrackerEstimate estimate = swarm.update({scores, sweep, {}, {}, &sessions});
+      const TrackerEstimate estimate = swarm.update({scores, sweep, sessions});
       sessions.sawSomething(estimate.best.recognised);
       const auto trial = sessions.trial(map.position_m(estimate.best_image), map.yaw_rad(estimate.best_image));
       if (trial) {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "localization/session_choice.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker.h"
@@ -16,7 +17,7 @@ namespace visual_localization::test {
 class World {
  public:
   explicit World(std::shared_ptr<const TrainingMap> map)
-      : map_(std::move(map)), scores_(map_->size()), sweep_(*map_, 100000, 100000) {}
+      : map_(std::move(map)), scores_(map_->size()), sweep_(*map_, 100000, 100000), sessions_(*map_, false) {}
 
   /// What the robot sees from here; globally, places within some 10 m look alike.
   TrackerInput from(const Eigen::Vector2d& robot_m) {
@@ -25,13 +26,13 @@ class World {
                                         : scoreAt(bell(image, robot_m, 10.0));
     });
     sweep_.startImage();
-    return {scores_, sweep_};
+    return {scores_, sweep_, sessions_};
   }
 
   TrackerInput inTheDark() {
     scores_.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{}; });
     sweep_.startImage();
-    return {scores_, sweep_};
+    return {scores_, sweep_, sessions_};
   }
 
   static Score scoreAt(double similarity) {
@@ -49,6 +50,7 @@ class World {
   std::shared_ptr<const TrainingMap> map_;
   Scores scores_;
   MapSweep sweep_;
+  SessionChoice sessions_;
 };
 
 /// A round of 30 m radius with an image every 0.94 m.

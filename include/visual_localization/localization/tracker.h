@@ -46,16 +46,13 @@ class SessionChoice;
 
 /// What one image brings to a tracker.
 struct TrackerInput {
-  Scores& scores;      ///< of the image, by the features chosen for it
-  MapSweep& sweep;     ///< where it may have been taken, should the position be lost
-  Travel travel = {};  ///< since the last image
+  Scores& scores;                 ///< of the image, by the features chosen for it
+  MapSweep& sweep;                ///< where it may have been taken, should the position be lost
+  const SessionChoice& sessions;  ///< which training image stands for a position
+  Travel travel = {};             ///< since the last image
   /// Where landmarks verify that the image was taken: particles are weighed by their distance from there, and no
   /// training image is compared.
   std::optional<Eigen::Vector2d> verified_m = {};
-  const SessionChoice* sessions = nullptr;  ///< null: training images of all sessions are compared
-
-  /// The training image that stands for a position.
-  Neighbour nearest(const TrainingMap& map, const Eigen::Vector2d& position_m) const;
 };
 
 /// Follows the position from image to image.
