@@ -33,7 +33,7 @@ class StreetMap {
     std::normal_distribution<double> normal(0.0, sigma_m);
     std::vector<WorldPoint> blown = world_;
     for (WorldPoint& point : blown) {
-      for (double& coordinate : point.position_m) coordinate += normal(random_);
+      for (Eigen::Index axis = 0; axis < 3; ++axis) point.position_m[axis] += normal(random_);
     }
     return viewOf(blown, camera_, pose, kKeypointSigma_px, random_).features;
   }

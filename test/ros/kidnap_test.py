@@ -47,6 +47,7 @@ class KidnapTest(unittest.TestCase):
 
     def show_black(self):
         """The status of an image that moves no particle anywhere, taken after those of the bag."""
+        fixture.wait_for_silence(self.localizer)
         black = CompressedImage(format='png', data=cv2.imencode('.png', np.zeros((240, 320), np.uint8))[1].tobytes())
         black.header.stamp = self.localizer.status.last().header.stamp + rospy.Duration(1.0)
         return fixture.Camera(self.localizer).show(black)

@@ -21,6 +21,7 @@ from visual_localization.msg import LocalizationStatus
 EARTH_RADIUS_M = 6371000.0
 TRUTH_TOPIC = '/ground_truth/fix'
 IMAGE_TOPIC = '/stereo/left/image_raw/compressed'
+SLOWNESS = int(os.environ.get('VISUAL_LOCALIZATION_TEST_SLOWNESS', '1'))  # of this build
 
 
 def _fail_skipped(result, test, reason):
@@ -155,6 +156,15 @@ class Camera:
         before = self._localizer.counts()[0]
         self.publish(image)
         return wait_for(answer, timeout_s, 'the answer to an image')[0]
+
+
+def wait_for_silence(localizer, seconds=1.0):
+    """Until no more image is answered: those that were sent before a bag was stopped may still be on their way."""
+    def silent():
+        before = localizer.counts()
+        time.sleep(seconds)
+        return localizer.counts() == before
+    wait_for(silent, 60.0, 'the last images of the bag')
 
 
 def memory_mb(node):

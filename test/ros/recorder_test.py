@@ -15,7 +15,7 @@ from visualization_msgs.msg import Marker
 import localizer_fixture as fixture
 from visual_localization.srv import WriteMap
 
-DEADLINE_S = 60.0
+DEADLINE_S = 60.0 * fixture.SLOWNESS
 RECORDER = roslib.packages.find_node('visual_localization', 'map_recorder')[0]
 MAP_INFO = roslib.packages.find_node('visual_localization', 'map_info')[0]
 
@@ -41,8 +41,8 @@ class RecorderTest(unittest.TestCase):
         return recorder
 
     def play(self, seconds, bag=None):
-        player = fixture.Player(bag or self.bag, rate=15, duration_s=seconds)
-        fixture.wait_for(player.ended, 120.0, 'the end of the bag')
+        player = fixture.Player(bag or self.bag, rate=15 / fixture.SLOWNESS, duration_s=seconds)
+        fixture.wait_for(player.ended, 120.0 * fixture.SLOWNESS, 'the end of the bag')
         player.stop()
 
     def recorded(self):
