@@ -8,8 +8,9 @@ import sys
 import tempfile
 import unittest
 
+import localizer_fixture as fixture
+
 BAG, OTHER_BAG = sys.argv[1:3]
-SLOWNESS = int(os.environ.get('VISUAL_LOCALIZATION_TEST_SLOWNESS', '1'))
 LAUNCH = pathlib.Path(__file__).resolve().parents[2] / 'launch'
 CONFIGURATIONS = {
     'atrv_jr.launch': [[], ['mode:=record'], ['rectify:=true', 'rviz:=false']],
@@ -27,7 +28,7 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def roslaunch(*arguments, timeout_s=300 * SLOWNESS):
+def roslaunch(*arguments, timeout_s=300 * fixture.SLOWNESS):
     return subprocess.run(['roslaunch', *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           universal_newlines=True, timeout=timeout_s)
 
