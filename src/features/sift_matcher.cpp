@@ -29,7 +29,7 @@ const NearestDescriptors& neighboursOf(const SiftFeatures& a, const SiftFeatures
   return nearest;
 }
 
-bool matchesBack(std::size_t i, const NearestDescriptors& nearest, const AngleRatioTest& test) {
+bool matchesBack(std::uint32_t i, const NearestDescriptors& nearest, const AngleRatioTest& test) {
   const TwoNearest& of_a = nearest.of_a[i];
   const TwoNearest& of_b = nearest.of_b[of_a.index];
   return of_b.index == i && isDistinct(of_a, test) && isDistinct(of_b, test);
@@ -40,7 +40,7 @@ void forEachOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angl
   if (a.size() < 2 || b.size() < 2) return;
   const NearestDescriptors& nearest = neighboursOf(a, b);
   const AngleRatioTest& test = ratioTest(max_angle_ratio);
-  for (std::size_t i = 0; i < a.size(); ++i) {
+  for (std::uint32_t i = 0; i < a.size(); ++i) {
     if (isDistinct(nearest.of_a[i], test)) use(FeatureMatch{i, nearest.of_a[i].index});
   }
 }
@@ -50,7 +50,7 @@ void forEachSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_a
   if (a.size() < 2 || b.size() < 2) return;
   const NearestDescriptors& nearest = neighboursOf(a, b);
   const AngleRatioTest& test = ratioTest(max_angle_ratio);
-  for (std::size_t i = 0; i < a.size(); ++i) {
+  for (std::uint32_t i = 0; i < a.size(); ++i) {
     if (matchesBack(i, nearest, test)) use(FeatureMatch{i, nearest.of_a[i].index});
   }
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
 
 #include <Eigen/Core>
@@ -96,29 +95,32 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> revisits(const std::vector<
   return pairs;
 }
 
-namespace {
+void FeatureSets::addImage(std::size_t features) {
+  const std::size_t end = parents_.size() + features;
+  ends_.push_back(static_cast<std::uint32_t>(end));
+  while (parents_.size() < end) parents_.push_back(static_cast<std::uint32_t>(parents_.size()));
+}
 
-/// Disjoint sets of features, numbered over all images.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t count) : parents_(count) { std::iota(parents_.begin(), parents_.end(), 0U); }
+void FeatureSets::append(const FeatureSets& other) {
+  const auto begin = static_cast<std::uint32_t>(parents_.size());
+  for (const std::uint32_t end : other.ends_) ends_.push_back(begin + end);
+  for (const std::uint32_t parent : other.parents_) parents_.push_back(begin + parent);
+}
 
-  std::uint32_t root(std::uint32_t i) {
-    while (parents_[i] != i) {
-      parents_[i] = parents_[parents_[i]];
-      i = parents_[i];
-    }
+/// The smallest feature of a set is its root, whatever the order.
+void FeatureSets::join(const ImagePair& pair) {
+  const auto find = [this](std::uint32_t image, std::uint32_t feature) {
+    std::uint32_t i = feature + (image == 0 ? 0 : ends_[image - 1]);
+    for (; parents_[i] != i; i = parents_[i]) parents_[i] = parents_[parents_[i]];
     return i;
-  }
-  /// The smaller number becomes the root, so that the result does not depend on the order of the pairs.
-  void join(std::uint32_t a, std::uint32_t b) {
-    const auto [small, large] = std::minmax({root(a), root(b)});
+  };
+  for (const FeatureMatch& match : pair.matches) {
+    const auto [small, large] = std::minmax({find(pair.a, match.a), find(pair.b, match.b)});
     parents_[large] = small;
   }
+}
 
- private:
-  std::vector<std::uint32_t> parents_;
-};
+namespace {
 
 bool showsAnImageTwice(const FeatureTrack& track) {
   return std::adjacent_find(track.begin(), track.end(), [](const auto& left, const auto& right) {
@@ -128,56 +130,51 @@ bool showsAnImageTwice(const FeatureTrack& track) {
 
 }  // namespace
 
-std::vector<FeatureTrack> tracksOf(const std::vector<ImagePair>& pairs, const std::vector<std::size_t>& feature_counts,
-                                   std::size_t min_views) {
-  std::vector<std::uint32_t> first(feature_counts.size() + 1, 0);
-  for (std::size_t i = 0; i < feature_counts.size(); ++i) {
-    first[i + 1] = first[i] + static_cast<std::uint32_t>(feature_counts[i]);
+std::vector<FeatureTrack> FeatureSets::tracks(std::size_t min_views) const {
+  std::vector<std::uint32_t> roots = parents_;
+  std::vector<std::uint32_t> sizes(parents_.size(), 0);
+  for (std::uint32_t& root : roots) {
+    root = roots[root];
+    ++sizes[root];
   }
-  DisjointSets sets(first.back());
-  for (const ImagePair& pair : pairs) {
-    for (const FeatureMatch& match : pair.matches) {
-      sets.join(first[pair.a] + static_cast<std::uint32_t>(match.a),
-                first[pair.b] + static_cast<std::uint32_t>(match.b));
-    }
-  }
-  std::vector<FeatureTrack> by_root(first.back());
-  for (std::uint32_t image = 0; image < feature_counts.size(); ++image) {
-    for (std::uint32_t feature = 0; feature < feature_counts[image]; ++feature) {
-      by_root[sets.root(first[image] + feature)].push_back({image, feature});
-    }
-  }
+  std::vector<std::uint32_t> track_of(parents_.size(), 0);  // by root
   std::vector<FeatureTrack> tracks;
-  for (FeatureTrack& track : by_root) {
-    if (track.size() >= min_views && !showsAnImageTwice(track)) tracks.push_back(std::move(track));
+  std::uint32_t i = 0;
+  for (std::uint32_t image = 0; image < ends_.size(); ++image) {
+    for (std::uint32_t feature = 0; i < ends_[image]; ++i, ++feature) {
+      const std::uint32_t root = roots[i];
+      if (sizes[root] < min_views) continue;
+      if (root == i) {
+        track_of[root] = static_cast<std::uint32_t>(tracks.size());
+        tracks.emplace_back().reserve(sizes[root]);
+      }
+      tracks[track_of[root]].push_back({image, feature});
+    }
   }
+  tracks.erase(std::remove_if(tracks.begin(), tracks.end(), showsAnImageTwice), tracks.end());
   return tracks;
 }
 
-std::vector<FeatureTrack> cutTracks(const std::vector<FeatureTrack>& tracks, std::size_t max_views,
-                                    const std::function<std::size_t(std::uint32_t image)>& session_of_image) {
-  std::vector<FeatureTrack> cut;
-  for (const FeatureTrack& track : tracks) {
-    std::vector<FeatureTrack> by_session;
-    for (std::size_t i = 0; i < track.size(); ++i) {
-      const bool begins = i == 0 || session_of_image(track[i].image) != session_of_image(track[i - 1].image);
-      if (begins) by_session.emplace_back();
-      by_session.back().push_back(track[i]);
-    }
-    std::size_t longest = 0;
-    for (const FeatureTrack& part : by_session) longest = std::max(longest, part.size());
-    const std::size_t pieces = longest == 0 ? 0 : (longest - 1) / max_views + 1;
-    for (std::size_t piece = 0; piece < pieces; ++piece) {
-      FeatureTrack& joined = cut.emplace_back();
-      for (const FeatureTrack& part : by_session) {
-        const auto at = [&](std::size_t k) {
-          return part.begin() + static_cast<std::ptrdiff_t>(k * part.size() / pieces);
-        };
-        joined.insert(joined.end(), at(piece), at(piece + 1));
-      }
+std::vector<FeatureTrack> cutTrack(const FeatureTrack& track, std::size_t max_views,
+                                   const std::function<std::size_t(std::uint32_t image)>& session_of_image) {
+  std::vector<FeatureTrack> by_session;
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const bool begins = i == 0 || session_of_image(track[i].image) != session_of_image(track[i - 1].image);
+    if (begins) by_session.emplace_back();
+    by_session.back().push_back(track[i]);
+  }
+  std::size_t longest = 0;
+  for (const FeatureTrack& part : by_session) longest = std::max(longest, part.size());
+  std::vector<FeatureTrack> pieces(longest == 0 ? 0 : (longest - 1) / max_views + 1);
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    for (const FeatureTrack& part : by_session) {
+      const auto at = [&](std::size_t piece) {
+        return part.begin() + static_cast<std::ptrdiff_t>(piece * part.size() / pieces.size());
+      };
+      pieces[k].insert(pieces[k].end(), at(k), at(k + 1));
     }
   }
-  return cut;
+  return pieces;
 }
 
 }  // namespace visual_localization

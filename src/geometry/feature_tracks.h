@@ -39,14 +39,28 @@ struct ImagePair {
   std::vector<FeatureMatch> matches;
 };
 
-/// Joins matches over many images into tracks of at least `min_views`. A track with two features of one image joins
-/// different things: it is dropped. `feature_counts`: of each image. In order of the first observation.
-std::vector<FeatureTrack> tracksOf(const std::vector<ImagePair>& pairs, const std::vector<std::size_t>& feature_counts,
-                                   std::size_t min_views);
+/// The features of images, joined where matches say that they show the same thing: four bytes a feature stay of all
+/// matches.
+class FeatureSets {
+ public:
+  /// Appends an image; its features are joined with none.
+  void addImage(std::size_t features);
+  /// Appends the images of another one, joined as they are there.
+  void append(const FeatureSets& other);
+  /// Joins the features of each match. The result does not depend on the order of the pairs.
+  void join(const ImagePair& pair);
+  /// Things that at least `min_views` images show, in order of the first observation. A set with two features of one
+  /// image joins different things: it is left out.
+  std::vector<FeatureTrack> tracks(std::size_t min_views) const;
 
-/// Cuts tracks into pieces of about the same length, with at most `max_views` images of a session each. A piece has
+ private:
+  std::vector<std::uint32_t> ends_;     ///< behind the last feature of each image, numbered over all images
+  std::vector<std::uint32_t> parents_;  ///< of each feature: a smaller one of its set, or itself
+};
+
+/// Cuts a track into pieces of about the same length, with at most `max_views` images of a session each. A piece has
 /// what all sessions see on the same stretch, if they drive the same way. `session_of_image`: increasing.
-std::vector<FeatureTrack> cutTracks(const std::vector<FeatureTrack>& tracks, std::size_t max_views,
-                                    const std::function<std::size_t(std::uint32_t image)>& session_of_image);
+std::vector<FeatureTrack> cutTrack(const FeatureTrack& track, std::size_t max_views,
+                                   const std::function<std::size_t(std::uint32_t image)>& session_of_image);
 
 }  // namespace visual_localization

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -169,7 +170,7 @@ constexpr std::size_t kOverlap = 4;       ///< a window shares this part of its 
 }  // namespace
 
 void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointRays> rays,
-                         const AveragedRotations& rotations) {
+                         const AveragedRotations& rotations, const FeatureSets& sets) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
   std::vector<double> sigmas_m;
   for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
@@ -196,6 +197,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
         {begin + static_cast<std::uint32_t>(i), up_m, config_.fix_correlation * heights.sigma_m});
   }
   sessions_.push_back(&session);
+  sets_.append(sets);
 }
 
 void Reconstruction::append(const Reconstruction& other) {
@@ -227,6 +229,7 @@ void Reconstruction::append(const Reconstruction& other) {
   add(other.fix_sigmas_m_, fix_sigmas_m_);
   add(other.problem_.cameras, problem_.cameras);
   add(other.problem_.road, problem_.road);
+  sets_.append(other.sets_);
 }
 
 void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m) {
@@ -238,10 +241,9 @@ void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d
   }
 }
 
-void Reconstruction::setMatches(const std::vector<ImagePair>& matches) {
-  std::vector<std::size_t> feature_counts;
-  for (const Image& image : images_) feature_counts.push_back(image.rays.normalised.size());
-  tracks_ = tracksOf(matches, feature_counts, kMinViews);
+void Reconstruction::tie(const std::vector<ImagePair>& ties) {
+  orderBy(ties);
+  for (const ImagePair& pair : ties) sets_.join(pair);
 }
 
 void Reconstruction::useFixes(double farthest_m, double loss) {
@@ -259,25 +261,30 @@ bool Reconstruction::isWithin(double farthest_m, const PositionObservation& fix)
 
 void Reconstruction::triangulateAll(double gate_px, std::size_t max_views) {
   problem_.landmarks.clear();
-  for (const FeatureTrack& track :
-       cutTracks(tracks_, max_views, [this](std::uint32_t image) { return sessionOf(image); })) {
-    Landmark landmark;
-    std::vector<Sight> sights;
-    for (const FeatureObservation& seen : track) {
-      const KeypointRays& rays = images_[seen.image].rays;
-      sights.push_back({&problem_.cameras[seen.image], rays.normalised[seen.feature]});
-      landmark.sightings.push_back({seen.image, seen.feature, sights.back().normalised, rays.sigmas[seen.feature]});
-    }
-    const std::optional<Eigen::Vector3d> point = triangulate(sights, kMinAngle_rad);
-    if (!point) continue;
-    landmark.position_m = *point;
-    auto& all = landmark.sightings;
-    const auto is_off = [&](const LandmarkSighting& sighting) {
-      return !(error(landmark, sighting) * focal_px(sighting.image) <= gate_px);
-    };
-    all.erase(std::remove_if(all.begin(), all.end(), is_off), all.end());
-    if (all.size() >= 2) problem_.landmarks.push_back(std::move(landmark));
+  const auto session_of = [this](std::uint32_t image) { return sessionOf(image); };
+  for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
+    for (const FeatureTrack& piece : cutTrack(track, max_views, session_of)) addLandmark(piece, gate_px);
   }
+}
+
+void Reconstruction::addLandmark(const FeatureTrack& track, double gate_px) {
+  Landmark landmark;
+  landmark.sightings.reserve(track.size());
+  std::vector<Sight> sights;
+  for (const FeatureObservation& seen : track) {
+    const KeypointRays& rays = images_[seen.image].rays;
+    sights.push_back({&problem_.cameras[seen.image], rays.normalised[seen.feature]});
+    landmark.sightings.push_back({seen.image, seen.feature, sights.back().normalised, rays.sigmas[seen.feature]});
+  }
+  const std::optional<Eigen::Vector3d> point = triangulate(sights, kMinAngle_rad);
+  if (!point) return;
+  landmark.position_m = *point;
+  auto& all = landmark.sightings;
+  const auto is_off = [&](const LandmarkSighting& sighting) {
+    return !(error(landmark, sighting) * focal_px(sighting.image) <= gate_px);
+  };
+  all.erase(std::remove_if(all.begin(), all.end(), is_off), all.end());
+  if (all.size() >= 2) problem_.landmarks.push_back(std::move(landmark));
 }
 
 /// All images at once, or so many at a time, each window with the last ones of the window before. What is behind a
@@ -369,6 +376,17 @@ void Reconstruction::bringBack() {
   for (const auto& [image, pose] : back) problem_.cameras[image] = pose;
 }
 
+/// With those landmarks only that its cameras see.
+BundleProblem Reconstruction::problemOf(const BundleWindow& window) const {
+  BundleProblem problem{problem_.cameras, {}, problem_.positions, problem_.heights, problem_.road, problem_.sessions};
+  std::copy_if(problem_.landmarks.begin(), problem_.landmarks.end(), std::back_inserter(problem.landmarks),
+               [&window](const Landmark& landmark) {
+                 return std::any_of(landmark.sightings.begin(), landmark.sightings.end(),
+                                    [&](const LandmarkSighting& sighting) { return window.moves(sighting.image); });
+               });
+  return problem;
+}
+
 double Reconstruction::freeFocalScale(double tolerance) const {
   BundleConfig config = bundle_;
   config.focal_is_free = true;
@@ -377,7 +395,7 @@ double Reconstruction::freeFocalScale(double tolerance) const {
   const std::vector<BundleWindow> all = windows();
   std::vector<double> scales;
   for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / kFocalWindows) {
-    BundleProblem problem = problem_;
+    BundleProblem problem = problemOf(all[i]);
     BundleWindow window = all[i];
     window.known_begin = window.begin;  // the others keep to the focal length that they have
     window.known_end = window.end;

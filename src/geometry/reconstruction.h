@@ -45,8 +45,10 @@ class Reconstruction {
 
   explicit Reconstruction(const GeometryConfig& config) : config_(config) {}
 
-  /// Appends the images of a session, where the cleaned path has their antenna. `session` must outlive it.
-  void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations);
+  /// Appends the images of a session, where the cleaned path has their antenna, and what they show. `session` must
+  /// outlive it.
+  void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations,
+           const FeatureSets& sets);
   /// Appends those of another one, with its landmarks, as they are there.
   void append(const Reconstruction& other);
 
@@ -66,10 +68,9 @@ class Reconstruction {
 
   /// Moves the images of a session, and the landmarks that they were the first to see.
   void move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m);
-  /// Windows have images of later sessions together with those that `ties` tie them to, from now on.
-  void orderBy(const std::vector<ImagePair>& ties);
-  /// What landmarks come from, from now on: matches that join at least three images.
-  void setMatches(const std::vector<ImagePair>& matches);
+  /// From now on landmarks come from these matches as well, and windows have images of later sessions together with
+  /// those that they are tied to.
+  void tie(const std::vector<ImagePair>& ties);
   /// Fixes count from now on: all of them, or those that are at most `farthest_m` from the cleaned path. `loss`: scale
   /// of their robust loss, sigmas.
   void useFixes(double farthest_m, double loss);
@@ -95,6 +96,7 @@ class Reconstruction {
     double up_m = 0.0;         ///< by altitudes, above the first one of its session; 0 without any
   };
 
+  void orderBy(const std::vector<ImagePair>& ties);
   Eigen::Vector3d antennaInMap_m(const CameraPose& camera, std::size_t image) const;
   Eigen::Vector3d startOf_m(std::size_t image) const;
   Eigen::Vector3d shiftOf_m(std::size_t image) const;
@@ -108,11 +110,13 @@ class Reconstruction {
   std::vector<std::set<std::uint32_t>> tiedSessions() const;
   double fixBias_m(const std::set<std::uint32_t>& tied) const;
   ImageGeometry imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const;
+  void addLandmark(const FeatureTrack& track, double gate_px);
   std::vector<BundleWindow> windows() const;
+  BundleProblem problemOf(const BundleWindow& window) const;
   bool isWithin(double farthest_m, const PositionObservation& fix) const;
   std::vector<bool> confirmedByFixes() const;
   double farShare(const SessionGeometry& geometry, std::size_t begin, const std::vector<bool>& confirmed) const;
-  void addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const;
+  void addPath(std::vector<ImageGeometry> images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;
   BundleConfig bundle_;
@@ -120,7 +124,7 @@ class Reconstruction {
   std::vector<double> fix_sigmas_m_;  ///< of a usual fix of each session
   std::vector<Image> images_;
   std::vector<PositionObservation> fixes_;  ///< all of them
-  std::vector<FeatureTrack> tracks_;
+  FeatureSets sets_;                        ///< of what the images show
   BundleProblem problem_;
   std::vector<std::size_t> ranks_;  ///< of the images, in windows
 };

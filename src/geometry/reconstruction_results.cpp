@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include "base/numbers.h"
 #include "geometry/bundle_adjustment.h"
@@ -39,10 +40,10 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
     }
     ++first_id;
   }
-  for (const FeatureTrack& track : tracks_) {
+  for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
     for (const FeatureObservation& seen : track) ++tracked[sessionOf(seen.image)];
   }
-  addPath(images, geometries);
+  addPath(std::move(images), geometries);
   for (std::size_t k = 0; k < geometries.size(); ++k) {
     SessionGeometry& geometry = geometries[k];
     geometry.sightings = errors_px[k].size();
@@ -114,7 +115,7 @@ double Reconstruction::farShare(const SessionGeometry& geometry, std::size_t beg
 }
 
 /// Images with enough landmarks, and how far they were moved.
-void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vector<SessionGeometry>& geometries) const {
+void Reconstruction::addPath(std::vector<ImageGeometry> images, std::vector<SessionGeometry>& geometries) const {
   for (std::size_t i = 0; i < images.size(); ++i) {
     SessionGeometry& geometry = geometries[sessionOf(i)];
     const auto least = static_cast<std::size_t>(config_.min_landmarks);
@@ -122,7 +123,7 @@ void Reconstruction::addPath(const std::vector<ImageGeometry>& images, std::vect
       geometry.images.emplace_back();
       continue;
     }
-    ImageGeometry& image = geometry.images.emplace_back(images[i]).value();
+    ImageGeometry& image = geometry.images.emplace_back(std::move(images[i])).value();
     std::sort(image.landmarks.begin(), image.landmarks.end(),
               [](const SeenLandmark& a, const SeenLandmark& b) { return a.feature < b.feature; });
     ++geometry.located;
@@ -164,8 +165,8 @@ class SeenLandmarks {
   std::optional<Eigen::Vector3d> offset(const ImagePair& pair) const {
     std::vector<Eigen::Vector3d> differences;
     for (const FeatureMatch& match : pair.matches) {
-      const auto a = positions_.find(key(pair.a, static_cast<std::uint32_t>(match.a)));
-      const auto b = positions_.find(key(pair.b, static_cast<std::uint32_t>(match.b)));
+      const auto a = positions_.find(key(pair.a, match.a));
+      const auto b = positions_.find(key(pair.b, match.b));
       if (a != positions_.end() && b != positions_.end()) differences.push_back(*a->second - *b->second);
     }
     if (differences.size() < kLeastShared) return std::nullopt;

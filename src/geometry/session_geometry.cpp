@@ -48,17 +48,21 @@ class PairMatcher {
  public:
   PairMatcher(const GeometryConfig& config, std::size_t threads) : config_(config), threads_(threads) {}
 
-  /// Those pairs that agree on enough. `viewOf(i)`: features and rays of an image.
-  template <class ViewOf>
-  std::vector<Pair> match(const std::vector<Indices>& indices, const ViewOf& viewOf) const {
-    std::vector<Pair> pairs(indices.size());
-    parallelFor(pairs.size(), threads_, [&](std::size_t i) {
-      const auto [a, b] = indices[i];
-      pairs[i].matches = {a, b, {}};
-      verify(viewOf(a), viewOf(b), pairs[i]);
-    });
-    pairs.erase(std::remove_if(pairs.begin(), pairs.end(), [](const Pair& pair) { return !pair.view; }), pairs.end());
-    return pairs;
+  /// Calls `use` with those pairs that agree on enough, in their order. `viewOf(i)`: features and rays of an image.
+  template <class ViewOf, class Use>
+  void match(const std::vector<Indices>& indices, const ViewOf& viewOf, const Use& use) const {
+    std::vector<Pair> pairs;
+    for (std::size_t begin = 0; begin < indices.size(); begin += pairs.size()) {
+      pairs.assign(std::min(kAtOnce, indices.size() - begin), {});
+      parallelFor(pairs.size(), threads_, [&](std::size_t i) {
+        const auto [a, b] = indices[begin + i];
+        pairs[i].matches = {a, b, {}};
+        verify(viewOf(a), viewOf(b), pairs[i]);
+      });
+      for (Pair& pair : pairs) {
+        if (pair.view) use(pair);
+      }
+    }
   }
 
   struct View {
@@ -79,6 +83,8 @@ class PairMatcher {
     if (pair.view) pair.matches.matches = std::move(pair.view->inliers);
   }
 
+  static constexpr std::size_t kAtOnce = 4096;  ///< pairs whose matches are in memory
+
   const GeometryConfig& config_;
   std::size_t threads_;
 };
@@ -88,12 +94,7 @@ class SessionAdjuster {
  public:
   SessionAdjuster(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads)
       : session_(session), config_(config), matcher_(config, threads), reconstruction_(config) {
-    std::vector<KeypointRays> rays;
-    for (std::size_t i = 0; i < session.images.size(); ++i) {
-      rays.push_back(raysOf(*session.features(i), *session.camera, config.keypoint_sigma_px));
-    }
-    std::vector<Pair> pairs = matchPairs(rays);
-    start(std::move(rays), std::move(pairs));
+    start();
     adjust();
   }
 
@@ -105,12 +106,11 @@ class SessionAdjuster {
     return geometry;
   }
   const Reconstruction& reconstruction() const { return reconstruction_; }
-  /// Matches between its images.
-  const std::vector<ImagePair>& matches() const { return matches_; }
 
  private:
-  std::vector<Pair> matchPairs(const std::vector<KeypointRays>& rays) const {
-    const auto count = static_cast<std::uint32_t>(rays.size());
+  /// Of images that may show the same.
+  std::vector<Indices> pairs() const {
+    const auto count = static_cast<std::uint32_t>(session_.images.size());
     const auto span = static_cast<std::uint32_t>(config_.pair_span);
     std::vector<Indices> indices;
     for (std::uint32_t a = 0; a < count; ++a) {
@@ -119,23 +119,29 @@ class SessionAdjuster {
     std::vector<PathImage> path;
     for (const TrajectoryPoint& image : session_.images) path.push_back({0, image});
     for (const Indices& pair : revisits(path)) indices.push_back(pair);
-    return matcher_.match(indices, [&](std::uint32_t i) {
-      return PairMatcher::View{session_.features(i), &rays[i], session_.camera->intrinsics().fx};
-    });
+    return indices;
   }
 
-  void start(std::vector<KeypointRays> rays, std::vector<Pair> pairs) {
-    std::vector<double> yaws_rad;
-    for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
+  void start() {
+    std::vector<KeypointRays> rays;
+    FeatureSets sets;
+    for (std::size_t i = 0; i < session_.images.size(); ++i) {
+      rays.push_back(raysOf(*session_.features(i), *session_.camera, config_.keypoint_sigma_px));
+      sets.addImage(rays.back().normalised.size());
+    }
     std::vector<RelativeRotation> relative;
-    for (Pair& pair : pairs) {
+    const auto view = [&](std::uint32_t i) {
+      return PairMatcher::View{session_.features(i), &rays[i], session_.camera->intrinsics().fx};
+    };
+    matcher_.match(pairs(), view, [&](const Pair& pair) {
       const auto& [a, b, inliers] = pair.matches;
       if (b - a <= kRotationSpan) relative.push_back({a, b, pair.view->b_from_a});
-      matches_.push_back(std::move(pair.matches));
-    }
+      sets.join(pair.matches);
+    });
+    std::vector<double> yaws_rad;
+    for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
     // Level, whatever the altitudes say: a camera turned aside by much would explain how a robot leans across a slope.
-    reconstruction_.add(session_, std::move(rays), averageRotations(yaws_rad, relative));
-    reconstruction_.setMatches(matches_);
+    reconstruction_.add(session_, std::move(rays), averageRotations(yaws_rad, relative), sets);
   }
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
@@ -164,7 +170,6 @@ class SessionAdjuster {
   const GeometryConfig& config_;
   PairMatcher matcher_;
   Reconstruction reconstruction_;
-  std::vector<ImagePair> matches_;
 };
 
 /// Sessions that were adjusted on their own, tied to each other where they overlap.
@@ -173,24 +178,14 @@ class SessionTier {
   SessionTier(const GeometryConfig& config, std::size_t threads)
       : config_(config), matcher_(config, threads), together_(config) {}
 
-  void add(const SessionAdjuster& alone) {
-    const auto begin = static_cast<std::uint32_t>(together_.size());
-    for (ImagePair pair : alone.matches()) {
-      pair.a += begin;
-      pair.b += begin;
-      matches_.push_back(std::move(pair));
-    }
-    together_.append(alone.reconstruction());
-  }
+  void add(const SessionAdjuster& alone) { together_.append(alone.reconstruction()); }
 
   /// Nothing when no two sessions overlap; otherwise that of each session, in the order in which they were added.
   std::optional<std::vector<SessionGeometry>> run() {
     const std::vector<ImagePair> ties = matchTies();
     if (ties.empty()) return std::nullopt;
     const std::vector<double> apart_m = alignSessions(ties, together_);
-    together_.orderBy(ties);
-    matches_.insert(matches_.end(), ties.begin(), ties.end());
-    together_.setMatches(matches_);
+    together_.tie(ties);
     together_.useFixes(kAllFixes_m, config_.fix_loss);
     together_.triangulateAll(20.0, kCoarseViews);
     together_.adjustAndPrune(kRough, 2);
@@ -215,9 +210,9 @@ class SessionTier {
       if (path[pair.first].session != path[pair.second].session) indices.push_back(pair);
     }
     std::vector<ImagePair> ties;
-    for (Pair& pair : matcher_.match(indices, [this](std::uint32_t i) { return view(i); })) {
-      ties.push_back(std::move(pair.matches));
-    }
+    matcher_.match(
+        indices, [this](std::uint32_t i) { return view(i); },
+        [&ties](Pair& pair) { ties.push_back(std::move(pair.matches)); });
     return ties;
   }
 
@@ -230,7 +225,6 @@ class SessionTier {
   const GeometryConfig& config_;
   PairMatcher matcher_;
   Reconstruction together_;
-  std::vector<ImagePair> matches_;
 };
 
 }  // namespace

@@ -71,10 +71,10 @@ struct Matches {
       const double x = distribution(random);
       return Eigen::Vector2d(x, distribution(random));
     };
-    for (std::size_t i = 0; i < 250; ++i) {
+    for (std::uint32_t i = 0; i < 250; ++i) {
       const Eigen::Vector3d point = depth_m(random) * at(side).homogeneous();
       a.emplace_back(point.hnormalized() + at(noise));
-      const bool is_wrong = static_cast<std::int64_t>(i) * 100 < wrong_percent * 250;
+      const bool is_wrong = std::int64_t{i} * 100 < wrong_percent * 250;
       b.push_back(is_wrong ? at(side) : b_in_a.toCamera(point).hnormalized() + at(noise));
       all.push_back({i, i});
     }

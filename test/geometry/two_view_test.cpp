@@ -31,7 +31,7 @@ Views viewsOf(const CameraPose& b_in_a, std::size_t count, std::uint32_t seed, d
   std::uniform_real_distribution<double> depth_m(4.0, 25.0);
   std::normal_distribution<double> error(0.0, 1.0);
   Views views;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::uint32_t i = 0; i < count; ++i) {
     const double z_m = depth_m(random);
     const double x = side(random);
     const Eigen::Vector3d point = z_m * Eigen::Vector3d(x, side(random), 1.0);
@@ -99,8 +99,8 @@ TEST(TwoView, RecoversTheRotationOfACameraThatTurnsOnTheSpot) {
 TEST(TwoView, DropsMatchesThatDoNotFit) {
   const CameraPose b_in_a = moved({0.1, 0.0, 1.0});
   Views views = viewsOf(b_in_a, 200, 1);
-  constexpr std::size_t kWrong = 60;
-  for (std::size_t i = 0; i < kWrong; ++i) views.matches[i].b = kWrong - 1 - i;
+  constexpr std::uint32_t kWrong = 60;
+  for (std::uint32_t i = 0; i < kWrong; ++i) views.matches[i].b = kWrong - 1 - i;
   const auto view = views.verify();
   ASSERT_TRUE(view);
   EXPECT_LT(rotationError_rad(*view, b_in_a), kTenthOfADegree_rad);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -13,7 +15,6 @@ namespace visual_localization::test {
 namespace {
 
 constexpr double kSight_m = 25.0;
-constexpr double kFarSight_m2 = (kSight_m + 1.0) * (kSight_m + 1.0);
 constexpr int kFixesPerImage = 5;
 constexpr std::int64_t kFixInterval_ns = 200'000'000;
 
@@ -62,15 +63,50 @@ WorldPoint randomPoint(const Eigen::Vector3d& position_m, std::mt19937& random) 
   return point;
 }
 
-View viewOf(const std::vector<WorldPoint>& world, const CameraModel& camera, const CameraPose& pose, double noise_px,
-            std::mt19937& random, std::size_t image) {
+namespace {
+
+/// Points of a world by squares of the map as wide as one can see. Those that move are in none.
+class PointGrid {
+ public:
+  explicit PointGrid(const std::vector<WorldPoint>& world) {
+    for (std::size_t i = 0; i < world.size(); ++i) {
+      (world[i].motion_m.isZero(0.0) ? cells_[cellOf(world[i].position_m)] : moving_).push_back(i);
+    }
+  }
+
+  /// In their order, all that may be seen from a position.
+  std::vector<std::size_t> around(const Eigen::Vector3d& position_m) const {
+    std::vector<std::size_t> near = moving_;
+    const auto [x, y] = cellOf(position_m);
+    for (long i = x - 1; i <= x + 1; ++i) {
+      for (long j = y - 1; j <= y + 1; ++j) {
+        const auto cell = cells_.find({i, j});
+        if (cell != cells_.end()) near.insert(near.end(), cell->second.begin(), cell->second.end());
+      }
+    }
+    std::sort(near.begin(), near.end());
+    return near;
+  }
+
+ private:
+  using Cell = std::pair<long, long>;
+
+  static Cell cellOf(const Eigen::Vector3d& position_m) {
+    return {std::lround(std::floor(position_m.x() / kSight_m)), std::lround(std::floor(position_m.y() / kSight_m))};
+  }
+
+  std::map<Cell, std::vector<std::size_t>> cells_;
+  std::vector<std::size_t> moving_;
+};
+
+View viewOf(const std::vector<WorldPoint>& world, const std::vector<std::size_t>& points, const CameraModel& camera,
+            const CameraPose& pose, double noise_px, std::mt19937& random, std::size_t image) {
   std::normal_distribution<double> noise(0.0, noise_px);
   std::vector<SiftKeypoint> keypoints;
   std::vector<std::uint8_t> descriptors;
   View view;
-  for (std::size_t i = 0; i < world.size(); ++i) {
+  for (const std::size_t i : points) {
     const Eigen::Vector3d position_m = world[i].position_m + static_cast<double>(image) * world[i].motion_m;
-    if ((position_m - pose.position_m).squaredNorm() > kFarSight_m2) continue;  // most of a long street
     const Eigen::Vector3d point = pose.toCamera(position_m);
     if (point.z() < 1.0 || point.norm() > kSight_m) continue;
     const Eigen::Vector2d pixel = camera.project(point);
@@ -85,6 +121,15 @@ View viewOf(const std::vector<WorldPoint>& world, const CameraModel& camera, con
   }
   view.features = SiftFeatures(std::move(keypoints), std::move(descriptors));
   return view;
+}
+
+}  // namespace
+
+View viewOf(const std::vector<WorldPoint>& world, const CameraModel& camera, const CameraPose& pose, double noise_px,
+            std::mt19937& random, std::size_t image) {
+  std::vector<std::size_t> all(world.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return viewOf(world, all, camera, pose, noise_px, random, image);
 }
 
 std::vector<DrivenPose> drive(const StreetDrive& street) {
@@ -148,8 +193,10 @@ RecordedDrive record(const std::vector<DrivenPose>& poses, const std::vector<Wor
   recorded.camera = camera;
   recorded.truth = poses;
   recorded.fixes = fixesOf(poses, fix_noise_m, random);
+  const PointGrid grid(world);
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const View view = viewOf(world, recorded.camera, poses[i].camera, kKeypointSigma_px, random, i);
+    const std::vector<std::size_t> points = grid.around(poses[i].camera.position_m);
+    const View view = viewOf(world, points, recorded.camera, poses[i].camera, kKeypointSigma_px, random, i);
     recorded.views.push_back(std::make_shared<const SiftFeatures>(view.features));
   }
   return recorded;

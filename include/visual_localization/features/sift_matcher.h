@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -20,8 +20,8 @@ struct MatchConfig {
 
 /// Feature `a` of the first image matches feature `b` of the second.
 struct FeatureMatch {
-  std::size_t a = 0;
-  std::size_t b = 0;
+  std::uint32_t a = 0;
+  std::uint32_t b = 0;
 };
 
 /// M_AB of Kronfeld et al. (journal), section 4: for each a its nearest neighbour b in B when
