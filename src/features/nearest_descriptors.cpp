@@ -39,7 +39,6 @@ constexpr std::size_t kBins = SiftFeatures::kDescriptorSize;
 #if HWY_TARGET == HWY_AVX3_DL
 constexpr std::size_t kGroup = 4;
 using Packed = std::uint8_t;
-Packed packed(std::uint8_t bin) { return static_cast<std::uint8_t>(bin ^ 0x80U); }
 HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
   std::uint32_t group = 0;
   std::memcpy(&group, bins, sizeof(group));
@@ -49,19 +48,18 @@ HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
 #else
 constexpr std::size_t kGroup = 2;
 using Packed = std::int16_t;
-Packed packed(std::uint8_t bin) { return bin; }
 HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
   for (std::size_t i = 0; i < kGroup; ++i) to[i] = bins[i];
 }
 #endif
 constexpr std::size_t kGroups = kBins / kGroup;
 
-void pack(const SiftFeatures& features, std::size_t lanes, std::vector<Packed>& to) {
-  const std::size_t tiles = (features.size() + lanes - 1) / lanes;
-  to.assign(tiles * lanes * kBins, packed(0));
-  for (std::size_t i = 0; i < features.size(); ++i) {
-    const std::uint8_t* from = features.descriptor(i);
-    Packed* tile = to.data() + i / lanes * lanes * kBins + i % lanes * kGroup;
+/// `padded`: the number of features, filled up to whole tiles with zeros.
+void pack(const SiftFeatures& features, std::size_t lanes, std::size_t padded, Packed* to) {
+  static constexpr std::uint8_t kNone[kBins] = {};
+  for (std::size_t i = 0; i < padded; ++i) {
+    const std::uint8_t* from = i < features.size() ? features.descriptor(i) : kNone;
+    Packed* tile = to + i / lanes * lanes * kBins + i % lanes * kGroup;
     for (std::size_t group = 0; group < kGroups; ++group) {
       packGroup(from + group * kGroup, tile + group * lanes * kGroup);
     }
@@ -98,9 +96,9 @@ HWY_INLINE hn::Vec<Ints> broadcast(const Row& row, std::size_t group) {
 HWY_INLINE hn::Vec<Ints> multiplyAdd(hn::Vec<Ints> row, const Packed* tile, hn::Vec<Ints>& sum, hn::Vec<Ints>& odd) {
 #if HWY_TARGET == HWY_AVX3_DL
   (void)odd;
-  return hn::Vec<Ints>{_mm512_dpbusd_epi32(sum.raw, row.raw, _mm512_loadu_si512(tile))};
+  return hn::Vec<Ints>{_mm512_dpbusd_epi32(sum.raw, row.raw, _mm512_load_si512(tile))};
 #else
-  return hn::ReorderWidenMulAccumulate(Ints(), hn::BitCast(Shorts(), row), hn::LoadU(Shorts(), tile), sum, odd);
+  return hn::ReorderWidenMulAccumulate(Ints(), hn::BitCast(Shorts(), row), hn::Load(Shorts(), tile), sum, odd);
 #endif
 }
 
@@ -175,7 +173,7 @@ HWY_INLINE TwoNearest reduce(const Lanes& lanes) {
 
 /// Memory that is kept from call to call.
 struct Workspace {
-  std::vector<Packed> packed;
+  hwy::AlignedFreeUniquePtr<Packed[]> packed;
   hwy::AlignedFreeUniquePtr<float[]> inverse_norms;
   hwy::AlignedFreeUniquePtr<float[]> best;
   hwy::AlignedFreeUniquePtr<float[]> second;
@@ -185,6 +183,7 @@ struct Workspace {
   void reserve(std::size_t count) {
     if (count <= capacity) return;
     capacity = 2 * count;
+    packed = hwy::AllocateAligned<Packed>(capacity * kBins);
     inverse_norms = hwy::AllocateAligned<float>(capacity);
     best = hwy::AllocateAligned<float>(capacity);
     second = hwy::AllocateAligned<float>(capacity);
@@ -199,7 +198,7 @@ void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescri
   const std::size_t padded = (a.size() + lanes - 1) / lanes * lanes;
   static thread_local Workspace work;
   work.reserve(padded);
-  pack(a, lanes, work.packed);
+  pack(a, lanes, padded, work.packed.get());
   for (std::size_t i = 0; i < padded; ++i) {
     work.inverse_norms[i] = i < a.size() ? a.inverseNorm(i) : 0.0F;
     work.best[i] = work.second[i] = -1.0F;
@@ -232,12 +231,12 @@ void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescri
     hn::Vec<Ints> products[2 * kRows];
     std::size_t i = 0;
     for (; i + lanes < padded; i += 2 * lanes) {
-      multiply<2>(rows, work.packed.data() + i * kBins, products);
+      multiply<2>(rows, work.packed.get() + i * kBins, products);
       offerTile(i, products);
       offerTile(i + lanes, products + kRows);
     }
     if (i < padded) {
-      multiply<1>(rows, work.packed.data() + i * kBins, products);
+      multiply<1>(rows, work.packed.get() + i * kBins, products);
       offerTile(i, products);
     }
     for (std::size_t r = 0; r < count; ++r) nearest.of_b[first + r] = reduce(of_row[r]);
