@@ -72,6 +72,7 @@ void Dpso::reset(const Prior& prior) {
 
 void Dpso::configure(const TrackerConfig& config) {
   const DpsoConfig before = std::exchange(config_, config.dpso);
+  choices_ = Choices(config_);
   fitness_config_ = config.fitness;
   odometry_config_ = config.odometry;
   if (config_.v0 != before.v0) tuning_.v0 = config_.v0;
@@ -175,7 +176,7 @@ void Dpso::move(Particle& particle) {
 /// `limit`: share of the range. The norm of Kronfeld et al. (journal), section 3, or each axis alone.
 Eigen::Vector2d Dpso::limited(const Eigen::Vector2d& velocity_m, double limit) const {
   const Eigen::Vector2d range = range_m();
-  if (config_.speed_limit == "axis") return velocity_m.cwiseMax(-limit * range).cwiseMin(limit * range);
+  if (choices_.limit_of_axis) return velocity_m.cwiseMax(-limit * range).cwiseMin(limit * range);
   const double length = relativeLength(velocity_m, range);
   const Eigen::Vector2d possible_m = (range.array() > 0.0).select(velocity_m.array(), 0.0);
   return length > limit ? Eigen::Vector2d(limit / length * possible_m) : possible_m;
@@ -190,7 +191,7 @@ void Dpso::moveQuantum(Particle& particle) {
 
 /// Whether quantum particles go where the whole image looks alike instead of around the best particle.
 bool Dpso::isGuided() const {
-  if (config_.recovery != "guided") return false;
+  if (!choices_.guided) return false;
   return tuning_.recovering || (config_.guided_start && position_unknown_);
 }
 
@@ -255,7 +256,7 @@ Eigen::Vector2d Dpso::centreOfMass() const {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double count = 0.0;
   for (const Particle& particle : particles_) {
-    if (particle.kind == ParticleKind::kQuantum && config_.speed_of == "moving") continue;
+    if (particle.kind == ParticleKind::kQuantum && choices_.speed_of_moving) continue;
     sum += particle.position_m;
     count += 1.0;
   }
@@ -351,9 +352,9 @@ void Dpso::keepOut(Particle& particle) const {
 
 /// The papers let particles go where they will; nothing is known of positions outside of the map's frame.
 void Dpso::confine(Particle& particle) const {
-  if (config_.confine == "box") return keepInside(particle, area_);
+  if (choices_.in_box) return keepInside(particle, area_);
   keepInside(particle, wholeFrame());
-  if (config_.confine == "none") return;
+  if (!choices_.in_corridor) return;
   const std::size_t nearest = map_.nearest(particle.position_m).image;
   keepNear(particle, map_.position_m(nearest), config_.corridor_m);
 }

@@ -31,6 +31,22 @@ class Dpso final : public Tracker {
   void exclude(const std::vector<Eigen::Vector2d>& places_m, double radius_m);
 
  private:
+  /// What parameters chose that each particle asks for: texts take long to compare.
+  struct Choices {
+    explicit Choices(const DpsoConfig& config)
+        : in_box(config.confine == "box"),
+          in_corridor(config.confine != "box" && config.confine != "none"),
+          limit_of_axis(config.speed_limit == "axis"),
+          speed_of_moving(config.speed_of == "moving"),
+          guided(config.recovery == "guided") {}
+
+    bool in_box;
+    bool in_corridor;
+    bool limit_of_axis;
+    bool speed_of_moving;
+    bool guided;
+  };
+
   void assignKinds();
   void confine(Particle& particle) const;
   void keepOut(Particle& particle) const;
@@ -52,6 +68,7 @@ class Dpso final : public Tracker {
 
   const TrainingMap& map_;
   DpsoConfig config_;
+  Choices choices_{config_};
   FitnessConfig fitness_config_;
   OdometryConfig odometry_config_;
   Random random_;
