@@ -31,7 +31,7 @@ class Dpso final : public Tracker {
   void exclude(const std::vector<Eigen::Vector2d>& places_m, double radius_m);
 
  private:
-  /// What parameters chose that each particle asks for: texts take long to compare.
+  /// What parameters choose. Each particle needs it, and comparing their texts takes longer.
   struct Choices {
     explicit Choices(const DpsoConfig& config)
         : in_box(config.confine == "box"),
