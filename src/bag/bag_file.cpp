@@ -66,25 +66,41 @@ void requireLz4Blocks(std::string_view frame) {
   require(frame.size() == kWord, "a compressed chunk does not end with its checksum");
 }
 
-bool unpacksLz4(std::string& packed, std::string& unpacked) {
+bool unpacksLz4(std::string& packed, std::size_t size, std::string& unpacked) {
+  constexpr std::size_t kMostOfOne = 255;  // bytes that a byte may stand for
   requireLz4Blocks(packed);
-  auto size = static_cast<unsigned int>(unpacked.size());
-  return roslz4_buffToBuffDecompress(packed.data(), static_cast<unsigned int>(packed.size()), unpacked.data(), &size) ==
-             ROSLZ4_OK &&
-         size == unpacked.size();
+  if (size / kMostOfOne > packed.size()) return false;
+  unpacked.resize(size);
+  auto count = static_cast<unsigned int>(size);
+  return roslz4_buffToBuffDecompress(packed.data(), static_cast<unsigned int>(packed.size()), unpacked.data(),
+                                     &count) == ROSLZ4_OK &&
+         count == size;
 }
 
-bool unpacksBz2(std::string& packed, std::string& unpacked) {
-  auto size = static_cast<unsigned int>(unpacked.size());
-  return BZ2_bzBuffToBuffDecompress(unpacked.data(), &size, packed.data(), static_cast<unsigned int>(packed.size()), 0,
-                                    0) == BZ_OK &&
-         size == unpacked.size();
+/// Step by step: a few bytes may stand for any number, so memory follows what is there, not what is claimed.
+bool unpacksBz2(std::string& packed, std::size_t size, std::string& unpacked) {
+  constexpr std::size_t kFirst = 1U << 20U;
+  bz_stream stream{};
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return false;
+  const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> ended(&stream, BZ2_bzDecompressEnd);
+  stream.next_in = packed.data();
+  stream.avail_in = static_cast<unsigned int>(packed.size());
+  int result = BZ_OK;
+  do {
+    const std::size_t begin = unpacked.size();
+    if (begin > 0) unpacked.reserve(size);  // so that nothing is copied as it grows
+    unpacked.resize(std::min(size, std::max(kFirst, 2 * begin)));
+    stream.next_out = unpacked.data() + begin;
+    stream.avail_out = static_cast<unsigned int>(unpacked.size() - begin);
+    result = BZ2_bzDecompress(&stream);
+  } while (result == BZ_OK && stream.avail_out == 0 && unpacked.size() < size);
+  return result == BZ_STREAM_END && stream.avail_out == 0 && unpacked.size() == size;
 }
 
 std::string unpack(const Bytes& bytes, Range chunk, const std::string& compression, std::uint64_t size) {
   std::string packed = readRange(bytes, chunk, kLargestChunk, "a chunk");
-  std::string unpacked(static_cast<std::size_t>(size), '\0');
-  require(compression == "bz2" ? unpacksBz2(packed, unpacked) : unpacksLz4(packed, unpacked),
+  std::string unpacked;
+  require((compression == "bz2" ? unpacksBz2 : unpacksLz4)(packed, static_cast<std::size_t>(size), unpacked),
           "a compressed chunk cannot be unpacked, or not to the size that it claims");
   return unpacked;
 }

@@ -1,10 +1,13 @@
 // Chunks made byte by byte: their indices, their messages and their compression.
 
 #include <algorithm>
+#include <cstdlib>
+#include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <bzlib.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <roslz4/lz4s.h>
@@ -73,11 +76,22 @@ std::string packedLz4(std::string content, int block_size) {
   return packed.substr(0, size);
 }
 
-/// A bag whose chunk holds `content`, and one in which the chunk is compressed.
+std::string packedBz2(std::string content) {
+  std::string packed(content.size() + 1000, '\0');
+  auto size = static_cast<unsigned int>(packed.size());
+  EXPECT_EQ(BZ2_bzBuffToBuffCompress(packed.data(), &size, content.data(), static_cast<unsigned int>(content.size()), 9,
+                                     0, 0),
+            BZ_OK);
+  return packed.substr(0, size);
+}
+
+constexpr int kBlocksOf64Kib = 4;
+
+/// A bag whose chunk holds `content`, and those in which the chunk is compressed.
 std::vector<std::string> plainAndPacked(const std::string& content, const std::string& index) {
-  constexpr int kBlocksOf64Kib = 4;
   return {oneChunk("none", content.size(), content, index),
-          oneChunk("lz4", content.size(), packedLz4(content, kBlocksOf64Kib), index)};
+          oneChunk("lz4", content.size(), packedLz4(content, kBlocksOf64Kib), index),
+          oneChunk("bz2", content.size(), packedBz2(content), index)};
 }
 
 std::string messageOf(std::uint64_t connection, const std::string& data) {
@@ -149,9 +163,35 @@ TEST_F(BagFileTest, WhatCannotBeUnpackedIsRefused) {
   EXPECT_THAT(refusal(writeBytes(oneChunk("lz4", 100, "short"))), HasSubstr("cut off"));
 }
 
+TEST_F(BagFileTest, AChunkOfSeveralMegabytesIsUnpacked) {
+  const std::string data(5'000'000, 'x');
+  for (const std::string& bytes : plainAndPacked(messageOf(0, data), indexOf({0}))) {
+    BagFile bag(inMemory(bytes));
+    EXPECT_EQ(bag.read(bag.messages({0}).at(0)), data);
+  }
+}
+
+/// A bag of few bytes must not take memory by what it claims.
+TEST_F(BagFileTest, AChunkThatClaimsMoreThanItHoldsTakesNoMemory) {
+  constexpr std::size_t kClaimed = 1U << 28U;
+  constexpr std::size_t kEnough = 1U << 26U;
+  const std::string message = messageOf(0, "data");
+  for (const std::size_t claimed : {message.size() - 1, message.size() + 1, kClaimed}) {
+    for (const std::string& bag :
+         {oneChunk("lz4", claimed, packedLz4(message, kBlocksOf64Kib)), oneChunk("bz2", claimed, packedBz2(message))}) {
+      const std::string path = writeBytes(bag);
+      const auto refuse = [&path] {
+        limitMemory(kEnough);
+        std::cerr << refusal(path);
+        std::exit(0);
+      };
+      EXPECT_EXIT(refuse(), testing::ExitedWithCode(0), "not to the size that it claims") << claimed;
+    }
+  }
+}
+
 TEST_F(BagFileTest, ALz4BlockLargerThanItsFrameAllowsIsRefused) {
   const std::string content(100'000, 'x');
-  constexpr int kBlocksOf64Kib = 4;
   const std::string packed = packedLz4(content, kBlocksOf64Kib);
   EXPECT_EQ(refusal(writeBytes(oneChunk("lz4", content.size(), packed))),
             "a record's header at byte 4 claims 2021161080 bytes of 99996");  // unpacked, but not made of records

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <csignal>
+#include <cstddef>
+#include <fstream>
 #include <memory>
 #include <set>
 #include <string>
@@ -82,14 +84,22 @@ class BagFileTest : public testing::Test {
     return "accepted";
   }
 
+  /// From now on this process gets at most so many bytes of memory beyond those that it has.
+  static void limitMemory(std::size_t most_bytes) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // these need far more addresses
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    const std::size_t most = pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + most_bytes;
+    const rlimit memory{most, most};
+    ::setrlimit(RLIMIT_AS, &memory);
+#endif
+  }
+
   /// The signal that ended a process that read the bag; 0 when it came to an end by itself.
   static int signalWhileReading(const std::string& path) {
     const pid_t child = ::fork();
     if (child == 0) {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // these need far more addresses
-      const rlimit memory{1UL << 31U, 1UL << 31U};
-      ::setrlimit(RLIMIT_AS, &memory);
-#endif
+      limitMemory(1UL << 30U);
       ::alarm(20);
       allowRefusal([&] { use(path); });
       ::_exit(0);
