@@ -203,11 +203,11 @@ TEST(PoseSolver, KnowsItsCovarianceWhenAllIsFarAway) {
 
 /// Each landmark stands elsewhere than on the day of the map.
 void move(std::vector<LandmarkMatch>& matches, double sigma_m, std::mt19937& random) {
-  std::normal_distribution<double> normal(0.0, sigma_m);
+  std::normal_distribution<double> normal(0.0, 1.0);
   for (LandmarkMatch& match : matches) {
-    const double east_m = normal(random);
-    const double north_m = normal(random);
-    match.landmark_m += Eigen::Vector3d(east_m, north_m, normal(random));
+    const double east_m = sigma_m * normal(random);
+    const double north_m = sigma_m * normal(random);
+    match.landmark_m += Eigen::Vector3d(east_m, north_m, sigma_m * normal(random));
   }
 }
 

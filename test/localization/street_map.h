@@ -30,10 +30,10 @@ class StreetMap {
   }
   /// Where each landmark stands `sigma_m` along each axis from where it stood on the day of the map.
   SiftFeatures seenInWind(const CameraPose& pose, double sigma_m) {
-    std::normal_distribution<double> normal(0.0, sigma_m);
+    std::normal_distribution<double> normal(0.0, 1.0);
     std::vector<WorldPoint> blown = world_;
     for (WorldPoint& point : blown) {
-      for (Eigen::Index axis = 0; axis < 3; ++axis) point.position_m[axis] += normal(random_);
+      for (Eigen::Index axis = 0; axis < 3; ++axis) point.position_m[axis] += sigma_m * normal(random_);
     }
     return viewOf(blown, camera_, pose, kKeypointSigma_px, random_).features;
   }

@@ -34,12 +34,12 @@ Eigen::Vector2d between(const std::vector<DrivenPose>& poses, std::size_t i, dou
 }
 
 std::vector<MapFix> fixesOf(const std::vector<DrivenPose>& poses, double noise_m, std::mt19937& random) {
-  std::normal_distribution<double> noise(0.0, noise_m);
+  std::normal_distribution<double> noise(0.0, 1.0);
   std::vector<MapFix> fixes;
   for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
     for (int k = 0; k < kFixesPerImage; ++k) {
-      const double east_m = noise(random);
-      const Eigen::Vector2d off(east_m, noise(random));
+      const double east_m = noise_m * noise(random);
+      const Eigen::Vector2d off(east_m, noise_m * noise(random));
       fixes.push_back({static_cast<std::int64_t>(fixes.size()) * kFixInterval_ns,
                        between(poses, i, static_cast<double>(k) / kFixesPerImage) + off});
     }
@@ -101,7 +101,7 @@ class PointGrid {
 
 View viewOf(const std::vector<WorldPoint>& world, const std::vector<std::size_t>& points, const CameraModel& camera,
             const CameraPose& pose, double noise_px, std::mt19937& random, std::size_t image) {
-  std::normal_distribution<double> noise(0.0, noise_px);
+  std::normal_distribution<double> noise(0.0, 1.0);
   std::vector<SiftKeypoint> keypoints;
   std::vector<std::uint8_t> descriptors;
   View view;
@@ -114,8 +114,9 @@ View viewOf(const std::vector<WorldPoint>& world, const std::vector<std::size_t>
           pixel.y() < camera.size().height - 1)) {
       continue;
     }
-    const double x_px = pixel.x() + noise(random);
-    keypoints.push_back({static_cast<float>(x_px), static_cast<float>(pixel.y() + noise(random)), 0.0F, 0.0F});
+    const double x_px = pixel.x() + noise_px * noise(random);
+    const double y_px = pixel.y() + noise_px * noise(random);
+    keypoints.push_back({static_cast<float>(x_px), static_cast<float>(y_px), 0.0F, 0.0F});
     descriptors.insert(descriptors.end(), world[i].descriptor.begin(), world[i].descriptor.end());
     view.points.push_back(i);
   }
