@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <set>
+#include <map>
 #include <vector>
 
 #include <Eigen/Core>
@@ -96,6 +96,9 @@ class Reconstruction {
     double up_m = 0.0;         ///< by altitudes, above the first one of its session; 0 without any
   };
 
+  /// Sessions that know where a place is, and how far from the nearest fix that they believe, metres.
+  using TiedSessions = std::map<std::uint32_t, double>;
+
   void orderBy(const std::vector<ImagePair>& ties);
   Eigen::Vector3d antennaInMap_m(const CameraPose& camera, std::size_t image) const;
   Eigen::Vector3d startOf_m(std::size_t image) const;
@@ -107,14 +110,15 @@ class Reconstruction {
   bool isAstray(std::size_t image) const;
   double error(const Landmark& landmark, const LandmarkSighting& sighting) const;
   double distance_m(const Landmark& landmark) const;
-  std::vector<std::set<std::uint32_t>> tiedSessions() const;
-  double fixBias_m(const std::set<std::uint32_t>& tied) const;
-  ImageGeometry imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const;
+  std::vector<TiedSessions> tiedSessions() const;
+  double mapSigma_m(const TiedSessions& tied) const;
+  ImageGeometry imageAt(std::size_t image, const TiedSessions& tied) const;
   void addLandmark(const FeatureTrack& track, double gate_px);
   std::vector<BundleWindow> windows() const;
   BundleProblem problemOf(const BundleWindow& window) const;
   bool isWithin(double farthest_m, const PositionObservation& fix) const;
   std::vector<bool> confirmedByFixes() const;
+  std::vector<double> distancesFromFixes_m() const;
   double farShare(const SessionGeometry& geometry, std::size_t begin, const std::vector<bool>& confirmed) const;
   void addPath(std::vector<ImageGeometry> images, std::vector<SessionGeometry>& geometries) const;
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <iterator>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <unordered_map>
@@ -21,6 +22,7 @@ constexpr double kLeastConfirmed = 0.2;       ///< of a session's images, for th
 constexpr double kFar_m = 3.0;                ///< an image moved by more than this is far from the cleaned path
 constexpr std::size_t kEnoughTracked = 20;    ///< features of an image on average, for their share to say anything
 constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
+constexpr double kDrift = 0.04;               ///< metres that images stray in a metre without fixes, one sigma
 
 }  // namespace
 
@@ -29,7 +31,7 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   std::vector<std::vector<double>> errors_px(sessions_.size());
   std::vector<std::size_t> tracked(sessions_.size());
   std::vector<ImageGeometry> images(images_.size());
-  const std::vector<std::set<std::uint32_t>> tied = tiedSessions();
+  const std::vector<TiedSessions> tied = tiedSessions();
   for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i, tied[i]);
   for (const Landmark& landmark : problem_.landmarks) {
     const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_.cameras);
@@ -58,35 +60,45 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
 }
 
 /// The sessions that show landmarks of each image, its own included.
-std::vector<std::set<std::uint32_t>> Reconstruction::tiedSessions() const {
-  std::vector<std::set<std::uint32_t>> tied(images_.size());
-  for (std::size_t i = 0; i < images_.size(); ++i) tied[i].insert(images_[i].session);
+std::vector<Reconstruction::TiedSessions> Reconstruction::tiedSessions() const {
+  const std::vector<double> away_m = distancesFromFixes_m();
+  std::vector<TiedSessions> tied(images_.size());
+  for (std::size_t i = 0; i < images_.size(); ++i) tied[i][sessionOf(i)] = away_m[i];
   for (const Landmark& landmark : problem_.landmarks) {
-    std::set<std::uint32_t> sessions;
-    for (const LandmarkSighting& sighting : landmark.sightings) sessions.insert(images_[sighting.image].session);
+    TiedSessions sessions;
+    for (const LandmarkSighting& sighting : landmark.sightings) {
+      const auto added = sessions.emplace(sessionOf(sighting.image), away_m[sighting.image]).first;
+      added->second = std::min(added->second, away_m[sighting.image]);
+    }
     if (sessions.size() == 1) continue;
-    for (const LandmarkSighting& sighting : landmark.sightings)
-      tied[sighting.image].insert(sessions.begin(), sessions.end());
+    for (const LandmarkSighting& sighting : landmark.sightings) {
+      for (const auto& [session, distance_m] : sessions) {
+        const auto added = tied[sighting.image].emplace(session, distance_m).first;
+        if (session != sessionOf(sighting.image)) added->second = std::min(added->second, distance_m);
+      }
+    }
   }
   return tied;
 }
 
-/// Receivers err slowly, each recording by itself: where several are tied, their errors average out.
-double Reconstruction::fixBias_m(const std::set<std::uint32_t>& tied) const {
+/// Receivers err slowly, each recording by itself: where several are tied, their errors average out. Where no fix
+/// confirms the path, images stray from it.
+double Reconstruction::mapSigma_m(const TiedSessions& tied) const {
   double information = 0.0;
-  for (const std::uint32_t session : tied) {
+  for (const auto& [session, away_m] : tied) {
     const double bias_m = std::max(config_.fix_bias * fix_sigmas_m_[session], 0.01);
-    information += 1.0 / (bias_m * bias_m);
+    const double drift_m = kDrift * away_m;
+    information += 1.0 / (bias_m * bias_m + drift_m * drift_m);
   }
   return 1.0 / std::sqrt(information);
 }
 
-ImageGeometry Reconstruction::imageAt(std::size_t image, const std::set<std::uint32_t>& tied) const {
+ImageGeometry Reconstruction::imageAt(std::size_t image, const TiedSessions& tied) const {
   ImageGeometry geometry;
   geometry.camera = problem_.cameras[image];
   Eigen::Matrix<double, 6, 1> sigmas;
-  const double bias_m = fixBias_m(tied);
-  sigmas << bias_m, bias_m, bias_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
+  const double sigma_m = mapSigma_m(tied);
+  sigmas << sigma_m, sigma_m, sigma_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
   geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
   return geometry;
 }
@@ -95,6 +107,26 @@ std::vector<bool> Reconstruction::confirmedByFixes() const {
   std::vector<bool> confirmed(images_.size());
   for (const PositionObservation& fix : fixes_) confirmed[fix.image] = isWithin(kBelievedFix_m, fix);
   return confirmed;
+}
+
+/// Of each image along the path of its session, from the nearest one that a fix confirms; without any, the whole path.
+std::vector<double> Reconstruction::distancesFromFixes_m() const {
+  const std::vector<bool> confirmed = confirmedByFixes();
+  std::vector<double> away_m;
+  for (std::size_t k = 0; k < sessions(); ++k) {
+    const std::size_t first = begin(k);
+    const auto step_m = [&](std::size_t i) { return (cleaned(i).position_m - cleaned(i - 1).position_m).norm(); };
+    double path_m = 0.0;
+    for (std::size_t i = first + 1; i < first + imagesIn(k); ++i) path_m += step_m(i);
+    for (std::size_t i = first; i < first + imagesIn(k); ++i) {
+      const double onwards_m = i == first ? path_m : std::min(path_m, away_m.back() + step_m(i));
+      away_m.push_back(confirmed[i] ? 0.0 : onwards_m);
+    }
+    for (std::size_t i = away_m.size(); i > first + 1; --i) {
+      away_m[i - 2] = std::min(away_m[i - 2], away_m[i - 1] + step_m(i - 1));
+    }
+  }
+  return away_m;
 }
 
 /// Of the images that fixes confirm: elsewhere the cleaned path is a guess, and an image moved away from it says

@@ -74,6 +74,36 @@ TEST(SessionGeometry, TwoTiedSessionsKnowWhereTheyAreBetterThanOne) {
   }
 }
 
+TEST(SessionGeometry, KnowsLessFarFromFixesUnlessAnotherSessionHasSome) {
+  constexpr std::size_t kFirst = 18;  // ten images, a metre each
+  constexpr std::size_t kLast = 27;
+  std::mt19937 random(21);
+  const auto world = test::pointsAlong(test::drive({}), kDensity, random);
+  std::vector<RecordedDrive> drives{again(world, {0.0, 0.0}, 22), again(world, {0.0, 0.0}, 23)};
+  const auto all = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  auto& fixes = drives[0].fixes;
+  const auto at = [&](std::size_t image) {
+    return fixes.begin() + static_cast<std::ptrdiff_t>(image * fixes.size() / drives[0].truth.size());
+  };
+  fixes.erase(at(kFirst), at(kLast + 1));
+  const SessionGeometry alone = adjustSessions({drives[0].unadjusted()}, {}, 1).front();
+  const auto variance = [](const SessionGeometry& session, std::size_t image) {
+    return session.images[image]->covariance(0, 0);
+  };
+  const double near = variance(alone, 0);
+  for (std::size_t i = 0; i < alone.images.size(); ++i) {
+    const bool is_away = i >= kFirst && i <= kLast;
+    const double away_m = is_away ? static_cast<double>(std::min(i - kFirst, kLast - i)) + 1.0 : 0.0;
+    EXPECT_NEAR(std::sqrt(variance(alone, i) - near), 0.04 * away_m, 0.05) << i;
+  }
+  EXPECT_GT(variance(alone, (kFirst + kLast) / 2), near + 0.15 * 0.15);
+  const auto tied = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  for (std::size_t i = 0; i < alone.images.size(); ++i) {
+    EXPECT_LE(variance(tied[0], i), near) << i;
+    EXPECT_GE(variance(tied[0], i), 0.99 * variance(all[0], i)) << i;
+  }
+}
+
 TEST(SessionGeometry, SharesLandmarksOfTiedSessions) {
   std::mt19937 random(31);
   const auto world = test::pointsAlong(test::drive({}), kDensity, random);
