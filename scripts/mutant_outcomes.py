@@ -6,6 +6,7 @@ import json
 import os
 import random
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,17 +20,26 @@ def limits():
     os.nice(5)
 
 
-def run_tests(program: str, tests: list, environment: dict, timeout_s: float) -> str:
-    """'passed', 'failed' or 'timed out'."""
+def run_tests(program: str, tests: list, environment: dict, timeout_s: float) -> tuple:
+    """'passed', 'failed' or 'timed out', and the processor time in seconds."""
     with tempfile.TemporaryDirectory() as folder:
-        try:
-            result = subprocess.run(
-                [program, '--gtest_filter=' + ':'.join(tests), '--gtest_fail_fast', '--gtest_brief=1'],
-                env={**os.environ, 'TMPDIR': folder, **environment}, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, timeout=timeout_s, preexec_fn=limits, check=False)
-        except subprocess.TimeoutExpired:
-            return 'timed out'
-    return 'passed' if result.returncode == 0 else 'failed'
+        process = subprocess.Popen(
+            [program, '--gtest_filter=' + ':'.join(tests), '--gtest_fail_fast', '--gtest_brief=1'],
+            env={**os.environ, 'TMPDIR': folder, **environment}, stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL, preexec_fn=limits)
+        end = time.monotonic() + timeout_s
+        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+        while ended == 0 and time.monotonic() < end:
+            time.sleep(0.005)
+            ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if ended == 0:
+            os.kill(process.pid, signal.SIGKILL)
+            _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    seconds = usage.ru_utime + usage.ru_stime
+    if ended == 0:
+        return 'timed out', seconds
+    return 'passed' if process.returncode == 0 else 'failed', seconds
 
 
 def list_tests(program: str) -> list:
@@ -44,8 +54,8 @@ def list_tests(program: str) -> list:
 
 
 class Suite:
-    """Which tests of the programs reach which mutants, and how long each takes. Those that take longer than
-    `slowest_s` are left out."""
+    """Which tests of the programs reach which mutants, and how much processor time each takes. Those that take more
+    than `slowest_s` are left out."""
 
     def __init__(self, programs: list, jobs: int, slowest_s: float):
         self.reached, self.seconds, self.reach = defaultdict(list), {}, {}
@@ -60,10 +70,10 @@ class Suite:
     @staticmethod
     def record(program: str, test: str):
         with tempfile.NamedTemporaryFile('r', suffix='.reached') as log:
-            start = time.monotonic()
-            if run_tests(program, [test], {'MUTANTS_REACHED': log.name}, 900) != 'passed':
+            outcome, seconds = run_tests(program, [test], {'MUTANTS_REACHED': log.name}, 900)
+            if outcome != 'passed':
                 sys.exit(f'{test} of {program} fails without any mutant')
-            return time.monotonic() - start, {int(line) for line in log.read().split()}
+            return seconds, {int(line) for line in log.read().split()}
 
     def judge(self, mutant: int) -> str:
         """'killed', 'timed out', 'survived', or 'not reached'."""
@@ -75,7 +85,7 @@ class Suite:
         for program, tests in by_program.items():
             for part in self.parts(program, tests):
                 expected_s = sum(self.seconds[(program, test)] for test in part)
-                outcome = run_tests(program, part, {'MUTANT': str(mutant)}, 20.0 + 10.0 * expected_s)
+                outcome, _ = run_tests(program, part, {'MUTANT': str(mutant)}, 20.0 + 10.0 * expected_s)
                 if outcome != 'passed':
                     return 'killed' if outcome == 'failed' else outcome
         return 'survived'
@@ -156,7 +166,7 @@ def main() -> int:
     command.add_argument('--resume', action='store_true', help='keep the outcomes that are there')
     command.add_argument('--jobs', type=int, default=os.cpu_count())
     command.add_argument('--sample', type=int, default=0, help='as many, chosen at random')
-    command.add_argument('--slowest', type=float, default=0.5, help='tests that take longer are left out [s]')
+    command.add_argument('--slowest', type=float, default=0.5, help='tests that take more processor time are left out [s]')
     command.add_argument('--seed', type=int, default=1)
     command.add_argument('program', nargs='+', help='GoogleTest programs')
     command.set_defaults(function=run)
