@@ -31,15 +31,12 @@ namespace {
 
 #ifdef VISUAL_LOCALIZATION_PLAIN_SQLITE_MEMORY
 /// SQLite's memory from the C library: from AddressSanitizer it takes most of the time. So what our code
-/// reads beyond a blob goes unnoticed here; fuzz_records.cpp reads blobs whose ends are watched. Without statistics and
-/// locks, since there is one thread.
+/// reads beyond a blob goes unnoticed here; fuzz_records.cpp reads blobs whose ends are watched.
 class PlainSqliteMemory {
  public:
   PlainSqliteMemory() {
     static sqlite3_mem_methods methods{take, give, resize, sizeOf, roundUp, start, end, nullptr};
     if (sqlite3_config(SQLITE_CONFIG_MALLOC, &methods) != SQLITE_OK) fuzz::fail("SQLite keeps its memory");
-    sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 0);
-    sqlite3_config(SQLITE_CONFIG_SINGLETHREAD);
   }
 
  private:
