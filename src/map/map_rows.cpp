@@ -23,7 +23,9 @@ using sqlite::Statement;
 class FileHeader {
  public:
   explicit FileHeader(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
+    std::ifstream file;
+    file.rdbuf()->pubsetbuf(nullptr, 0);  // no buffer for so few bytes
+    file.open(path, std::ios::binary);
     if (!file) throw Refusal(std::string("cannot be opened: ") + std::strerror(errno));
     file.read(reinterpret_cast<char*>(bytes_.data()), static_cast<std::streamsize>(bytes_.size()));
     complete_ = file.gcount() == static_cast<std::streamsize>(bytes_.size());

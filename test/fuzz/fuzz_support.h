@@ -7,11 +7,11 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <string>
 #include <type_traits>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 /// What the fuzz targets share.
@@ -115,16 +115,22 @@ inline std::string inMemoryFile(const std::uint8_t* data, std::size_t size) {
       const auto folder = std::filesystem::is_directory(memory) ? std::filesystem::path(memory)
                                                                 : std::filesystem::temp_directory_path();
       path = (folder / ("visual_localization_fuzz_" + std::to_string(::getpid()))).string();
+      descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     }
-    ~File() { ::unlink(path.c_str()); }
+    ~File() {
+      ::close(descriptor);
+      ::unlink(path.c_str());
+    }
     File(const File&) = delete;
     File& operator=(const File&) = delete;
     std::string path;
+    int descriptor;
   };
   static const File file;
-  std::ofstream out(file.path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
-  if (!out.flush()) fail("cannot write " + file.path);
+  const auto wanted = static_cast<ssize_t>(size);
+  if (::ftruncate(file.descriptor, wanted) != 0 || ::pwrite(file.descriptor, data, size, 0) != wanted) {
+    fail("cannot write " + file.path);
+  }
   return file.path;
 }
 

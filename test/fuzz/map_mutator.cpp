@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <functional>
 #include <map>
 #include <memory>
 #include <random>
@@ -42,7 +41,7 @@ class Editor {
     sqlite3_limit(handle_, SQLITE_LIMIT_LENGTH, 1 << 20);
     sqlite3_progress_handler(
         handle_, 100000, [](void*) { return 1; }, nullptr);
-    execute("PRAGMA writable_schema = ON; PRAGMA journal_mode = OFF");
+    sqlite3_db_config(handle_, SQLITE_DBCONFIG_WRITABLE_SCHEMA, 1, nullptr);
   }
   ~Editor() { sqlite3_close_v2(handle_); }
   Editor(const Editor&) = delete;
@@ -56,15 +55,27 @@ class Editor {
     return {statement, sqlite3_finalize};
   }
 
-  /// To be called before repairRows().
-  void readSeeds() {
-    const Row version = prepare("PRAGMA user_version");
-    sqlite3_step(version.get());
-    forEachImage([&](const map_schema::ImageRow& image) {
-      seeds_[image.id] = map_schema::rowSeed(image, sqlite3_column_int(version.get(), 0));
-    });
+  /// To be called before the checksums are repaired.
+  void readImages() {
+    const Row row =
+        prepare("SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count FROM images ORDER BY id");
+    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
+      const auto integer = [&row](int column) { return std::int64_t{sqlite3_column_int64(row.get(), column)}; };
+      const auto real = [&row](int column) { return sqlite3_column_double(row.get(), column); };
+      images_.push_back({integer(0), integer(1), integer(2), real(3), real(4), real(5), integer(6)});
+    }
   }
 
+  /// To be called before repairRows().
+  void computeSeeds() {
+    const Row version = prepare("PRAGMA user_version");
+    sqlite3_step(version.get());
+    for (const map_schema::ImageRow& image : images_) {
+      seeds_[image.id] = map_schema::rowSeed(image, sqlite3_column_int(version.get(), 0));
+    }
+  }
+
+  /// `select`: the image, its blobs and their checksum.
   void repairRows(const char* select, int blobs, const char* update) {
     std::vector<std::pair<std::int64_t, std::int64_t>> checksums;
     const Row row = prepare(select);
@@ -76,9 +87,11 @@ class Editor {
       };
       const std::int64_t image = sqlite3_column_int64(row.get(), 0);
       const std::int64_t seed = seeds_[image];
-      checksums.emplace_back(image, blobs == 1 ? map_schema::rowChecksum(seed, {blob(1)})
-                                               : map_schema::rowChecksum(seed, {blob(1), blob(2)}));
+      const std::int64_t checksum =
+          blobs == 1 ? map_schema::rowChecksum(seed, {blob(1)}) : map_schema::rowChecksum(seed, {blob(1), blob(2)});
+      if (sqlite3_column_int64(row.get(), blobs + 1) != checksum) checksums.emplace_back(image, checksum);
     }
+    if (checksums.empty()) return;
     const Row change = prepare(update);
     for (const auto& [image, checksum] : checksums) {
       sqlite3_bind_int64(change.get(), 1, checksum);
@@ -108,7 +121,7 @@ class Editor {
 
   void repairChecksum() {
     map_schema::Checksum checksum;
-    forEachImage([&checksum](const map_schema::ImageRow& image) { image.addTo(checksum); });
+    for (const map_schema::ImageRow& image : images_) image.addTo(checksum);
     checksum.add(meta());
     const Row change = prepare("INSERT OR REPLACE INTO meta VALUES('checksum', ?)");
     sqlite3_bind_int64(change.get(), 1, checksum.value());
@@ -125,16 +138,6 @@ class Editor {
   }
 
  private:
-  void forEachImage(const std::function<void(const map_schema::ImageRow&)>& use) {
-    const Row row =
-        prepare("SELECT id, session, stamp_ns, east_m, north_m, yaw_rad, feature_count FROM images ORDER BY id");
-    while (row && sqlite3_step(row.get()) == SQLITE_ROW) {
-      const auto integer = [&row](int column) { return std::int64_t{sqlite3_column_int64(row.get(), column)}; };
-      const auto real = [&row](int column) { return sqlite3_column_double(row.get(), column); };
-      use({integer(0), integer(1), integer(2), real(3), real(4), real(5), integer(6)});
-    }
-  }
-
   ParameterValues meta() {
     ParameterValues values;
     const Row row = prepare("SELECT key, value FROM meta WHERE key <> 'checksum'");
@@ -158,6 +161,7 @@ class Editor {
   }
 
   sqlite3* handle_ = nullptr;
+  std::vector<map_schema::ImageRow> images_;
   std::map<std::int64_t, std::int64_t> seeds_;  ///< of the images' rows
 };
 
@@ -247,21 +251,24 @@ void repairChecksums(Editor& editor, const std::string& changed) {
   const auto is_changed = [&changed](const char* table) {
     return changed.empty() || changed == "images" || changed == table;
   };
+  editor.readImages();
   if (is_changed("features") || is_changed("globals") || is_changed("previews") || is_changed("landmarks")) {
-    editor.readSeeds();
+    editor.computeSeeds();
   }
   if (is_changed("features")) {
-    editor.repairRows("SELECT image, keypoints, descriptors FROM features", 2,
+    editor.repairRows("SELECT image, keypoints, descriptors, crc32 FROM features", 2,
                       "UPDATE features SET crc32 = ? WHERE image = ?");
   }
   if (is_changed("globals")) {
-    editor.repairRows("SELECT image, wgoh, wgii FROM globals", 2, "UPDATE globals SET crc32 = ? WHERE image = ?");
+    editor.repairRows("SELECT image, wgoh, wgii, crc32 FROM globals", 2,
+                      "UPDATE globals SET crc32 = ? WHERE image = ?");
   }
   if (is_changed("previews")) {
-    editor.repairRows("SELECT image, jpeg FROM previews", 1, "UPDATE previews SET crc32 = ? WHERE image = ?");
+    editor.repairRows("SELECT image, jpeg, crc32 FROM previews", 1, "UPDATE previews SET crc32 = ? WHERE image = ?");
   }
   if (is_changed("landmarks")) {
-    editor.repairRows("SELECT image, pose, points FROM landmarks", 2, "UPDATE landmarks SET crc32 = ? WHERE image = ?");
+    editor.repairRows("SELECT image, pose, points, crc32 FROM landmarks", 2,
+                      "UPDATE landmarks SET crc32 = ? WHERE image = ?");
   }
   if (is_changed("masks")) editor.repairMasks();
   editor.repairChecksum();
