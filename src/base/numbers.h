@@ -22,7 +22,13 @@ inline bool faceAlike(double yaw_rad, double other_yaw_rad) {
 }
 
 /// The middle value; of an even number the mean of the two in the middle; 0 of none.
-double median(std::vector<double> values);
+inline double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
 
 /// The middle value; of an even number the larger of the two in the middle, so that it is always one of the values.
 /// Datum and cleaned path of a map and the scale of a match rest on this one: with median() every map and every track
@@ -36,7 +42,12 @@ T upperMedian(std::vector<T>& values) {
 
 /// The smallest value that at least `share` of all are not above (nearest rank): always one of the values. Reorders
 /// `values`, of which there must be one.
-double nearestRank(std::vector<double>& values, double share);
+inline double nearestRank(std::vector<double>& values, double share) {
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size())));
+  const auto found = values.begin() + std::max<std::ptrdiff_t>(1, rank) - 1;
+  std::nth_element(values.begin(), found, values.end());
+  return *found;
+}
 
 /// Of `count` items every so many-th is taken, so that at most `most` are: at least 1.
 constexpr std::size_t strideFor(std::size_t count, std::size_t most) {
@@ -44,6 +55,11 @@ constexpr std::size_t strideFor(std::size_t count, std::size_t most) {
 }
 
 /// Value below which `share` of the sorted values lie, linear between neighbours.
-double quantile(const std::vector<double>& sorted, double share);
+inline double quantile(const std::vector<double>& sorted, double share) {
+  const double rank = share * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(rank);
+  const std::size_t above = std::min(below + 1, sorted.size() - 1);
+  return sorted[below] + (rank - static_cast<double>(below)) * (sorted[above] - sorted[below]);
+}
 
 }  // namespace visual_localization

@@ -7,6 +7,7 @@
 
 #include "base/numbers.h"
 #include "base/time.h"
+#include "visual_localization/localization/particles.h"
 
 namespace visual_localization {
 

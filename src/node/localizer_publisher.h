@@ -24,7 +24,7 @@
 #include "node/drawings.h"
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
-#include "node/message_conversions.h"
+#include "node/markers.h"
 #include "node/node_config.h"
 #include "node/throttled_log.h"
 #include "visual_localization/localization/estimate.h"

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
+#include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/scores.h"
 
 namespace visual_localization {

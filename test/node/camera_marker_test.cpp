@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "node/message_conversions.h"
+#include "node/markers.h"
 #include "test/node/map_header.h"
 #include "test/support/example_map.h"
 

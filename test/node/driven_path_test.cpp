@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "node/message_conversions.h"
+#include "node/markers.h"
 #include "test/node/map_header.h"
 
 namespace visual_localization {

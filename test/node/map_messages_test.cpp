@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "node/message_conversions.h"
+#include "node/markers.h"
 #include "test/node/small_map.h"
 
 namespace visual_localization {

@@ -4,12 +4,12 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <random>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "visual_localization/localization/odometry.h"
-#include "visual_localization/localization/random.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/map/training_map.h"
@@ -55,6 +55,25 @@ Eigen::Matrix2d covarianceAbout(const Eigen::Vector2d& centre_m, const std::vect
 Eigen::Matrix2d scatterAbout(const Eigen::Vector2d& centre_m, const std::vector<Particle>& particles);
 /// Scales the weights to sum one; all equal when their sum is not positive.
 void normaliseWeights(std::vector<Particle>& particles);
+
+/// The one source of randomness of a tracker: seeded, passed in, never global.
+class Random {
+ public:
+  explicit Random(std::uint32_t seed) : engine_(seed) {}
+
+  /// Uniform in [min, max).
+  double uniform(double min, double max) { return std::uniform_real_distribution<double>(min, max)(engine_); }
+  /// N(0, std_dev^2).
+  double normal(double std_dev) { return std::normal_distribution<double>(0.0, 1.0)(engine_) * std_dev; }
+  /// Independent N(0, std_dev_i^2) per axis.
+  Eigen::Vector2d normal(const Eigen::Vector2d& std_dev) {
+    const double x = normal(std_dev.x());
+    return {x, normal(std_dev.y())};
+  }
+
+ private:
+  std::mt19937 engine_;
+};
 
 /// Draws a position of the map frame, metres: where the robot may be before any image was seen.
 using Prior = std::function<Eigen::Vector2d(Random&)>;

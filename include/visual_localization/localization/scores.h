@@ -14,11 +14,12 @@
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
-#include "visual_localization/localization/random.h"
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
+
+class Random;
 
 /// Which features images are compared by.
 enum class FeatureKind : std::uint8_t { kSift = 0, kGlobal = 1 };
