@@ -108,6 +108,7 @@ std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, cons
 namespace {
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
+/// Of a symmetric matrix: its lower triangle.
 using Triplets = std::vector<Eigen::Triplet<double>>;
 
 /// Where a time lies between two points of the grid.
@@ -152,7 +153,7 @@ void addStiffness(const SmoothedPath& grid, double weight, Triplets& matrix) {
   const auto points = static_cast<Eigen::Index>(grid.positions_m.size());
   for (Eigen::Index k = 0; k + 2 < points; ++k) {
     for (Eigen::Index i = 0; i < 3; ++i) {
-      for (Eigen::Index j = 0; j < 3; ++j) {
+      for (Eigen::Index j = 0; j <= i; ++j) {
         const double product = difference[static_cast<std::size_t>(i)] * difference[static_cast<std::size_t>(j)];
         matrix.emplace_back(k + i, k + j, scale * product);
       }
@@ -173,7 +174,6 @@ void addSpeed(const SmoothedPath& path, double speed_mps, double weight, Triplet
     const Eigen::RowVector2d wanted = scale * speed_mps * path.step_s * step.normalized().transpose();
     matrix.emplace_back(k, k, scale);
     matrix.emplace_back(k + 1, k + 1, scale);
-    matrix.emplace_back(k, k + 1, -scale);
     matrix.emplace_back(k + 1, k, -scale);
     right_side.row(k) -= wanted;
     right_side.row(k + 1) += wanted;
@@ -186,7 +186,7 @@ void addSample(const GridPosition& where, const Eigen::Vector2d& position_m, dou
   for (Eigen::Index i = 0; i < 2; ++i) {
     const double share_i = shares[static_cast<std::size_t>(i)];
     right_side.row(where.left + i) += weight * share_i * position_m.transpose();
-    for (Eigen::Index j = 0; j < 2; ++j) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
       matrix.emplace_back(where.left + i, where.left + j, weight * share_i * shares[static_cast<std::size_t>(j)]);
     }
   }
@@ -197,7 +197,7 @@ void solve(const std::vector<PathSample>& samples, const std::vector<double>& we
            double speed_mps, double speed_weight, SmoothedPath& grid) {
   const auto points = static_cast<Eigen::Index>(grid.positions_m.size());
   Triplets triplets;
-  triplets.reserve(grid.positions_m.size() * 9 + samples.size() * 4);
+  triplets.reserve(grid.positions_m.size() * 9 + samples.size() * 3);
   Eigen::MatrixX2d right_side = Eigen::MatrixX2d::Zero(points, 2);
   addStiffness(grid, stiffness, triplets);
   if (speed_weight > 0.0) addSpeed(grid, speed_mps, speed_weight, triplets, right_side);

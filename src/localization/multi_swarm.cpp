@@ -150,9 +150,7 @@ void MultiSwarm::scout(const TrackerInput& input) {
   rival.unrecognised = 0;
   share();
   rival.dpso->reset(normallyDistributed(position_m, kStart_m * kStart_m * Eigen::Matrix2d::Identity()));
-  rival.estimate = {};
   rival.estimate.position_m = position_m;
-  rival.estimate.best = found;
 }
 
 /// The leader's, with the cloud of all.

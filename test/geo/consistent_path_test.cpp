@@ -86,6 +86,10 @@ TEST(MeasureSpeed, AGapSaysNothing) {
   std::vector<PathSample> samples = atSpeeds(repeated(20, 2.0));
   samples.push_back({samples.back().time_s + 50.0, samples.back().position_m});
   EXPECT_NEAR(measureSpeed(samples, 1.0).std_mps, 0.0, 1e-12);
+  for (const double gap_s : {2.9, 3.1}) {
+    const std::vector<PathSample> pair{{0.0, {0.0, 0.0}}, {gap_s, {gap_s, 0.0}}};
+    EXPECT_NEAR(measureSpeed(pair, 1.0).median_mps, gap_s < 3.0 ? 1.0 : 0.0, 1e-12) << "three spans are a gap";
+  }
   EXPECT_DOUBLE_EQ(measureSpeed({samples[19], samples[21]}, 60.0).median_mps, 0.0) << "there is no such span";
   EXPECT_GT(measureSpeed({samples[19], samples[21]}, 50.0).median_mps, 0.0);
 }
@@ -129,6 +133,18 @@ TEST(ConsistentSamples, ARobotMayStandAndCrawl) {
   };
   EXPECT_TRUE(all(consistentSamples(atSpeeds(joined(repeated(10, 1.0), repeated(10, 0.0))), oneMetreASecond())));
   EXPECT_TRUE(all(consistentSamples(atSpeeds(joined(repeated(10, 1.0), repeated(3, 0.3))), oneMetreASecond())));
+}
+
+TEST(ConsistentSamples, ToStandCostsHalfASigma) {
+  DrivingModel model = oneMetreASecond();
+  model.opening_cost = 0.0;
+  model.rejection_cost = 0.6;
+  const std::vector<PathSample> stops_at_last = atSpeeds(joined(repeated(10, 1.0), {0.1}));
+  EXPECT_TRUE(consistentSamples(stops_at_last, model).back());
+  model.rejection_cost = 0.4;
+  EXPECT_FALSE(consistentSamples(stops_at_last, model).back());
+  model.rejection_cost = 0.5;
+  EXPECT_FALSE(consistentSamples(stops_at_last, model).back()) << "for the same cost the shorter path";
 }
 
 TEST(ConsistentSamples, AStretchThatIsDrivenTooFastLosesAsAWhole) {

@@ -87,9 +87,11 @@ TEST(PathSmoother, DetailsShorterThanTheSmoothingTimeAreGone) {
 TEST(PathSmoother, WhatLiesFarOffHasNoInfluence) {
   std::vector<PathSample> samples;
   for (int i = 0; i <= 100; ++i) samples.push_back({0.2 * i, {0.2 * i, 0.0}});
-  const auto farthestWith = [&](double offset_m) {
+  const auto farthestWith = [&](double offset_m, double outlier_distance_m = 1.0) {
     samples[50].position_m.y() = offset_m;
-    const SmoothedPath path = smoothPath(samples, {});
+    PathSmootherConfig config;
+    config.outlier_distance_m = outlier_distance_m;
+    const SmoothedPath path = smoothPath(samples, config);
     double farthest_m = 0.0;
     for (double time_s = 0.0; time_s <= 20.0; time_s += 0.1) {
       farthest_m = std::max(farthest_m, std::abs(path.at(time_s).y()));
@@ -99,6 +101,7 @@ TEST(PathSmoother, WhatLiesFarOffHasNoInfluence) {
   const double small_m = farthestWith(0.1);
   EXPECT_GT(small_m, 0.003) << "the path bends towards a small deviation";
   EXPECT_LT(farthestWith(5.0), small_m) << "but not towards a large one";
+  EXPECT_GT(farthestWith(2.0, 20.0), 10.0 * farthestWith(2.0, 0.5)) << "what is large is said by a parameter";
   EXPECT_LT(farthestWith(500.0), 0.01) << "weights have a floor, so that the system stays solvable";
 }
 
@@ -130,6 +133,24 @@ TEST(PathSmoother, ARobotThatStoodIsNotMadeToDrive) {
   const SmoothedPath path = smoothPath(samples, config);
   EXPECT_NEAR(lengthOf(path, 15.0, 25.0), 0.0, 0.1) << "five smoothing times from stop and start";
   EXPECT_NEAR(lengthOf(path, 2.0, 8.0), 6.0, 0.1);
+}
+
+TEST(PathSmoother, TwiceAsFastItIsTheSamePath) {
+  const auto pathAt = [](double mps) {
+    std::vector<PathSample> samples;  // a right angle, not seen
+    for (int i = 0; i <= 100; ++i) {
+      const double along_m = 0.2 * i;
+      if (along_m > 6.0 && along_m < 14.0) continue;
+      samples.push_back({along_m / mps, {std::min(along_m, 10.0), std::max(0.0, along_m - 10.0)}});
+    }
+    return smoothPath(samples, {1.0 / mps, 1.0, mps, 1.0});
+  };
+  const SmoothedPath slow = pathAt(1.0);
+  const SmoothedPath fast = pathAt(2.0);
+  ASSERT_EQ(slow.positions_m.size(), fast.positions_m.size());
+  for (std::size_t k = 0; k < slow.positions_m.size(); ++k) {
+    EXPECT_LT((slow.positions_m[k] - fast.positions_m[k]).norm(), 1e-6) << k;
+  }
 }
 
 TEST(PathSmoother, OneSampleIsNoPath) {

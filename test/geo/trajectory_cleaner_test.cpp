@@ -39,7 +39,7 @@ TEST(TrajectoryCleaner, ACleanRoundLosesNothing) {
 
 // Thirty steps underestimate their own noise at times, and then refuse good fixes.
 TEST(TrajectoryCleaner, FewShortRecordingsLoseTheirFixesToNoise) {
-  constexpr int kDrives = 400;
+  constexpr int kDrives = 200;
   constexpr int kSeconds = 45;
   int shorter = 0;
   std::size_t dropped = 0;
@@ -133,6 +133,16 @@ TEST(TrajectoryCleaner, DropsSpikesAndInvalidFixes) {
   EXPECT_EQ(cleaned.gaps_closed, 1u);
   EXPECT_NEAR(cleaned.longest_gap_s, 8.2, 0.3);
   EXPECT_LT(largestOf(errorsOf(cleaned, block, 250.0)), 0.6);
+}
+
+TEST(TrajectoryCleaner, ASpikeIsThreeNodesAwayFromItsOwn) {
+  const double node_m = TrajectoryCleanerConfig().node_length_m;
+  for (const double spike_m : {2.8 * node_m, 3.3 * node_m}) {
+    std::vector<Fix> fixes = record(block, 250.0, kRate, 0.01);
+    shift(fixes[150], {0.0, spike_m});  // the path leads east there
+    const FixVerdict verdict = clean(fixes).verdicts[150];
+    EXPECT_EQ(verdict, spike_m < 3.0 * node_m ? FixVerdict::kKept : FixVerdict::kSpike) << spike_m;
+  }
 }
 
 TEST(TrajectoryCleaner, DropsMultipathBendsInAnyDirection) {

@@ -273,6 +273,46 @@ TEST(Dpso, AVerifiedPositionEndsARecoveryAndItsCount) {
   EXPECT_TRUE(swarm.tuning().recovering);
 }
 
+TEST(Dpso, ABadImageBeforeAnAttractionDoesNotCountAfterIt) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.recovery_patience = 3;
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  for (int image = 0; image < 2; ++image) swarm.update(world.inTheDark());
+  swarm.attract(onCircle(10.0));
+  for (int image = 0; image < 2; ++image) swarm.update(world.inTheDark());
+  EXPECT_FALSE(swarm.tuning().recovering);
+}
+
+TEST(Dpso, AnotherNumberOfParticlesHasTheSameShares) {
+  World world = roundWorld();
+  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  for (const std::size_t particles : {40U, 120U}) {
+    swarm.resize(particles);
+    EXPECT_EQ(countOf(swarm.particles(), ParticleKind::kQuantum), particles / 10);
+    EXPECT_EQ(countOf(swarm.particles(), ParticleKind::kHighEnergy), particles / 10);
+    EXPECT_EQ(countOf(swarm.particles(), ParticleKind::kStandard), particles * 8 / 10);
+    EXPECT_NEAR(test::sumOfWeights(swarm.particles()), 1.0, 1e-9);
+  }
+}
+
+TEST(Dpso, StaysOutOfExcludedPlacesUnlessItsBestParticleIsThere) {
+  World world = roundWorld();
+  const Eigen::Vector2d here_m(30.0, 0.0);
+  const auto nearest_m = [&](const Eigen::Vector2d& place_m, const Eigen::Vector2d& attractor_m) {
+    Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
+    swarm.exclude({place_m}, 15.0);
+    swarm.attract(attractor_m);
+    swarm.update(world.inTheDark());  // the particles are all over the area
+    double nearest_m = 1e9;
+    for (const Particle& p : swarm.particles()) nearest_m = std::min(nearest_m, (p.position_m - place_m).norm());
+    return nearest_m;
+  };
+  EXPECT_GE(nearest_m(-here_m, here_m), 15.0);
+  EXPECT_GE(nearest_m(here_m, Eigen::Vector2d(14.9, 0.0)), 15.0);
+  EXPECT_LT(nearest_m(here_m, Eigen::Vector2d(15.1, 0.0)), 15.0);
+}
+
 TEST(Dpso, AVerifiedPositionIsTheEstimateAndComparesNothing) {
   World world = roundWorld();
   Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
@@ -359,6 +399,28 @@ TEST(Dpso, AReconfigurationChangesWhatItNames) {
   config.dpso.v0_max = 0.002;
   swarm.configure(config);
   EXPECT_EQ(swarm.tuning().v0, 0.002);
+}
+
+TEST(Dpso, AReconfigurationChangesWhatConfinesIt) {
+  World world = roundWorld();
+  TrackerConfig config;
+  config.dpso.confine = "none";
+  config.dpso.phi0 = 5.0;
+  Dpso swarm(world.map(), config.dpso, config.fitness, 1);
+  const auto isAnyOutside = [&] {
+    bool outside = false;
+    for (int image = 0; image < 20; ++image) {
+      swarm.update(world.inTheDark());
+      for (const Particle& particle : swarm.particles()) {
+        outside = outside || (particle.position_m.array().abs() > 30.0 + 1e-6).any();
+      }
+    }
+    return outside;
+  };
+  EXPECT_TRUE(isAnyOutside());
+  config.dpso.confine = "box";
+  swarm.configure(config);
+  EXPECT_FALSE(isAnyOutside());
 }
 
 TEST(Dpso, AParticleThatTheCorridorHoldsKeepsOnlyTheSpeedAlongIt) {

@@ -31,6 +31,12 @@ TEST_F(LocalizerChanges, ReconfiguringChangesTrackerAndParticles) {
   config.tracker = "pf_linear";
   localizer_->configure(config);
   EXPECT_EQ(localizer_->particles().size(), static_cast<std::size_t>(config.pf.particles));
+  config.tracker = "dpso";
+  config.dpso.particles = config.pf.particles;  // as many, and yet another tracker
+  localizer_->configure(config);
+  quantum = 0;
+  for (const Particle& particle : localizer_->particles()) quantum += particle.kind == ParticleKind::kQuantum ? 1 : 0;
+  EXPECT_EQ(quantum, config.dpso.particles / 5);
   config.sweep_images = 10;
   config.features = "global";
   localizer_->configure(config);

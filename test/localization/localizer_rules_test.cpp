@@ -1,9 +1,11 @@
 // The rules of the localizer, by images that are known by their scores alone.
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -196,6 +198,10 @@ TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
   image_->best_of_others = 0.6;
   for (int i = 0; i < 60; ++i) estimate = see(20.0);
   EXPECT_EQ(estimate.session, "second");
+  LocalizerConfig without = config_;
+  without.choose_session = false;
+  localizer_->configure(without);
+  EXPECT_EQ(see(20.0).session, "");
 }
 
 TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
@@ -231,6 +237,24 @@ TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
   }
 }
 
+TEST_F(LocalizerRules, SaysHowFarTheLastImagesAreFromASteadyMotion) {
+  LocalizerConfig config;
+  config.state.motion_length = 3;
+  make(config);
+  std::vector<Eigen::Vector2d> positions_m;
+  double largest_m = 0.0;
+  for (const double x_m : {20.0, 21.0, 23.0, 22.0, 24.0, 21.0, 23.0, 22.0}) {
+    const Estimate estimate = see(x_m);
+    positions_m.push_back(estimate.tracked.position_m);
+    if (positions_m.size() < 3) continue;
+    const auto last = positions_m.rbegin();
+    // Of three points at even times, from the line that fits them best.
+    EXPECT_NEAR(estimate.motion_residual_m, (last[0] - 2.0 * last[1] + last[2]).norm() / std::sqrt(18.0), 1e-9);
+    largest_m = std::max(largest_m, estimate.motion_residual_m);
+  }
+  EXPECT_GT(largest_m, 0.5);
+}
+
 TEST_F(LocalizerRules, APlaceHasTheHeadingOfItsTrainingImages) {
   std::vector<Eigen::Vector2d> north;
   for (int i = 0; i < 60; ++i) north.emplace_back(0.0, 1.0 * i);
@@ -245,7 +269,22 @@ TEST_F(LocalizerRules, APlaceHasTheHeadingOfItsTrainingImages) {
 
 TEST_F(LocalizerRules, TheReportIsThatOfTheImage) {
   image_->features = 42;
-  EXPECT_EQ(see(20.0).image.features_kept, 42U);
+  const Estimate estimate = see(20.0);
+  EXPECT_EQ(estimate.image.features_kept, 42U);
+  EXPECT_EQ(estimate.image.match_ms, 0.0) << "no landmarks, no time for them";
+  EXPECT_EQ(estimate.images_since_metric, 0U);
+}
+
+TEST_F(LocalizerRules, APlaceIsOnTheEarthWhereItIsInTheMap) {
+  const Estimate estimate = settle();
+  const GeodeticPoint expected = localizer_->map().frame().toGeodetic(estimate.pose.position_m);
+  EXPECT_EQ(estimate.pose.geodetic.latitude_deg, expected.latitude_deg);
+  EXPECT_EQ(estimate.pose.geodetic.longitude_deg, expected.longitude_deg);
+}
+
+TEST_F(LocalizerRules, BeginsWithTheSessionOfTheHour) {
+  make({}, twoSessions());
+  EXPECT_EQ(see(20.0, 1010.0).session, "second");
 }
 
 }  // namespace

@@ -103,6 +103,7 @@ TEST_F(MetricEstimate, APoseThatIsNotConfirmedLeavesTheParticles) {
   const Estimate estimate = show(street_.fewSeenFrom(street_.trueNear(40, kHere_m), 40, 30));
   ASSERT_TRUE(estimate.metric);
   ASSERT_FALSE(estimate.metric->confirmed) << "fewer than twice the inliers, and nothing predicts it";
+  EXPECT_FALSE(estimate.evidence.verified.value_or(true));
   double farthest_m = 0.0;
   for (const Particle& particle : localizer_->particles()) {
     farthest_m = std::max(farthest_m, (particle.position_m - positionOf(40)).norm());
@@ -122,6 +123,45 @@ TEST_F(MetricEstimate, AMountHoldsFromTheNextImageAndForgetsTheMotion) {
   ASSERT_EQ(after.source, PoseSource::kMetric);
   EXPECT_NEAR((after.metric->base.translation() - after.metric->camera.position_m).norm(), 2.0, 1e-9);
   EXPECT_NEAR((after.pose.position_m - before.pose.position_m).norm(), 2.0, 0.2);
+}
+
+TEST_F(MetricEstimate, AnotherCameraIsJudgedByItsOwnImages) {
+  for (std::size_t i = 10; i < 20; ++i) ASSERT_NEAR(see(i).focal_scale, 1.0, 0.01) << i;
+  Intrinsics lens = localizer_->camera()->intrinsics();
+  lens.fx *= 1.01;
+  lens.fy *= 1.01;
+  localizer_->setCamera(CameraModel(lens));
+  const Estimate estimate = see(20);
+  ASSERT_TRUE(estimate.metric);
+  EXPECT_NEAR(estimate.focal_scale, 1.0 / 1.01, 0.01);
+}
+
+TEST_F(MetricEstimate, ACameraThatTheImagesContradictVerifiesNothing) {
+  Intrinsics lens = localizer_->camera()->intrinsics();
+  lens.fx *= 1.02;
+  lens.fy *= 1.02;
+  localizer_->setCamera(CameraModel(lens));
+  std::size_t contradicted = 0;
+  for (std::size_t i = 5; i < 45; ++i) {
+    const Estimate estimate = see(i);
+    if (!estimate.camera_contradicted) continue;
+    ++contradicted;
+    EXPECT_FALSE(estimate.evidence.verified);
+  }
+  EXPECT_GT(contradicted, 10U);
+}
+
+TEST_F(MetricEstimate, TheTimeOfGeometryIsThatOfThisImage) {
+  const Estimate proposed = see(10);
+  ASSERT_TRUE(proposed.metric);
+  EXPECT_GT(proposed.image.match_ms, 0.0);
+  const Estimate predicted = see(11);
+  ASSERT_TRUE(predicted.metric);
+  EXPECT_GT(predicted.image.match_ms, 0.0);
+  LocalizerConfig places;
+  places.metric.pose_source = "place";
+  localizer_->configure(places);
+  EXPECT_EQ(see(12).image.match_ms, 0.0);
 }
 
 TEST_F(MetricEstimate, RelocalizingForgetsTheMotion) {

@@ -198,6 +198,20 @@ TEST(SessionChoice, AtTheSameTimeOfDayTheNewerOneIsChosen) {
   EXPECT_EQ(sessions.chosen(), 1U) << "only the first image asks for the hour";
 }
 
+TEST(SessionChoice, TheFirstImageOfTheMapCountsAsAnyOther) {
+  MapHeader header;
+  header.image_size = {320, 240};
+  header.sessions = {{"morning"}, {"evening"}};
+  std::vector<TrainingImage> images(2);
+  images[0].stamp_ns = 8 * kHour_ns;
+  images[1].stamp_ns = 18 * kHour_ns;
+  images[1].session = 1;
+  const TrainingMap map(header, images);
+  SessionChoice sessions(map, true);
+  sessions.startImage(9 * kHour_ns);
+  EXPECT_EQ(sessions.chosen(), 0U);
+}
+
 /// Images until a session that matches `ratio` times as well as the first one is chosen; 100: never.
 int imagesUntilChosen(double ratio) {
   const auto map = street();

@@ -390,8 +390,22 @@ TEST(SwarmEquations, TheSpeedOverTheGroundStaysKnown) {
   for (int image = 0; image < 60 && swarm.tuning().recovering; ++image) see(world.from(onCircle(7.0)), 1.0);
   ASSERT_FALSE(swarm.tuning().recovering);
   EXPECT_GT(swarm.tuning().speed_mps, 0.0) << "the image that ends a recovery";
+  const Eigen::Vector2d then_m = centreOfTravellers(swarm);
+  see(world.from(onCircle(7.6)), 2.0);
+  EXPECT_NEAR(swarm.tuning().speed_mps, 0.5 * (centreOfTravellers(swarm) - then_m).norm(), 1e-9)
+      << "the speed of the search is forgotten";
   swarm.reset();
   EXPECT_EQ(swarm.tuning().speed_mps, 0.0);
+  see(world.from(onCircle(7.6)), 1.0);
+  see(world.from(onCircle(8.2)), 1.0);
+  const Eigen::Vector2d restarted_m = centreOfTravellers(swarm);
+  swarm.reset();
+  see(world.from(onCircle(8.2)), 1.0);
+  const Eigen::Vector2d first_m = centreOfTravellers(swarm);
+  EXPECT_NE(first_m, restarted_m);
+  see(world.from(onCircle(8.8)), 1.0);
+  EXPECT_NEAR(swarm.tuning().speed_mps, (centreOfTravellers(swarm) - first_m).norm(), 1e-9)
+      << "of its first step, not smoothed with what was before";
 }
 
 TEST(SwarmEquations, WhatIsAtItsLimitStaysThereInARecovery) {
