@@ -145,6 +145,31 @@ TEST(TrajectoryCleaner, ASpikeIsThreeNodesAwayFromItsOwn) {
   }
 }
 
+// Fixes that are wrong by half a metre in both axes, this way and that in turn: their second differences are 2 m. Ten
+// of them are a node, whose median is right, so that steps of 2.5 s seem exact: the noise of a step is then
+// sqrt(2) 1.2533 (1.4826 / 2.449) 2 m / sqrt(10) = 0.679 m. To go aside and back costs 2 ((v - 0.53) / hypot(0.271,
+// 0.0265))^2, to leave the node out 8 + 1.5: equal at 1.124 m/s, 2.48 m aside.
+TEST(TrajectoryCleaner, HowFarANodeMayBeAsideFollowsFromTheNoiseOfItsFixes) {
+  for (const double aside_m : {2.38, 2.58}) {
+    std::vector<Fix> fixes = record([](double time_s) { return Eigen::Vector2d(0.53 * time_s, 0.0); }, 250.0, 4.0, 0.0);
+    ASSERT_EQ(fixes.size(), 1000U);
+    for (std::size_t i = 0; i < fixes.size(); ++i) shift(fixes[i], Eigen::Vector2d::Constant(i % 2 == 0 ? 0.5 : -0.5));
+    for (std::size_t i = 500; i < 510; ++i) shift(fixes[i], {0.0, aside_m});
+    const CleanedTrajectory cleaned = clean(fixes);
+    const bool is_kept = aside_m < 2.48;
+    EXPECT_EQ(countOf(cleaned, FixVerdict::kKept), is_kept ? 1000U : 990U) << aside_m;
+    EXPECT_EQ(cleaned.verdicts[505], is_kept ? FixVerdict::kKept : FixVerdict::kMultipath) << aside_m;
+  }
+}
+
+TEST(TrajectoryCleaner, WhatIsWrongAtTheStartGrowsAtItsEndToo) {
+  std::vector<Fix> fixes = record(block, 100.0, kRate, 0.01);
+  for (std::size_t i = 0; i < 20; ++i) shift(fixes[i], {0.0, 12.0});  // two nodes
+  const CleanedTrajectory cleaned = clean(fixes);
+  for (std::size_t i = 0; i < 28; ++i) EXPECT_EQ(cleaned.verdicts[i], FixVerdict::kMultipath) << i;
+  EXPECT_EQ(cleaned.verdicts[60], FixVerdict::kKept);
+}
+
 TEST(TrajectoryCleaner, DropsMultipathBendsInAnyDirection) {
   for (int direction = 0; direction < 8; ++direction) {
     const double angle_rad = direction * kPi / 4.0;

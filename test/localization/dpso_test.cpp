@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -282,6 +283,37 @@ TEST(Dpso, ABadImageBeforeAnAttractionDoesNotCountAfterIt) {
   swarm.attract(onCircle(10.0));
   for (int image = 0; image < 2; ++image) swarm.update(world.inTheDark());
   EXPECT_FALSE(swarm.tuning().recovering);
+}
+
+TEST(Dpso, WhoIsAttractedSearchesThereAndNotAllOver) {
+  World world = roundWorld();
+  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  for (int image = 0; image < 5; ++image) {
+    swarm.attract(onCircle(10.0));
+    swarm.update(world.inTheDark());
+    if (image == 0) continue;  // which moves nothing
+    for (const Particle& particle : swarm.particles()) {
+      if (particle.kind != ParticleKind::kQuantum) continue;
+      EXPECT_LT((particle.position_m - onCircle(10.0)).norm(), 6.0 * DpsoConfig().quantum_std * 60.0);
+    }
+  }
+}
+
+TEST(Dpso, RecoveryThatIsSwitchedOnAgainCountsAnew) {
+  World world = roundWorld();
+  TrackerConfig config;
+  Dpso swarm(world.map(), config.dpso, config.fitness, 1);
+  for (int image = 0; image < 5; ++image) swarm.update(world.inTheDark());
+  ASSERT_TRUE(swarm.tuning().recovering);
+  const std::string recovery = std::exchange(config.dpso.recovery, "none");
+  swarm.configure(config);
+  EXPECT_FALSE(swarm.tuning().recovering);
+  config.dpso.recovery = recovery;
+  swarm.configure(config);
+  swarm.update(world.inTheDark());
+  EXPECT_FALSE(swarm.tuning().recovering) << "the first bad image of two";
+  swarm.update(world.inTheDark());
+  EXPECT_TRUE(swarm.tuning().recovering);
 }
 
 TEST(Dpso, AnotherNumberOfParticlesHasTheSameShares) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -76,6 +77,17 @@ TEST_F(LocalizerChanges, ReconfiguringReachesStateAndSweep) {
   few.sweep_images = 20000;
   localizer_->configure(few);
   EXPECT_GT(see(20.0).swept, swept);
+}
+
+TEST_F(LocalizerChanges, AnImageThatFailedIsLookedAtAnewWhenItRepeats) {
+  settle();
+  image_->fails = true;
+  EXPECT_THROW(see(25.0), std::runtime_error);
+  image_->fails = false;
+  image_->repeated = true;
+  const int compared = image_->compared;
+  see(25.0, 0.0);
+  EXPECT_GT(image_->compared, compared) << "and does not get the answer of the one before";
 }
 
 TEST_F(LocalizerChanges, WhatIsToldMeanwhileIsNewsToARepeatedImage) {

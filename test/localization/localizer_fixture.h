@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -33,6 +34,7 @@ class SeenFrom final : public FakeImage {
     sift_recognised = similarity.sift_recognised;
   }
   Score compare(FeatureKind kind, std::size_t i) override {
+    if (fails) throw std::runtime_error("a camera that fails");
     ++compared;
     const double width_m = kind == FeatureKind::kSift ? 2.0 : 10.0;
     const double offset = (map_->position_m(i) - position_m).norm() / width_m;
@@ -48,6 +50,7 @@ class SeenFrom final : public FakeImage {
   double best_of_others = 0.5;
   double sift_recognised = 0.05;
   bool repeated = false;
+  bool fails = false;
   std::size_t features = 100;
   int compared = 0;
 

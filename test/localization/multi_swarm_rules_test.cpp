@@ -79,6 +79,14 @@ TEST(MultiSwarmRules, StrengthIsAMeanInWhichTheLastImageCountsAFifth) {
   EXPECT_NEAR(robot.look().rival_weight, 0.868 / (0.99 + 0.868), 1e-9);
 }
 
+TEST(MultiSwarmRules, TheCloudIsThatOfAllSwarms) {
+  StandingRobot robot(severalSwarms());
+  EXPECT_LT(robot.look().cloud_covariance_m2(0, 0), 500.0);
+  ASSERT_TRUE(robot.settle(2));
+  const double expected_m2 = 11.0 / 80.0 * kTwin_m * kTwin_m;  // about the leader, each particle counted the same
+  EXPECT_NEAR(robot.look().cloud_covariance_m2(0, 0), expected_m2, 0.3 * expected_m2);
+}
+
 TEST(MultiSwarmRules, ARivalLeadsWhenItIsATenthStronger) {
   for (const double twin : {0.86, 0.90}) {
     StandingRobot robot(severalSwarms(), 0.8, twin);

@@ -137,10 +137,13 @@ TEST(ParticleFilter, BeforeTheFirstImageAllWeighAlikeAndNothingMoves) {
   ParticleFilterConfig config;
   config.random_share = 0.0;
   ParticleFilter filter = makeFilter(world, "pf_gaussian", 7, config);
-  const std::vector<Particle> before = filter.particles();
-  for (const Particle& particle : before) EXPECT_DOUBLE_EQ(particle.weight, 1.0 / 300.0);
-  filter.update(world.from(onCircle(0.0)));
-  for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(filter.particles()[i].position_m, before[i].position_m);
+  for (int start = 0; start < 2; ++start) {
+    const std::vector<Particle> before = filter.particles();
+    for (const Particle& particle : before) EXPECT_DOUBLE_EQ(particle.weight, 1.0 / 300.0);
+    filter.update(world.from(onCircle(0.0)));
+    for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(filter.particles()[i].position_m, before[i].position_m);
+    filter.reset();
+  }
 }
 
 TEST(ParticleFilter, TheEstimateNamesItsTrainingImages) {

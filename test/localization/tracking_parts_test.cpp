@@ -45,6 +45,16 @@ TEST(Cloud, MomentsOfAKnownCloud) {
   EXPECT_DOUBLE_EQ(moments.spread().x(), std::sqrt(3.0));
 }
 
+TEST(Cloud, MomentsNeedNoWeightsOfSumOne) {
+  std::vector<Particle> cloud(2);
+  cloud[0].position_m = {1.0, 0.0};
+  cloud[1].position_m = {3.0, 0.0};
+  for (Particle& particle : cloud) particle.weight = 0.1;
+  const CloudMoments moments = momentsOf(cloud);
+  EXPECT_NEAR(moments.mean_m.x(), 2.0, 1e-12);
+  EXPECT_NEAR(moments.covariance_m2(0, 0), 1.0, 1e-12);
+}
+
 TEST(Cloud, CovarianceOfAModeIgnoresTheRest) {
   const std::vector<Particle> cloud{particleAt(1.0, 0.0, 0.2), particleAt(-1.0, 0.0, 0.2), particleAt(50.0, 0.0, 0.6)};
   EXPECT_DOUBLE_EQ(covarianceAbout({0.0, 0.0}, cloud, 5.0)(0, 0), 1.0);
