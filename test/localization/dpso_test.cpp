@@ -336,9 +336,9 @@ TEST(Dpso, StaysOutOfExcludedPlacesUnlessItsBestParticleIsThere) {
     swarm.exclude({place_m}, 15.0);
     swarm.attract(attractor_m);
     swarm.update(world.inTheDark());  // the particles are all over the area
-    double nearest_m = 1e9;
-    for (const Particle& p : swarm.particles()) nearest_m = std::min(nearest_m, (p.position_m - place_m).norm());
-    return nearest_m;
+    double least_m = 1e9;
+    for (const Particle& p : swarm.particles()) least_m = std::min(least_m, (p.position_m - place_m).norm());
+    return least_m;
   };
   EXPECT_GE(nearest_m(-here_m, here_m), 15.0);
   EXPECT_GE(nearest_m(here_m, Eigen::Vector2d(14.9, 0.0)), 15.0);
