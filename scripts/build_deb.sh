@@ -30,7 +30,8 @@ build_package() {
     -DVISUAL_LOCALIZATION_DEB_DEPENDS="${depends//$'\n'/, }" \
     && cmake --build "$build" --parallel "$jobs" \
     && rm -f "$build"/*.deb \
-    && (cd "$build" && cpack)
+    && (cd "$build" && cpack) \
+    && rm -rf "$build/_CPack_Packages"  # roslaunch would find each launch file twice in this checkout
 }
 
 install_package() {

@@ -22,13 +22,14 @@ run all. Exit code 0 when the run is complete, whatever survived.
 USAGE
 }
 
-# A copy of the checkout as it is, without what git ignores, so that the mutants never stand in the sources.
+# A copy of the checkout as it is, without what git ignores, so that the mutants never stand in the sources. Hidden, or
+# roslaunch would find each launch file twice in this checkout.
 copy_sources() {
-  rm -rf "$work/source"
-  mkdir -p "$work/source"
+  rm -rf "$work/.source"
+  mkdir -p "$work/.source"
   git -C "$repo" ls-files -z --cached --others --exclude-standard | (cd "$repo" && while IFS= read -r -d '' file; do
     if [[ -f $file ]]; then printf '%s\0' "$file"; fi  # not one that was deleted
-  done | xargs -0 cp --parents -t "$work/source")
+  done | xargs -0 cp --parents -t "$work/.source")
 }
 
 main() {
@@ -48,10 +49,10 @@ main() {
   export PATH=/usr/bin:$PATH
   local build=$work/build programs=()
   copy_sources
-  cmake -S "$work/source" -B "$build" -DCMAKE_BUILD_TYPE=Release -DVISUAL_LOCALIZATION_ROS=OFF \
+  cmake -S "$work/.source" -B "$build" -DCMAKE_BUILD_TYPE=Release -DVISUAL_LOCALIZATION_ROS=OFF \
     -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
     '-DCMAKE_CXX_FLAGS=-w -D_GLIBCXX_ASSERTIONS' -DCMAKE_CXX_FLAGS_RELEASE=-O2
-  "$repo/scripts/mutants.py" --source "$work/source" --build "$build" --out "$work/mutants.json" "${folders[@]}"
+  "$repo/scripts/mutants.py" --source "$work/.source" --build "$build" --out "$work/mutants.json" "${folders[@]}"
   cmake --build "$build" --parallel "$(nproc)" --target "${tests[@]/#/test_}"
   for test in "${tests[@]}"; do programs+=("$build/test/test_$test"); done
   "$repo/scripts/mutant_outcomes.py" run --mutants "$work/mutants.json" --out "$work/outcomes.jsonl" "${options[@]}" \

@@ -100,6 +100,14 @@ class InstallTest(unittest.TestCase):
             result = run('bash', '-c', f'source {PREFIX}/setup.bash && exec {PROGRAMS / name} --help')
             self.assertEqual(result.returncode, 0, name + ': ' + result.stderr)
 
+    def test_roslaunch_finds_each_launch_file_of_the_checkout_once(self):
+        """It looks into all folders of a package but the hidden ones."""
+        checkout = Path(__file__).resolve().parents[2]
+        for path in sorted((checkout / 'launch').glob('*.launch')):
+            find = f'import roslib.packages as p; print(p.find_resource("visual_localization", "{path.name}"))'
+            result = run(sys.executable, '-c', find, env={'PATH': '/usr/bin:/bin', 'ROS_PACKAGE_PATH': str(checkout)})
+            self.assertEqual(result.stdout.strip(), str([str(path)]), result.stderr)
+
     def test_programs_run_without_setup(self):
         for name in ('map_builder', 'map_edit', 'map_info', 'localize', 'evaluate', 'localizer_node', 'map_recorder'):
             result = run(PROGRAMS / name, '--help', env={'PATH': '/usr/bin:/bin'})
