@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <numeric>
 #include <utility>
@@ -59,6 +61,11 @@ inline World roundWorld() { return World(mapAt(circle(200, 30.0))); }
 /// The place `arc_m` along that round.
 inline Eigen::Vector2d onCircle(double arc_m) {
   return 30.0 * Eigen::Vector2d(std::cos(arc_m / 30.0), std::sin(arc_m / 30.0));
+}
+
+inline std::size_t countOf(const std::vector<Particle>& particles, ParticleKind kind) {
+  return static_cast<std::size_t>(
+      std::count_if(particles.begin(), particles.end(), [kind](const Particle& p) { return p.kind == kind; }));
 }
 
 inline double sumOfWeights(const std::vector<Particle>& particles) {
