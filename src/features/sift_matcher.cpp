@@ -116,8 +116,8 @@ double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vect
   return static_cast<double>(upperMedian(scales));
 }
 
-SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
-                        double max_angle_ratio) {
+std::vector<std::size_t> seenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
+                                double max_angle_ratio) {
   std::vector<bool> seen(features.size(), false);
   for (const SiftFeatures* neighbour : neighbours) {
     for (const FeatureMatch& match : matchOneWay(features, *neighbour, max_angle_ratio)) seen[match.a] = true;
@@ -126,7 +126,12 @@ SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const Si
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i]) kept.push_back(i);
   }
-  return features.subset(kept);
+  return kept;
+}
+
+SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
+                        double max_angle_ratio) {
+  return features.subset(seenIn(features, neighbours, max_angle_ratio));
 }
 
 void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, double max_angle_ratio,

@@ -178,17 +178,9 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
   extractWaiting();
   const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
-  if (!adjusts() && !(config_.spacing_m > 0.0) && !hasMount()) {
-    prune(*unpruned, sink, progress);
-    return;
-  }
-  ImageSpool pruned(resources_.spool_beside);
-  prune(
-      *unpruned, [&pruned](const TrainingImage& image) { pruned.append(image); }, progress);
-  const std::shared_ptr<const TrainingMap> map = pruned.finish(header_);
-  if (config_.geometry.enabled && config_.geometry.self_calibration) calibrate(*map);
+  if (config_.geometry.enabled && config_.geometry.self_calibration) calibrate(*unpruned);
   std::vector<std::optional<SessionGeometry>> geometries(header_.sessions.size());
-  if (adjusts()) geometries = geometryOf(*map, header_.sessions, fixes_, config_.geometry, resources_.threads);
+  if (adjusts()) geometries = geometryOf(*unpruned, header_.sessions, fixes_, config_.geometry, resources_.threads);
   for (std::size_t i = 0; i < geometries.size(); ++i) {
     if (!geometries[i]) continue;
     report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks
@@ -196,12 +188,19 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
     geometries[i].reset();
     header_.sessions[i].camera.reset();
   }
-  report_.images_thinned += writeThinned(*map, header_.sessions, std::move(geometries), config_, sink);
+  const PruningNeighbours neighbours(*unpruned);
+  report_.features_kept = 0;
+  const auto pruned = [&](std::size_t i, TrainingImage& image) {
+    prune(i, *unpruned, neighbours, image);
+    report_.features_kept += image.sift.size();
+    if (progress) progress(i + 1, unpruned->size());
+  };
+  report_.images_thinned += writeThinned(*unpruned, header_.sessions, std::move(geometries), config_, pruned, sink);
 }
 
 /// Those sessions that nobody has calibrated, as far as their images say how.
-void MapBuilder::calibrate(const TrainingMap& pruned) {
-  const auto cameras = calibrateByImages(pruned, header_.sessions, fixes_, config_.geometry, resources_.threads);
+void MapBuilder::calibrate(const TrainingMap& unpruned) {
+  const auto cameras = calibrateByImages(unpruned, header_.sessions, fixes_, config_.geometry, resources_.threads);
   for (std::size_t k = 0; k < cameras.size(); ++k) {
     if (!cameras[k]) continue;
     SessionImages& session = report_.session_images[k];
@@ -220,25 +219,14 @@ bool MapBuilder::hasCalibratedSession() const {
                      [](const Session& session) { return session.camera.has_value(); });
 }
 
-bool MapBuilder::hasMount() const {
-  return std::any_of(header_.sessions.begin(), header_.sessions.end(),
-                     [](const Session& session) { return session.mount.has_value(); });
-}
-
-void MapBuilder::prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress) {
-  const PruningNeighbours neighbours_of(unpruned);
-  report_.features_kept = 0;
-  for (std::size_t i = 0; i < unpruned.size(); ++i) {
-    TrainingImage image = unpruned.image(i);
-    const auto neighbours = neighboursOf(i, neighbours_of, unpruned);
-    // An image on its own has nothing to be compared with: it keeps all its features.
-    if (config_.prune && !neighbours.empty()) {
-      image.sift = keepSeenIn(image.sift, pointersTo(neighbours), config_.match.max_angle_ratio);
-    }
-    report_.features_kept += image.sift.size();
-    sink(image);
-    if (progress) progress(i + 1, unpruned.size());
-  }
+/// `image`: the i-th of `unpruned`, where it will be in the map. On its own it has nothing to be compared with: it
+/// keeps all its features.
+void MapBuilder::prune(std::size_t i, const TrainingMap& unpruned, const PruningNeighbours& neighbours_of,
+                       TrainingImage& image) const {
+  if (!config_.prune) return;
+  const auto neighbours = neighboursOf(i, neighbours_of, unpruned);
+  if (neighbours.empty()) return;
+  keepFeatures(seenIn(image.sift, pointersTo(neighbours), config_.match.max_angle_ratio), image);
 }
 
 std::shared_ptr<const TrainingMap> MapBuilder::build(const Progress& progress) {

@@ -215,6 +215,19 @@ void requireUsable(const ImageGeometry& geometry, std::size_t feature_count) {
   }
 }
 
+void keepFeatures(const std::vector<std::size_t>& kept, TrainingImage& image) {
+  image.sift = image.sift.subset(kept);
+  if (!image.geometry) return;
+  std::vector<SeenLandmark> landmarks;
+  for (SeenLandmark landmark : image.geometry->landmarks) {
+    const auto feature = std::lower_bound(kept.begin(), kept.end(), std::size_t{landmark.feature});
+    if (feature == kept.end() || *feature != landmark.feature) continue;
+    landmark.feature = static_cast<std::uint32_t>(feature - kept.begin());
+    landmarks.push_back(landmark);
+  }
+  image.geometry->landmarks = std::move(landmarks);
+}
+
 void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry) {
   const Eigen::Isometry3d base = mount.baseInMap(geometry.camera);
   image.position_m = base.translation().head<2>();
@@ -222,15 +235,16 @@ void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry
   image.geometry = std::move(geometry);
 }
 
-std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned, const std::vector<Session>& sessions,
+std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& unpruned,
+                                                       const std::vector<Session>& sessions,
                                                        const std::vector<std::vector<MapFix>>& fixes,
                                                        const GeometryConfig& config, std::size_t threads) {
-  const std::vector<std::size_t> begin = begins(pruned, sessions.size());
+  const std::vector<std::size_t> begin = begins(unpruned, sessions.size());
   std::vector<UnadjustedSession> calibrated;
   std::vector<std::size_t> which;
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     if (!sessions[k].camera) continue;
-    calibrated.push_back(unadjusted(pruned, begin[k], begin[k + 1], sessions[k], fixes[k]));
+    calibrated.push_back(unadjusted(unpruned, begin[k], begin[k + 1], sessions[k], fixes[k]));
     which.push_back(k);
   }
   std::vector<SessionGeometry> adjusted = adjustSessions(calibrated, config, threads);
@@ -239,35 +253,37 @@ std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned
   return geometries;
 }
 
-std::vector<std::optional<CameraModel>> calibrateByImages(const TrainingMap& pruned,
+std::vector<std::optional<CameraModel>> calibrateByImages(const TrainingMap& unpruned,
                                                           const std::vector<Session>& sessions,
                                                           const std::vector<std::vector<MapFix>>& fixes,
                                                           const GeometryConfig& config, std::size_t threads) {
-  const std::vector<std::size_t> begin = begins(pruned, sessions.size());
+  const std::vector<std::size_t> begin = begins(unpruned, sessions.size());
   std::vector<std::optional<CameraModel>> cameras(sessions.size());
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     if (sessions[k].camera) continue;
-    cameras[k] = calibrateByImages(unadjusted(pruned, begin[k], begin[k + 1], sessions[k], fixes[k]),
-                                   pruned.header().image_size, config, threads);
+    cameras[k] = calibrateByImages(unadjusted(unpruned, begin[k], begin[k + 1], sessions[k], fixes[k]),
+                                   unpruned.header().image_size, config, threads);
   }
   return cameras;
 }
 
-std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& sessions,
+std::size_t writeThinned(const TrainingMap& unpruned, const std::vector<Session>& sessions,
                          std::vector<std::optional<SessionGeometry>> geometries, const MapBuilderConfig& config,
+                         const std::function<void(std::size_t i, TrainingImage&)>& prune,
                          const std::function<void(const TrainingImage&)>& sink) {
-  const std::vector<std::size_t> begin = begins(pruned, geometries.size());
+  const std::vector<std::size_t> begin = begins(unpruned, geometries.size());
   std::size_t thinned = 0;
   for (std::size_t k = 0; k < geometries.size(); ++k) {
     SpacingFilter spacing(geometries[k] ? std::max(config.spacing_m, config.geometry.spacing_m) : config.spacing_m);
     for (std::size_t i = begin[k]; i < begin[k + 1]; ++i) {
-      TrainingImage image = pruned.image(i);
+      TrainingImage image = unpruned.image(i);
       const SensorMount mount = sessions[k].mount.value_or(SensorMount());
       if (geometries[k] && geometries[k]->images[i - begin[k]]) {
         placeByCamera(image, mount, std::move(*geometries[k]->images[i - begin[k]]));
       } else {
         placeByAntenna(image, mount);
       }
+      prune(i, image);
       if (spacing.keeps(image.position_m)) {
         sink(image);
       } else {

@@ -88,25 +88,31 @@ constexpr double kLongestOffset_m = 1e5;
 /// std::runtime_error.
 void requireUsable(const ImageGeometry& geometry, std::size_t feature_count);
 
+/// Of the image's features keeps those with these indices, which are in order, and the landmarks that they show.
+void keepFeatures(const std::vector<std::size_t>& kept, TrainingImage& image);
+
 /// The image is where the robot was by the pose of its camera.
 void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry);
 
-/// Landmarks and poses of the sessions that have a camera, from their pruned images, which follow each other session by
-/// session. `fixes`: of each session.
-std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& pruned, const std::vector<Session>& sessions,
+/// Landmarks and poses of the sessions that have a camera, from their images, which follow each other session by
+/// session. Not pruned: what only images farther apart have in common holds the path together as well. `fixes`: of each
+/// session.
+std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& unpruned,
+                                                       const std::vector<Session>& sessions,
                                                        const std::vector<std::vector<MapFix>>& fixes,
                                                        const GeometryConfig& config, std::size_t threads);
 
 /// Cameras of the sessions that have none, by their images: see calibrateByImages() of a single one.
-std::vector<std::optional<CameraModel>> calibrateByImages(const TrainingMap& pruned,
+std::vector<std::optional<CameraModel>> calibrateByImages(const TrainingMap& unpruned,
                                                           const std::vector<Session>& sessions,
                                                           const std::vector<std::vector<MapFix>>& fixes,
                                                           const GeometryConfig& config, std::size_t threads);
 
-/// Gives the images to `sink` where the adjustment has the robot, but for those that are too close to the one before
-/// (map/spacing, geometry/spacing); the number of these is returned.
-std::size_t writeThinned(const TrainingMap& pruned, const std::vector<Session>& sessions,
+/// Gives the images to `sink` where the adjustment has the robot, each after `prune`, but for those that are too close
+/// to the one before (map/spacing, geometry/spacing); the number of these is returned.
+std::size_t writeThinned(const TrainingMap& unpruned, const std::vector<Session>& sessions,
                          std::vector<std::optional<SessionGeometry>> geometries, const MapBuilderConfig& config,
+                         const std::function<void(std::size_t i, TrainingImage&)>& prune,
                          const std::function<void(const TrainingImage&)>& sink);
 
 }  // namespace visual_localization

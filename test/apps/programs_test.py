@@ -180,6 +180,23 @@ class ProgramsTest(ProgramTest):
             self.assert_refused(run(*program, '--output', bad, '--camera-info', bad), 2, 'would overwrite')
         self.assertFalse(output.exists())
 
+    def test_the_adjustment_takes_the_features_that_pruning_drops(self):
+        tables = []
+        for prune in ('true', 'false'):
+            config, output, table = (self.folder / f'{prune}.{ending}' for ending in ('yaml', 'map', 'csv'))
+            config.write_text(f'map: {{prune: {prune}}}\n', encoding='utf-8')
+            for command in (('map_builder', '--bag', self.short, '--config', config, '--output', output),
+                            ('map_info', output, '--export-csv', table)):
+                result = run(*command)
+                self.assertEqual(result.returncode, 0, result.stderr)
+            tables.append(read_track(table))
+        pruned, unpruned = ([(row['stamp'], row['east_m'], row['north_m'], row['yaw_rad']) for row in table]
+                            for table in tables)
+        self.assertGreater(len(pruned), 5)
+        self.assertEqual(pruned, unpruned)
+        self.assertGreater(sum(int(row['features']) for row in tables[1]),
+                           1.5 * sum(int(row['features']) for row in tables[0]))
+
     def test_an_unknown_parameter_is_named(self):
         config = self.folder / 'config.yaml'
         config.write_text('dpso:\n  inertai: 0.5\n', encoding='utf-8')

@@ -3,6 +3,8 @@
 
 #include "base/numbers.h"
 #include "map/extraction_pool.h"
+#include "map/map_geometry.h"
+#include "test/support/example_map.h"
 
 namespace visual_localization {
 namespace {
@@ -76,6 +78,33 @@ TEST(PruningNeighbours, AnImageOnItsOwnHasNone) {
   const PruningNeighbours neighbours(*map);
   EXPECT_THAT(neighbours.of(0), IsEmpty());
   EXPECT_THAT(neighbours.of(1), ElementsAre(2U));
+}
+
+TEST(KeepFeatures, KeepsTheLandmarksThatTheyShow) {
+  TrainingImage image = test::exampleImages(2, 8).back();
+  const TrainingImage all = image;
+  image.geometry = test::exampleGeometry(8);  // features 1, 3, 5 and 7 show landmarks
+  const std::vector<SeenLandmark> landmarks = image.geometry->landmarks;
+  keepFeatures({0, 3, 4, 5}, image);
+  ASSERT_EQ(image.sift.size(), 4U);
+  EXPECT_EQ(image.sift.keypoints()[3].x_px, all.sift.keypoints()[5].x_px);
+  ASSERT_EQ(image.geometry->landmarks.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(image.geometry->landmarks[i].feature, 1U + 2U * i);
+    EXPECT_EQ(image.geometry->landmarks[i].id, landmarks[1 + i].id);
+    EXPECT_EQ(image.geometry->landmarks[i].offset_m, landmarks[1 + i].offset_m);
+  }
+  keepFeatures({}, image);
+  EXPECT_TRUE(image.sift.empty());
+  EXPECT_TRUE(image.geometry->landmarks.empty());
+}
+
+TEST(KeepFeatures, NeedsNoGeometry) {
+  TrainingImage image = test::exampleImages(2, 8).back();
+  image.geometry.reset();
+  keepFeatures({7}, image);
+  EXPECT_EQ(image.sift.size(), 1U);
+  EXPECT_FALSE(image.geometry);
 }
 
 }  // namespace

@@ -45,9 +45,13 @@ void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeature
 /// look, and so how much nearer they are, seen from a. 1 without matches of sizes above 0.
 double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vector<FeatureMatch>& matches);
 
-/// Drops the "noisy" features that appear in one image only (Weiss et al., section III): keeps those of
-/// `features` that match (one way, ratio test) a feature of at least one of `neighbours`. The neighbours are
-/// given unpruned. Order is kept.
+/// Without the "noisy" features that appear in one image only (Weiss et al., section III): the indices of those of
+/// `features`, in order, that match (one way, ratio test) a feature of at least one of `neighbours`. The neighbours are
+/// given unpruned.
+std::vector<std::size_t> seenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
+                                double max_angle_ratio);
+
+/// The features themselves.
 SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
                         double max_angle_ratio);
 

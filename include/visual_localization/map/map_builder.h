@@ -26,6 +26,7 @@ class ExtractionPool;
 class ImageSpool;
 class MapWriter;
 class PartialFile;
+class PruningNeighbours;
 struct MapFix;
 struct RawImage;
 
@@ -128,7 +129,7 @@ class MapBuilder {
   /// ratio are left out: no calibration holds for them. Throws CameraError when the session's camera or mask is for
   /// images of another shape, and std::runtime_error when the map's images would be too large.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
-  /// Prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
+  /// Adjusts, prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
   std::shared_ptr<const TrainingMap> build(const Progress& progress = {});
   /// The same map as a file, written image by image: what is in memory does not grow with the map, but for the poses.
   /// Throws MapStoreError besides.
@@ -147,13 +148,13 @@ class MapBuilder {
   bool fits(cv::Size recorded);
   void fitCamera();
   void extractWaiting();
-  void calibrate(const TrainingMap& pruned);
+  void calibrate(const TrainingMap& unpruned);
   void finish(const Sink& sink, const Progress& progress);
   void write(MapWriter& writer, const Progress& progress);
-  void prune(const TrainingMap& unpruned, const Sink& sink, const Progress& progress);
+  void prune(std::size_t i, const TrainingMap& unpruned, const PruningNeighbours& neighbours_of,
+             TrainingImage& image) const;
   bool hasCalibratedSession() const;
   bool adjusts() const;
-  bool hasMount() const;
 
   MapBuilderConfig config_;
   MapBuilderResources resources_;
