@@ -50,9 +50,9 @@ void MetricConfig::declare(ParameterVisitor& visitor) {
                100.0);
   visitor.real({"metric/max_gap", "s", "the motion predicts poses at most this long after the last one"}, max_gap_s,
                0.0, 3600.0);
-  visitor.real(
-      {"metric/max_prediction_error", "m", "farthest of a pose from the predicted one, plus half the way since"},
-      max_prediction_error_m, 0.01, 1000.0);
+  visitor.real({"metric/max_prediction_error", "m",
+                "farthest of a pose from the predicted one, plus half the way since and twice the pose's sigma"},
+               max_prediction_error_m, 0.01, 1000.0);
   visitor.real({"metric/max_focal_error", "1",
                 "no pose is believed while the last images ask for a focal length farther from the calibration's"},
                max_focal_error, 0.001, 1.0);

@@ -245,7 +245,8 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
   return counts;
 }
 
-MetricPose PoseVerifier::accepted(MetricPose pose) {
+std::optional<MetricPose> PoseVerifier::accepted(MetricPose pose) {
+  if (isAside(pose)) return std::nullopt;
   const bool clear = pose.inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isPredicted(pose);
   const std::optional<bool> odometry_agrees = odometryAgrees(pose);
   pose.confirmed = !isElsewhere(pose, odometry_agrees) && focal_.confirms() && clear;
@@ -267,6 +268,7 @@ MetricPose PoseVerifier::accepted(MetricPose pose) {
 namespace {
 
 constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way
+constexpr double kUnknownWay_m = 1.0;    ///< the same where one pose tells no speed
 constexpr double kTurn_rad_per_m = 0.1;  ///< standard deviation of how much it turns on the way
 constexpr double kSlipped_m = 0.3;       ///< odometry that is off by more, beside its own uncertainty, is wrong
 constexpr double kSlipped_rad = 0.3;
@@ -316,7 +318,7 @@ std::optional<PoseVerifier::Prediction> PoseVerifier::byVelocity() const {
   Prediction prediction;
   prediction.position_m = last.base.translation().head<2>() + way_m;
   prediction.yaw_rad = yawOf(last.base);
-  prediction.sigma_m = kTurn * way_m.norm();
+  prediction.sigma_m = last_->velocity_mps ? kTurn * way_m.norm() : kUnknownWay_m;
   prediction.covariance_m2 =
       covariance.topLeftCorner<2, 2>() + prediction.sigma_m * prediction.sigma_m * Eigen::Matrix2d::Identity();
   const double turn_rad = kTurn_rad_per_m * way_m.norm();
@@ -328,9 +330,20 @@ std::optional<PoseVerifier::Prediction> PoseVerifier::byVelocity() const {
 bool PoseVerifier::isPredicted(const MetricPose& pose) const {
   const auto agrees = [&](const std::optional<Prediction>& expected) {
     return expected && (pose.base.translation().head<2>() - expected->position_m).norm() <=
-                           config_.max_prediction_error_m + expected->sigma_m;
+                           config_.max_prediction_error_m + expected->sigma_m + 2.0 * pose.sigma_m();
   };
   return agrees(byOdometry()) || agrees(byVelocity());
+}
+
+/// Whether the landmarks may be those of a thing that was moved since the day of the map, a parked car: the motion is
+/// known from the last two images, and the pose is beside where it leads. A robot that was pushed aside is there in the
+/// next image as well, and a kidnapped one is farther away.
+bool PoseVerifier::isAside(const MetricPose& pose) const {
+  if (images_since_ != 1 || !last_) return false;
+  const std::optional<Prediction> expected = predicted();
+  if (!expected || !(expected->by_odometry || last_->velocity_mps) || odometryAgrees(pose).value_or(false))
+    return false;
+  return !isPredicted(pose) && (pose.base.translation().head<2>() - expected->position_m).norm() < kApart_m;
 }
 
 /// Whether odometry since the last verified pose leads to this one; nothing when it does not know.

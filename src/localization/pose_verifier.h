@@ -148,7 +148,8 @@ class PoseVerifier {
   std::optional<bool> odometryAgrees(const MetricPose& pose) const;
   void judgeOdometry(bool agrees);
   bool isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees);
-  MetricPose accepted(MetricPose pose);
+  bool isAside(const MetricPose& pose) const;
+  std::optional<MetricPose> accepted(MetricPose pose);
 
   const TrainingMap& map_;
   MetricConfig config_;

@@ -201,12 +201,12 @@ TEST_F(PosePrediction, NothingIsPredictedForTimesBeforeThePose) {
   EXPECT_FALSE(verifier_.predicted());
 }
 
-// Four metres a second predict four metres on, and that to 2 m of its own beside the 2 m that are allowed.
+// Four metres a second predict four metres on, and that to 2 m of its own beside the metre that is allowed.
 TEST_F(PosePrediction, AFastRobotMayBeFartherFromItsPrediction) {
   ASSERT_TRUE(verifyNear(0.0, 6));
   ASSERT_TRUE(verifyNear(1.0, 10));
-  const auto few = street_.fewSeenFrom(street_.trueNear(11, kBeside_m), 14);
-  EXPECT_TRUE(verify(2.0, few, {11})) << "3 m short of the prediction";
+  const auto few = street_.fewSeenFrom(street_.trueNear(12, kBeside_m), 14);
+  EXPECT_TRUE(verify(2.0, few, {12})) << "2 m short of the prediction";
 }
 
 }  // namespace

@@ -183,7 +183,7 @@ TEST_F(PoseVerifierTest, AsksForFewerInliersNearThePrediction) {
   EXPECT_LT(error_m(*pose, 11), 4.0 * pose->sigma_m() + 0.02);
 }
 
-// Four metres ahead of the last pose, of which no motion is known; two are allowed.
+// Four metres ahead of the last pose, of which no motion is known; 2 m and two sigmas are allowed.
 TEST_F(PoseVerifierTest, AsksForMoreInliersFarFromThePrediction) {
   ASSERT_TRUE(verifyNear(0.0, 6));
   const auto few = street_.fewSeenFrom(street_.trueNear(10, kBeside_m), 6);
@@ -202,6 +202,24 @@ TEST_F(PoseVerifierTest, PredictsForSomeSecondsOnly) {
   const auto few = street_.fewSeenFrom(street_.trueNear(10, kBeside_m), 10);
   EXPECT_TRUE(verify(4.9, few, {10}));
   EXPECT_FALSE(verify(10.0, few, {10})) << "5 s after the last pose nothing is predicted any more";
+}
+
+// Landmarks of a car that was parked elsewhere on the day of the map would agree like that.
+TEST_F(PoseVerifierTest, DoesNotBelieveAPoseAsideOfTheMotionUntilTheNextImage) {
+  const Eigen::Vector3d aside_m = kBeside_m + Eigen::Vector3d(3.0, 0.0, 0.0);
+  const auto seenAside = [&](std::size_t i) { return street_.seenFrom(street_.trueNear(i, aside_m)); };
+  ASSERT_TRUE(verifyNear(0.0, 10));
+  EXPECT_TRUE(verify(1.0, seenAside(11), {10, 11, 12})) << "nobody knows how fast the robot is";
+  verifier_.reset();
+  ASSERT_TRUE(verifyNear(10.0, 10));
+  ASSERT_TRUE(verifyNear(11.0, 11));
+  EXPECT_FALSE(verify(12.0, seenAside(12), {11, 12, 13}));
+  EXPECT_EQ(verifier_.imagesSince(), 1U);
+  ASSERT_TRUE(verifyNear(13.0, 13)) << "the motion before leads on";
+  EXPECT_FALSE(verify(14.0, seenAside(14), {13, 14, 15}));
+  const auto again = verify(15.0, seenAside(15), {14, 15, 16});
+  ASSERT_TRUE(again) << "the robot was pushed";
+  EXPECT_LT((again->camera.position_m - street_.mappedNear(15, aside_m).position_m).norm(), 0.1);
 }
 
 TEST_F(PoseVerifierTest, ForgetsTheMotionOnReset) {

@@ -62,7 +62,7 @@ struct MetricConfig {
   double sigma_factor = 1.4;
   double max_sigma_m = 0.3;
   double max_gap_s = 5.0;
-  double max_prediction_error_m = 2.0;
+  double max_prediction_error_m = 1.0;
   double max_focal_error = 0.01;
 
   void declare(ParameterVisitor& visitor);
