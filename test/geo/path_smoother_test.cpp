@@ -138,7 +138,7 @@ TEST(PathSmoother, ARobotThatStoodIsNotMadeToDrive) {
   EXPECT_NEAR(lengthOf(path, 2.0, 8.0), 6.0, 0.1);
 }
 
-TEST(PathSmoother, TwiceAsFastItIsTheSamePath) {
+TEST(PathSmoother, FasterOrSlowerItIsTheSamePath) {
   const auto pathAt = [](double mps) {
     std::vector<PathSample> samples;  // a right angle, not seen
     for (int i = 0; i <= 100; ++i) {
@@ -148,11 +148,13 @@ TEST(PathSmoother, TwiceAsFastItIsTheSamePath) {
     }
     return smoothPath(samples, {1.0 / mps, 1.0, mps, 1.0});
   };
-  const SmoothedPath slow = pathAt(1.0);
-  const SmoothedPath fast = pathAt(2.0);
-  ASSERT_EQ(slow.positions_m.size(), fast.positions_m.size());
-  for (std::size_t k = 0; k < slow.positions_m.size(); ++k) {
-    EXPECT_LT((slow.positions_m[k] - fast.positions_m[k]).norm(), 1e-6) << k;
+  const SmoothedPath walking = pathAt(1.0);
+  for (const double mps : {0.25, 2.0}) {
+    const SmoothedPath other = pathAt(mps);
+    ASSERT_EQ(other.positions_m.size(), walking.positions_m.size());
+    for (std::size_t k = 0; k < walking.positions_m.size(); ++k) {
+      EXPECT_LT((other.positions_m[k] - walking.positions_m[k]).norm(), 1e-6) << mps << ' ' << k;
+    }
   }
 }
 

@@ -162,6 +162,19 @@ TEST(TrajectoryCleaner, HowFarANodeMayBeAsideFollowsFromTheNoiseOfItsFixes) {
   }
 }
 
+// Exact fixes in pairs, of a robot at 5 m/s: their second differences are the intervals, not noise.
+TEST(TrajectoryCleaner, UnevenIntervalsAreNoNoise) {
+  std::vector<Fix> fixes;
+  const LocalFrame frame(test::kDatum);
+  for (int i = 0; i < 400; ++i) {
+    const double time_s = 0.2 * i + (i % 2 == 0 ? 0.0 : -0.15);
+    fixes.push_back({stampOf(time_s), frame.toGeodetic(Eigen::Vector2d::Constant(3.5 * time_s)), true});
+  }
+  for (std::size_t i = 200; i < 208; ++i) shift(fixes[i], {1.5, -1.5});
+  const CleanedTrajectory cleaned = clean(fixes);
+  for (std::size_t i = 200; i < 208; ++i) EXPECT_EQ(cleaned.verdicts[i], FixVerdict::kMultipath) << i;
+}
+
 TEST(TrajectoryCleaner, WhatIsWrongAtTheStartGrowsAtItsEndToo) {
   std::vector<Fix> fixes = record(block, 100.0, kRate, 0.01);
   for (std::size_t i = 0; i < 20; ++i) shift(fixes[i], {0.0, 12.0});  // two nodes

@@ -91,6 +91,17 @@ TEST(Dpso, AStraightStreetHasNoSecondAxis) {
   EXPECT_TRUE(std::isfinite(tracker.tuning().v0));
 }
 
+TEST(Dpso, AnAxisOfDecimetresIsOne) {
+  World world(test::mapAt({{0.0, 0.0}, {20.0, 0.0}, {20.0, 0.5}, {0.0, 0.5}}));
+  DpsoConfig config;
+  config.quantum_share = 0.0;
+  config.speed_limit = "norm";
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  for (int image = 0; image < 3; ++image) swarm.update(world.inTheDark());
+  const auto moves = [](const Particle& particle) { return particle.velocity_m.y() != 0.0; };
+  EXPECT_TRUE(std::any_of(swarm.particles().begin(), swarm.particles().end(), moves));
+}
+
 TEST(Dpso, AMapOfOneImageWorks) {
   World world(test::mapAt({{3.0, 4.0}}));
   Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
@@ -307,6 +318,24 @@ TEST(Dpso, AParticleThatTheCorridorHoldsKeepsOnlyTheSpeedAlongIt) {
     ++held;
   }
   EXPECT_GT(held, 10);
+}
+
+TEST(Dpso, InsideTheCorridorNobodyIsHeld) {
+  World world(test::mapAt({{50.0, 20.0}}));
+  DpsoConfig config;
+  config.confine = "corridor";
+  config.corridor_m = 2.0;
+  config.phi0 = 0.0;
+  config.recovery = "none";
+  config.quantum_share = 0.0;
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  swarm.reset(around({50.0, 20.0}, 0.3));
+  const std::vector<Particle> before = swarm.particles();
+  swarm.update(world.inTheDark());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const Eigen::Vector2d expected_m = before[i].position_m + swarm.particles()[i].velocity_m;
+    EXPECT_LT((swarm.particles()[i].position_m - expected_m).norm(), 1e-9) << i;
+  }
 }
 
 TEST(Dpso, BeforeTheFirstImageThereIsNoWay) {

@@ -178,6 +178,16 @@ TEST(MapSweep, ThinnedOutItStillDrawsByWeight) {
   EXPECT_EQ(best, (std::set<std::size_t>{27, 28, 29}));
 }
 
+TEST(MapSweep, TheMostSimilarOfOneImageAreOfAnotherPartThanThoseOfTheNext) {
+  MadeUpSweep sweep(30, 10);
+  std::set<std::size_t> best;
+  for (int image = 0; image < 3; ++image) {
+    sweep.startImage([](std::size_t i) { return i >= 27 ? 1.0 : 0.0; });
+    best.insert(sweep.mostSimilar(1).front());
+  }
+  EXPECT_EQ(best, (std::set<std::size_t>{27, 28, 29}));
+}
+
 TEST(MapSweep, AMapOfOneImageLeavesNoChoice) {
   for (const double weight : {0.0, 0.7}) {
     MadeUpSweep sweep(1, 1);

@@ -71,5 +71,22 @@ TEST_F(SessionTrial, TheSessionThatShowsFewerInliersIsNot) {
   EXPECT_EQ(chosenOnTheWay(kEvening_ns, 12), std::vector<std::size_t>(12, 1));
 }
 
+TEST_F(SessionTrial, WhereTheSessionShowsTooFewLandmarksThoseOfAllAreTried) {
+  const SiftFeatures seen = street_.seenFrom(street_.trueNear(20, Eigen::Vector3d::Zero()));
+  const auto inliersAt = [&](std::size_t training_image) {
+    verifier_.reset();
+    verifier_.startImage(0, seen, street_.camera());
+    const auto pose = verifier_.nearOneOf({training_image});
+    return pose ? pose->inliers : 0;
+  };
+  const std::size_t of_morning = inliersAt(20);
+  ASSERT_GT(of_morning, 0U);
+  ASSERT_GT(inliersAt(street_.map().size() + 20), of_morning);
+  MetricConfig config;
+  config.min_inliers = static_cast<int>(of_morning) + 1;
+  verifier_.configure(config);
+  EXPECT_GT(inliersAt(20), of_morning);
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -93,6 +93,8 @@ TEST(Scores, ANewImageForgetsTheOldScores) {
   Scores scores(2);
   scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{0.1, 0.1, 1}; });
   EXPECT_EQ(scores[1].similarity, 0.1);
+  scores.count({0, 1});
+  EXPECT_EQ(scores.comparisons(), 2u);
   scores.startImage(FeatureKind::kGlobal, [](FeatureKind, std::size_t) { return Score{0.2, 0.2, 2}; });
   EXPECT_EQ(scores.comparisons(), 0u);
   EXPECT_EQ(scores[1].similarity, 0.2);
