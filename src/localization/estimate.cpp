@@ -43,6 +43,9 @@ void MetricConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"metric/min_inliers", "1", "a pose on fewer landmarks is not believed"}, min_inliers, 6, 10000);
   visitor.integer({"metric/min_inliers_predicted", "1", "the same where the motion since the last pose predicts it"},
                   min_inliers_predicted, 6, 10000);
+  visitor.integer({"metric/min_inliers_tracking", "1",
+                   "TRACKING needs so many inliers, those of the poses before that this one follows included"},
+                  min_inliers_tracking, 6, 1000000);
   visitor.real({"metric/sigma_factor", "1",
                 "landmarks err alike: this multiple of the standard deviations that they would give a pose one by one"},
                sigma_factor, 0.1, 100.0);

@@ -74,6 +74,7 @@ void PoseVerifier::configure(const MetricConfig& config) {
 
 void PoseVerifier::reset() {
   last_.reset();
+  inliers_together_ = 0;
   elsewhere_ = 0;
   moving_ = {};
   moving_gain_ = 0.0;
@@ -247,7 +248,8 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
 
 std::optional<MetricPose> PoseVerifier::accepted(MetricPose pose) {
   if (isAside(pose)) return std::nullopt;
-  const bool clear = pose.inliers >= 2 * static_cast<std::size_t>(config_.min_inliers) || isPredicted(pose);
+  inliers_together_ = (follows(pose) ? inliers_together_ : 0) + pose.inliers;
+  const bool clear = inliers_together_ >= static_cast<std::size_t>(config_.min_inliers_tracking);
   const std::optional<bool> odometry_agrees = odometryAgrees(pose);
   pose.confirmed = !isElsewhere(pose, odometry_agrees) && focal_.confirms() && clear;
   if (odometry_agrees) judgeOdometry(*odometry_agrees);
@@ -256,6 +258,7 @@ std::optional<MetricPose> PoseVerifier::accepted(MetricPose pose) {
     const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
     if (elapsed_s > 0.0 && elapsed_s <= config_.max_gap_s) {
       known.velocity_mps = (pose.base.translation() - last_->pose.base.translation()).head<2>() / elapsed_s;
+      if (isPredicted(pose)) speed_mps_ = known.velocity_mps->norm();  // two that agree
     }
   }
   last_ = known;
@@ -269,6 +272,7 @@ namespace {
 
 constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way
 constexpr double kUnknownWay_m = 1.0;    ///< the same where one pose tells no speed
+constexpr double kShortWay_m = 10.0;     ///< after a longer one a robot may be anywhere
 constexpr double kTurn_rad_per_m = 0.1;  ///< standard deviation of how much it turns on the way
 constexpr double kSlipped_m = 0.3;       ///< odometry that is off by more, beside its own uncertainty, is wrong
 constexpr double kSlipped_rad = 0.3;
@@ -333,6 +337,17 @@ bool PoseVerifier::isPredicted(const MetricPose& pose) const {
                            config_.max_prediction_error_m + expected->sigma_m + 2.0 * pose.sigma_m();
   };
   return agrees(byOdometry()) || agrees(byVelocity());
+}
+
+/// Whether the robot may have driven here since the last verified pose: it is where the motion leads, or after a short
+/// way no farther than by the speed that it had.
+bool PoseVerifier::follows(const MetricPose& pose) const {
+  if (isPredicted(pose)) return true;
+  if (!last_ || !speed_mps_) return false;
+  const double way_m = *speed_mps_ * secondsBetween(last_->stamp_ns, stamp_ns_);
+  if (!(way_m >= 0.0 && way_m <= kShortWay_m)) return false;
+  const double driven_m = (pose.base.translation() - last_->pose.base.translation()).head<2>().norm();
+  return driven_m <= config_.max_prediction_error_m + (1.0 + kTurn) * way_m;
 }
 
 /// Whether the landmarks may be those of a thing that was moved since the day of the map, a parked car: the motion is

@@ -145,6 +145,7 @@ class PoseVerifier {
   std::optional<Prediction> byVelocity() const;
   std::optional<MetricPose> near(const std::optional<Prediction>& prediction);
   bool isPredicted(const MetricPose& pose) const;
+  bool follows(const MetricPose& pose) const;
   std::optional<bool> odometryAgrees(const MetricPose& pose) const;
   void judgeOdometry(bool agrees);
   bool isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees);
@@ -162,6 +163,8 @@ class PoseVerifier {
   OdometryConfig odometry_config_;
   std::size_t distrust_ = 0;   ///< verified poses that odometry must agree with before it is believed again
   std::size_t elsewhere_ = 0;  ///< verified poses that must follow before one that odometry contradicts is confirmed
+  std::optional<double> speed_mps_;   ///< of the last two verified poses that agree about it
+  std::size_t inliers_together_ = 0;  ///< of verified poses that follow each other
   std::size_t images_since_ = 0;
   std::int64_t stamp_ns_ = 0;
   const SiftFeatures* features_ = nullptr;

@@ -83,8 +83,9 @@ TEST_F(CarriedRobot, WasNotCarriedWhereAWrongHeadingExplainsIt) {
   config_.turn_sigma_rad_m = 0.03;
   verifier_.useOdometry(track_, config_);
   MetricConfig config;
-  config.min_inliers = 10;  // twice that are few where odometry leads aside
+  config.min_inliers = 10;  // few where odometry leads aside
   config.min_inliers_predicted = 10;
+  config.min_inliers_tracking = 20;
   verifier_.configure(config);
   const std::optional<MetricPose> begin = verifyNear(1.0, 10);
   ASSERT_TRUE(begin);

@@ -85,6 +85,7 @@ TEST_F(MetricEstimate, SaysWhatItRestsOn) {
 TEST_F(MetricEstimate, AVerifiedPoseBringsTheParticles) {
   LocalizerConfig config;
   config.state.max_step_m = 2.0;
+  config.metric.min_inliers_tracking = config.metric.min_inliers;
   make(config);
   for (std::size_t i = 3; i < 8; ++i) see(i);
   const Estimate estimate = see(40);
@@ -102,7 +103,7 @@ TEST_F(MetricEstimate, APoseThatIsNotConfirmedLeavesTheParticles) {
   for (std::size_t i = 3; i < 8; ++i) see(i);
   const Estimate estimate = show(street_.fewSeenFrom(street_.trueNear(40, kHere_m), 40, 30));
   ASSERT_TRUE(estimate.metric);
-  ASSERT_FALSE(estimate.metric->confirmed) << "fewer than twice the inliers, and nothing predicts it";
+  ASSERT_FALSE(estimate.metric->confirmed) << "few inliers, and nothing leads there";
   EXPECT_FALSE(estimate.evidence.verified.value_or(true));
   double farthest_m = 0.0;
   for (const Particle& particle : localizer_->particles()) {

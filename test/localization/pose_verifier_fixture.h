@@ -55,6 +55,10 @@ class PoseVerifierTest : public testing::Test {
   std::optional<MetricPose> verifyNear(double time_s, std::size_t i) {
     return verify(time_s, street_.seenFrom(street_.trueNear(i, kBeside_m)), {i - 1, i, i + 1});
   }
+  /// An image with only some features: enough for a pose, not for its being confirmed.
+  std::optional<MetricPose> seeSome(double time_s, std::size_t i) {
+    return verify(time_s, street_.fewSeenFrom(street_.trueNear(i, kBeside_m), i, 30), {i - 1, i, i + 1});
+  }
   /// Of the position, metres.
   double error_m(const MetricPose& pose, std::size_t i) const {
     return (pose.camera.position_m - street_.mappedNear(i, kBeside_m).position_m).norm();

@@ -59,6 +59,7 @@ struct MetricConfig {
   double keypoint_sigma_px = 0.3;
   int min_inliers = 20;
   int min_inliers_predicted = 12;
+  int min_inliers_tracking = 80;
   double sigma_factor = 1.4;
   double max_sigma_m = 0.3;
   double max_gap_s = 5.0;
@@ -80,7 +81,7 @@ struct MetricPose {
   /// Of the map there, the same for images near each other: no average takes it away.
   Covariance map_covariance = Covariance::Zero();
   std::size_t inliers = 0;
-  bool confirmed = false;  ///< by the motion since the last pose, or by twice the inliers that are asked for
+  bool confirmed = false;  ///< enough inliers, those of the poses before that it follows included
   /// Median distance of an inlier from its landmark's projection, pixels of the map's size.
   double reprojection_px = 0.0;
 
