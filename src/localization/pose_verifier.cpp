@@ -253,11 +253,12 @@ std::optional<MetricPose> PoseVerifier::accepted(MetricPose pose) {
   const std::optional<bool> odometry_agrees = odometryAgrees(pose);
   pose.confirmed = !isElsewhere(pose, odometry_agrees) && focal_.confirms() && clear;
   if (odometry_agrees) judgeOdometry(*odometry_agrees);
-  Known known{stamp_ns_, pose, {}, true};
+  Known known{stamp_ns_, pose, {}, 0.0, true};
   if (last_ && last_->velocity_holds) {
     const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
     if (elapsed_s > 0.0 && elapsed_s <= config_.max_gap_s) {
       known.velocity_mps = (pose.base.translation() - last_->pose.base.translation()).head<2>() / elapsed_s;
+      known.turned_rad = angleDifference(yawOf(last_->pose.base), yawOf(pose.base));
       if (isPredicted(pose)) speed_mps_ = known.velocity_mps->norm();  // two that agree
     }
   }
@@ -330,13 +331,20 @@ std::optional<PoseVerifier::Prediction> PoseVerifier::byVelocity() const {
   return prediction;
 }
 
-/// By odometry or by the velocity before.
+/// By odometry or by the velocity before; of a robot that turned as this pose says, along the arc.
 bool PoseVerifier::isPredicted(const MetricPose& pose) const {
   const auto agrees = [&](const std::optional<Prediction>& expected) {
     return expected && (pose.base.translation().head<2>() - expected->position_m).norm() <=
                            config_.max_prediction_error_m + expected->sigma_m + 2.0 * pose.sigma_m();
   };
-  return agrees(byOdometry()) || agrees(byVelocity());
+  std::optional<Prediction> by_velocity = byVelocity();
+  if (agrees(byOdometry()) || agrees(by_velocity)) return true;
+  if (!by_velocity) return false;
+  const Eigen::Vector2d last_m = last_->pose.base.translation().head<2>();
+  const double turned_rad = angleDifference(yawOf(last_->pose.base), yawOf(pose.base));
+  const Eigen::Rotation2Dd along_arc(0.5 * (last_->turned_rad + turned_rad));
+  by_velocity->position_m = last_m + along_arc * (by_velocity->position_m - last_m);
+  return agrees(by_velocity);
 }
 
 /// Whether the robot may have driven here since the last verified pose: it is where the motion leads, or after a short

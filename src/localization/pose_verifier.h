@@ -120,6 +120,7 @@ class PoseVerifier {
     std::int64_t stamp_ns = 0;
     MetricPose pose;
     std::optional<Eigen::Vector2d> velocity_mps;
+    double turned_rad = 0.0;  ///< on the way that tells the velocity
     bool velocity_holds = true;
   };
   /// A landmark and the feature of the image that seems to show it.

@@ -223,6 +223,25 @@ TEST_F(PoseVerifierTest, DoesNotBelieveAPoseAsideOfTheMotionUntilTheNextImage) {
   EXPECT_LT((again->camera.position_m - street_.mappedNear(15, aside_m).position_m).norm(), 0.1);
 }
 
+// A corner between two images, with four metres of way: half of the turn aside of straight on.
+TEST_F(PoseVerifierTest, BelievesAPoseAsideOfTheMotionWhereTheRobotTurnedThatWay) {
+  constexpr double kWay_m = 4.0;
+  constexpr double kTurn_rad = 1.4;
+  MetricConfig config;
+  config.max_prediction_error_m = 0.2;
+  config.min_inliers = 12;
+  verifier_.configure(config);
+  const Eigen::Vector3d along_arc_m(-kWay_m * std::sin(0.5 * kTurn_rad), 0.0, kWay_m * std::cos(0.5 * kTurn_rad));
+  for (const double turned_rad : {0.0, kTurn_rad}) {  // to the left
+    verifier_.reset();
+    for (const std::size_t i : {5U, 9U, 13U}) ASSERT_TRUE(verifyNear(100.0 * turned_rad + static_cast<double>(i), i));
+    CameraPose there = street_.trueNear(13, kBeside_m + along_arc_m);
+    there.rotation = there.rotation * Eigen::AngleAxisd(-turned_rad, Eigen::Vector3d::UnitY());
+    const auto pose = verify(100.0 * turned_rad + 17.0, street_.seenFrom(there), {13, 14, 15, 16, 17, 18});
+    EXPECT_EQ(pose.has_value(), turned_rad > 0.0) << turned_rad;
+  }
+}
+
 TEST_F(PoseVerifierTest, ForgetsTheMotionOnReset) {
   ASSERT_TRUE(verifyNear(0.0, 10));
   const auto few = street_.fewSeenFrom(street_.trueNear(10, kBeside_m), 10);
