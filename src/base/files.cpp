@@ -33,6 +33,9 @@ constexpr std::string_view kPartial = ".partial";
 constexpr std::size_t kDigits = 16;
 /// What stands behind the name of a file while one process at a time may write it.
 constexpr std::string_view kLockSuffix = ".lock.partial";
+/// Times that an OutputLock is tried, 10 ms apart: removeAbandoned() of another process holds the file for a moment
+/// too.
+constexpr int kLockAttempts = 100;
 
 bool endsWith(std::string_view text, std::string_view end) {
   return text.size() > end.size() && text.substr(text.size() - end.size()) == end;
@@ -296,12 +299,19 @@ void PartialFile::write(const std::string& content) {
 }
 
 OutputLock::OutputLock(const std::string& target) : path_(resolved(target) + std::string(kLockSuffix)) {
+  for (int attempt = 1; !tryLock(); ++attempt) {
+    if (attempt == kLockAttempts) refuse(target, "process " + holderIn(path_) + " is writing it");
+    ::poll(nullptr, 0, 10);
+  }
+}
+
+bool OutputLock::tryLock() {
   const Change change;
   locked_ = openLocked(path_, O_CREAT);
-  if (locked_ < 0 && errno == EWOULDBLOCK) refuse(target, "process " + holderIn(path_) + " is writing it");
-  if (locked_ < 0) return;
+  if (locked_ < 0) return errno != EWOULDBLOCK;
   slot_ = enlist(path_);
   nameHolder(locked_);
+  return true;
 }
 
 OutputLock::~OutputLock() {

@@ -48,14 +48,17 @@ class PartialFile {
 /// disappears with this object. What a killed process leaves behind does not hold anybody up.
 class OutputLock {
  public:
-  /// Throws FileError naming `target` and the process that holds it. Where the file system has no locks nobody is kept
-  /// from writing.
+  /// Waits a second for whoever holds it, then throws FileError naming `target` and that process. Where the file system
+  /// has no locks nobody is kept from writing.
   explicit OutputLock(const std::string& target);
   ~OutputLock();
   OutputLock(const OutputLock&) = delete;
   OutputLock& operator=(const OutputLock&) = delete;
 
  private:
+  /// False while another process holds it.
+  bool tryLock();
+
   std::string path_;
   int slot_ = -1;
   int locked_ = -1;  ///< descriptor

@@ -1,3 +1,4 @@
+#include <chrono>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -97,6 +98,18 @@ TEST(OutputLock, OneProcessAtATimeWrites) {
   EXPECT_EQ(folder.names().size(), 1U);
   { const OutputLock lock(target); }
   EXPECT_TRUE(folder.names().empty());
+}
+
+TEST(OutputLock, WaitsForWhoeverHoldsItForAMoment) {
+  const test::TemporaryFolder folder;
+  const std::string target = folder / "a";
+  auto other = std::make_unique<OutputLock>(target);
+  std::thread release([&other] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    other.reset();
+  });
+  EXPECT_NO_THROW(OutputLock{target});
+  release.join();
 }
 
 TEST(PartialFile, ReplacesTheTargetOnlyOnCommit) {
