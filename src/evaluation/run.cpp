@@ -121,7 +121,7 @@ std::vector<KnownImage> knownImages(const PartialMap& part, const std::vector<st
   const TrainingMap& map = *part.map;
   for (std::size_t i = 0; i < map.size() && !truth.empty(); ++i) {
     const std::optional<TruePose>& pose = truth[part.images.empty() ? i : part.images[i]];
-    if (!pose) continue;
+    if (!pose || (map.hasGeometry() && !map.geometry(i))) continue;
     KnownImage image{map.frame().toEastNorth(pose->position), pose->yaw_rad, {}};
     image.error.position_m = map.position_m(i) - image.true_position_m;
     if (pose->yaw_rad) image.error.yaw_rad = angleDifference(*pose->yaw_rad, map.yaw_rad(i));

@@ -58,7 +58,8 @@ struct MapError {
 };
 
 /// For each image of `drive`, the error of the map at the training image that was taken nearest to it and faces alike,
-/// if headings are known. `truth`: of the images of the whole map; nothing where they are not known.
+/// if headings are known. In a map with landmarks, of the images that have some: poses rest on those alone. `truth`: of
+/// the images of the whole map; nothing where they are not known.
 std::vector<std::optional<MapError>> mapErrors(const PartialMap& part,
                                                const std::vector<std::optional<TruePose>>& truth, const Drive& drive);
 

@@ -55,6 +55,17 @@ TEST_F(MapErrors, KnowWhichImagesAPartOfTheMapHas) {
   EXPECT_NEAR(error->position_m.y(), -7.0, 1e-6);
 }
 
+TEST_F(MapErrors, AreThoseOfImagesWithLandmarks) {
+  std::vector<TrainingImage> images;
+  for (std::size_t i = 0; i < map_->size(); ++i) images.push_back(map_->image(i));
+  for (const std::size_t i : {0, 1, 3}) images[i].geometry.emplace();
+  truth_[2]->position = map_->frame().toGeodetic({10.0, -3.0});
+  const auto error =
+      at({10.5, 0.0}, std::nullopt, {std::make_shared<TrainingMap>(map_->header(), std::move(images)), {}});
+  ASSERT_TRUE(error);
+  EXPECT_NEAR((error->position_m - Eigen::Vector2d(0.0, -1.0)).norm(), 0.0, 1e-6);
+}
+
 TEST_F(MapErrors, AreNotKnownWithoutTruth) {
   truth_.assign(map_->size(), std::nullopt);
   EXPECT_FALSE(at({0.0, 0.0}, std::nullopt, {map_, {}}));
