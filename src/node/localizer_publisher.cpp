@@ -240,6 +240,7 @@ LocalizerPublisher::LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHan
       image_transport_(private_node) {
   constexpr bool kLatched = true;
   pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kMessagesQueued);
+  metric_pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("metric_pose", kMessagesQueued);
   fix_ = private_node.advertise<sensor_msgs::NavSatFix>("fix", kMessagesQueued);
   path_ = private_node.advertise<nav_msgs::Path>("path", kMessagesQueued);
   camera_marker_ = private_node.advertise<visualization_msgs::Marker>("camera_marker", kMessagesQueued);
@@ -288,6 +289,7 @@ void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts&
 
 void LocalizerPublisher::publishPose(const Estimate& estimate, const std_msgs::Header& header) {
   pose_.publish(toPose(estimate, header));
+  if (const auto metric_pose = toMetricPose(estimate, header)) metric_pose_.publish(*metric_pose);
   fix_.publish(toFix(estimate, headerOf(config_.base_frame_id, header.stamp)));
 }
 

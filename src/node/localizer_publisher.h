@@ -150,6 +150,7 @@ class LocalizerPublisher : public ImageOutput {
   DrivenPath drive_;
   image_transport::ImageTransport image_transport_;
   ros::Publisher pose_;
+  ros::Publisher metric_pose_;
   ros::Publisher fix_;
   ros::Publisher path_;
   ros::Publisher camera_marker_;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <sensor_msgs/point_cloud2_iterator.h>
@@ -29,13 +30,17 @@ geometry_msgs::Pose poseOf(const Eigen::Vector2d& position_m, double yaw_rad) {
   return pose;
 }
 
-/// Of a metric pose, map included; symmetric to the last bit.
-MetricPose::Covariance fullCovariance(const MetricPose& metric) {
-  MetricPose::Covariance covariance = metric.covariance + metric.map_covariance;
+/// Symmetric to the last bit.
+MetricPose::Covariance invertible(MetricPose::Covariance covariance) {
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
   covariance.diagonal().head<3>().array() += kLeastPositionSigma_m * kLeastPositionSigma_m;
   covariance.diagonal().tail<3>().array() += kLeastRotationSigma_rad * kLeastRotationSigma_rad;
   return covariance;
+}
+
+/// Of a metric pose, map included.
+MetricPose::Covariance fullCovariance(const MetricPose& metric) {
+  return invertible(metric.covariance + metric.map_covariance);
 }
 
 Eigen::Matrix2d positionCovariance(const Estimate& estimate) {
@@ -48,10 +53,10 @@ bool isFinite(const MetricPose& metric) {
          std::isfinite(metric.reprojection_px);
 }
 
-geometry_msgs::PoseWithCovariance withCovariance(const MetricPose& metric) {
+geometry_msgs::PoseWithCovariance withCovariance(const MetricPose& metric, const MetricPose::Covariance& covariance) {
   geometry_msgs::PoseWithCovariance pose;
   pose.pose = tf2::toMsg(metric.base);
-  Eigen::Map<MetricPose::Covariance>(pose.covariance.data()) = fullCovariance(metric);  // symmetric: rows are columns
+  Eigen::Map<MetricPose::Covariance>(pose.covariance.data()) = covariance;  // symmetric: rows are columns
   return pose;
 }
 
@@ -123,7 +128,17 @@ bool isFinite(const Particle& particle) {
 geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header) {
   geometry_msgs::PoseWithCovarianceStamped message;
   message.header = header;
-  message.pose = estimate.metric ? withCovariance(*estimate.metric) : withCovariance(estimate.pose);
+  message.pose = estimate.metric ? withCovariance(*estimate.metric, fullCovariance(*estimate.metric))
+                                 : withCovariance(estimate.pose);
+  return message;
+}
+
+std::optional<geometry_msgs::PoseWithCovarianceStamped> toMetricPose(const Estimate& estimate,
+                                                                     const std_msgs::Header& header) {
+  if (!estimate.metric || estimate.state != LocalizationState::kTracking) return std::nullopt;
+  geometry_msgs::PoseWithCovarianceStamped message;
+  message.header = header;
+  message.pose = withCovariance(*estimate.metric, invertible(estimate.metric->covariance));
   return message;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,12 @@ bool isFinite(const Particle& particle);
 /// map included. Otherwise position, heading and their covariance; height, roll and pitch are zero. `header`: map
 /// frame.
 geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header);
+
+/// The same with the covariance of the image alone, in relation to the map: for a filter, which takes what it fuses for
+/// white noise. Nothing unless a METRIC pose is TRACKING: one that is not may be at a place that looks alike, however
+/// sure it is of where.
+std::optional<geometry_msgs::PoseWithCovarianceStamped> toMetricPose(const Estimate& estimate,
+                                                                     const std_msgs::Header& header);
 
 /// The same position as latitude and longitude; the map knows no altitude. No fix while the position is unknown or
 /// lost. `header`: frame of the robot, as for a GPS receiver.

@@ -145,6 +145,29 @@ TEST(MessageConversions, AMetricCovarianceCanBeInvertedWhateverComes) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Covariance>(covariance).eigenvalues().minCoeff(), 0.0);
 }
 
+TEST(MessageConversions, AFilterFusesWhatAnImageSaysInRelationToTheMap) {
+  Estimate estimate = metricEstimate();
+  estimate.state = LocalizationState::kTracking;
+  const auto message = toMetricPose(estimate, header());
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->header.stamp, header().stamp);
+  EXPECT_EQ(message->pose.pose, toPose(estimate, header()).pose.pose);
+  const Covariance covariance = Eigen::Map<const Covariance>(message->pose.covariance.data());
+  EXPECT_LT((covariance - estimate.metric->covariance).cwiseAbs().maxCoeff(), 2e-6);
+}
+
+TEST(MessageConversions, AFilterIsNotGivenWhatNobodyConfirms) {
+  Estimate estimate = metricEstimate();
+  for (const LocalizationState state : {LocalizationState::kUncertain, LocalizationState::kInitializing,
+                                        LocalizationState::kRecovering, LocalizationState::kOffMap}) {
+    estimate.state = state;
+    EXPECT_FALSE(toMetricPose(estimate, header())) << toString(state);
+  }
+  estimate.state = LocalizationState::kTracking;
+  estimate.metric.reset();  // of a place, or predicted
+  EXPECT_FALSE(toMetricPose(estimate, header()));
+}
+
 TEST(MessageConversions, TheFixOfAMetricPoseHasItsCovariance) {
   const auto pose = toPose(metricEstimate(), header());
   const auto fix = toFix(metricEstimate(), header());

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Transforms: with odometry map, odom and base agree with a metric pose, and no other pose moves the robot; without
-odometry nothing is broadcast."""
+odometry nothing is broadcast. A filter on ~metric_pose gets the same poses."""
 import itertools
 import math
 import sys
@@ -51,6 +51,7 @@ class LocalizerWithOdometry(unittest.TestCase):
         self.odometry = rospy.Publisher('/tf', TFMessage, queue_size=10)
         self.transforms = fixture.Recorder('/tf', TFMessage)
         self.poses = fixture.Recorder('/localizer/pose', PoseWithCovarianceStamped)
+        self.metric_poses = fixture.Recorder('/localizer/metric_pose', PoseWithCovarianceStamped)
         self.diagnostics = fixture.Diagnostics('localizer')
         self.localizer = fixture.Localizer()
         self.localizer.wait_until_up()
@@ -122,6 +123,17 @@ class TfTest(LocalizerWithOdometry):
         after = self.transform_with(self.show_dark((4.0, -2.0, 0.7)))
         self.assertEqual(after.child_frame_id, 'odom')
         self.assertEqual(after.transform, before.transform)
+
+    def test_5_a_filter_gets_those_that_are_tracking_and_what_the_image_says(self):
+        pose = self.show_metric()
+        dark = self.show_dark()
+        claims = {status.header.stamp for status in self.localizer.status.messages()
+                  if status.state == LocalizationStatus.TRACKING and status.source == LocalizationStatus.METRIC}
+        self.assertNotIn(dark.header.stamp, claims)
+        fused = {message.header.stamp: message.pose for message in self.metric_poses.messages()}
+        self.assertLessEqual(set(fused), claims)
+        self.assertEqual(fused[pose.header.stamp].pose, pose.pose.pose)
+        self.assertLess(fused[pose.header.stamp].covariance[0], pose.pose.covariance[0])
 
 
 if __name__ == '__main__':
