@@ -42,13 +42,15 @@ class History:
         self._lock = threading.Lock()
 
     def add(self, status) -> None:
-        """One more status; begins anew when time goes back, as it does when a bag is played again."""
+        """One more status; begins anew when time goes back, as it does when a bag is played again, and when simulated
+        time begins, which is 0 until then."""
         answers_an_image = status.best_image >= 0
         # A bag of an older version has no inliers and no sigma.
         row = {name: float(getattr(status, name, math.nan)) if answers_an_image else math.nan for name in FIGURES}
         row['stamp'] = status.header.stamp.to_sec()
         with self._lock:
-            if self._rows and row['stamp'] < self._rows[-1]['stamp']:
+            before = self._rows[-1]['stamp'] if self._rows else row['stamp']
+            if row['stamp'] < before or before == 0 < row['stamp']:
                 self._rows.clear()
                 self._states.clear()
                 self._sources.clear()

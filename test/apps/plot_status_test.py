@@ -64,6 +64,13 @@ class HistoryTest(unittest.TestCase):
             history.add(status_at(second, 'RECOVERING' if second == 50.0 else 'TRACKING'))
         self.assertEqual(history.states(), ['RECOVERING'])
 
+    def test_it_begins_when_simulated_time_does(self):
+        history = plot_status.History()
+        for second in (0.0, 0.0, 1.2e9, 1.2e9 + 1):
+            history.add(status_at(second, 'INITIALIZING' if second == 0 else 'TRACKING'))
+        self.assertEqual(history.states(), 2 * ['TRACKING'])
+        self.assertEqual(list(history.columns()['seconds']), [0.0, 1.0])
+
     def test_an_unknown_latency_is_not_drawn(self):
         history = plot_status.History()
         history.add(status_at(1.0, latency_ms=-1.0))
