@@ -69,6 +69,16 @@ TEST(MultiSwarmRules, ARivalHasASeventhOfTheParticlesAndTheWeightOfItsMatches) {
   EXPECT_EQ(with_few.tracker.particles().size(), 10U);
 }
 
+TEST(MultiSwarmRules, TheImageThatFoundARivalIsItsFirst) {
+  StandingRobot robot(severalSwarms());
+  double weight = 0.0;
+  for (int i = 0; i < 200 && robot.tracker.swarms() == 1U; ++i) weight = robot.look().rival_weight;
+  ASSERT_EQ(robot.tracker.swarms(), 2U);
+  robot.street.setLikeness(1.0, 0.7);
+  const double strength = 0.8 * weight / (1.0 - weight) + 0.2 * 0.7;  // the leader's is 1
+  EXPECT_NEAR(robot.look().rival_weight, strength / (1.0 + strength), 1e-4);
+}
+
 TEST(MultiSwarmRules, StrengthIsAMeanInWhichTheLastImageCountsAFifth) {
   StandingRobot robot(severalSwarms());
   ASSERT_TRUE(robot.settle(2));
