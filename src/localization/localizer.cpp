@@ -175,10 +175,15 @@ std::optional<MetricPose> Localizer::poseNearPrediction(std::int64_t stamp_ns) {
 
 std::optional<MetricPose> Localizer::poseNearProposal(const TrackerEstimate& tracked) {
   if (!isMetric()) return std::nullopt;
-  const Stopwatch stopwatch;
-  std::optional<MetricPose> pose = verifier_->nearOneOf(scores_.mostSimilar());
-  if (!pose) pose = verifier_->nearOneOf(sweep_.mostSimilar(scores_, kSweptImages));  // wherever that may be
-  geometry_ms_ += stopwatch.elapsed_ms();
+  const auto nearOneOf = [this](const std::vector<std::size_t>& training_images) {
+    const Stopwatch stopwatch;
+    std::optional<MetricPose> pose = verifier_->nearOneOf(training_images);
+    geometry_ms_ += stopwatch.elapsed_ms();
+    return pose;
+  };
+  std::optional<MetricPose> pose = nearOneOf(scores_.mostSimilar());
+  // Wherever that may be. The sweep's time is that of its features and comparisons, which are timed there.
+  if (!pose) pose = nearOneOf(sweep_.mostSimilar(scores_, kSweptImages));
   if (!pose) return pose;
   tracker_->attract(pose->base.translation().head<2>());
   bringTracker(tracked, *pose);

@@ -1,13 +1,16 @@
 // What an estimate says of itself where landmarks verify the pose.
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "base/time.h"
 #include "test/localization/street_map.h"
 #include "visual_localization/localization/localizer.h"
 
@@ -163,6 +166,34 @@ TEST_F(MetricEstimate, TheTimeOfGeometryIsThatOfThisImage) {
   places.metric.pose_source = "place";
   localizer_->configure(places);
   EXPECT_EQ(see(12).image.match_ms, 0.0);
+}
+
+/// An image that shows nothing and takes a while to say so.
+class SlowImage final : public test::FakeImage {
+ public:
+  Score compare(FeatureKind, std::size_t) override {
+    const Stopwatch stopwatch;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    report_.match_ms += stopwatch.elapsed_ms();
+    return {};
+  }
+  const SiftFeatures* unprunedSift() override { return &nothing_; }
+  ImageReport report() const override { return report_; }
+
+ private:
+  SiftFeatures nothing_;
+  ImageReport report_;
+};
+
+TEST_F(MetricEstimate, NoTimeIsCountedTwice) {
+  const std::shared_ptr<const TrainingMap> map(std::shared_ptr<void>(), &street_.map());
+  LocalizerConfig config;
+  config.tracker = "pf_gaussian";  // sweeps nothing itself: geometry is the first to
+  Localizer localizer(map, config, std::make_shared<SlowImage>());
+  const Estimate estimate = localizer.process(kSecond_ns, cv::Mat());
+  ASSERT_GT(estimate.swept, 0U);
+  EXPECT_GE(estimate.image.match_ms, static_cast<double>(estimate.comparisons + estimate.swept));
+  EXPECT_GE(estimate.update_ms, 0.0);
 }
 
 TEST_F(MetricEstimate, RelocalizingForgetsTheMotion) {
