@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
+#include <set>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -55,6 +57,20 @@ std::vector<std::size_t> inliersOf(const std::vector<LandmarkMatch>& matches, co
     if (errorOf(matches[i], pose) <= tolerance) inliers.push_back(i);
   }
   return inliers;
+}
+
+/// Which matches count where a keypoint may show landmarks of several sessions: those of the session that the pose
+/// explains best.
+std::vector<bool> ofOneSession(const std::vector<LandmarkMatch>& matches, const CameraPose& pose) {
+  std::map<std::size_t, std::pair<double, int>> best;  // of each keypoint: error and session
+  for (const LandmarkMatch& match : matches) {
+    const std::pair<double, int> found(errorOf(match, pose), match.session);
+    const auto known = best.emplace(match.keypoint, found).first;
+    known->second = std::min(known->second, found);
+  }
+  std::vector<bool> counts;
+  for (const LandmarkMatch& match : matches) counts.push_back(best.at(match.keypoint).second == match.session);
+  return counts;
 }
 
 /// How far sights may be off: keypoints and landmarks by `stretch` times what they tell, landmarks by `motion_m`
@@ -367,6 +383,17 @@ MovingScene inMovingScene(const std::vector<LandmarkMatch>& matches, const Solve
   return moving;
 }
 
+/// Landmarks of other sessions that the keypoints of inliers show as well.
+void addTheirLike(const std::vector<LandmarkMatch>& matches, const std::vector<bool>& counts, double tolerance,
+                  SolvedPose& solved) {
+  std::set<std::size_t> keypoints;
+  for (const std::size_t i : solved.inliers) keypoints.insert(matches[i].keypoint);
+  for (const std::size_t i : inliersOf(matches, solved.camera, tolerance)) {
+    if (!counts[i] && keypoints.count(matches[i].keypoint) > 0) solved.inliers.push_back(i);
+  }
+  std::sort(solved.inliers.begin(), solved.inliers.end());
+}
+
 }  // namespace
 
 std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, double tolerance,
@@ -374,11 +401,22 @@ std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, d
   min_inliers = std::max(min_inliers, kLeast);
   if (matches.size() < min_inliers) return std::nullopt;
   const std::optional<CameraPose> start = PoseSampler(matches, tolerance).best();
-  std::optional<SolvedPose> solved = start ? refined(matches, *start, tolerance, min_inliers) : std::nullopt;
+  if (!start) return std::nullopt;
+  const std::vector<bool> counts = ofOneSession(matches, *start);
+  std::vector<std::size_t> counted;
+  std::vector<LandmarkMatch> sights;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!counts[i]) continue;
+    counted.push_back(i);
+    sights.push_back(matches[i]);
+  }
+  std::optional<SolvedPose> solved = refined(sights, *start, tolerance, min_inliers);
   if (!solved) return std::nullopt;
-  MovingScene moving = inMovingScene(matches, *solved, min_inliers);
+  MovingScene moving = inMovingScene(sights, *solved, min_inliers);
   if (moving.pose && moving_evidence + moving.gain > kMovingGain) solved = std::move(moving.pose);
   solved->moving_gain = moving.gain;
+  for (std::size_t& i : solved->inliers) i = counted[i];
+  addTheirLike(matches, counts, tolerance, *solved);
   return solved;
 }
 

@@ -12,6 +12,8 @@ namespace visual_localization {
 
 /// A landmark and where the image seems to show it.
 struct LandmarkMatch {
+  std::size_t keypoint = 0;                                 ///< of the image
+  int session = 0;                                          ///< of the map, that the landmark is of
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();     ///< x/z, y/z in the camera's frame
   double sigma = 1.0;                                       ///< of each coordinate
   Eigen::Vector3d landmark_m = Eigen::Vector3d::Zero();     ///< map frame
@@ -34,11 +36,12 @@ struct SolvedPose {
 };
 
 /// The pose from which most matches are right, the nearer the better: AP3P in RANSAC, then least squares on all
-/// inliers, each weighed by its own and its landmark's covariance (Cauchy loss). Where landmarks that moved since the
-/// day of the map explain the matches far better, all matches decide, and the covariance grows. `tolerance`: farthest
-/// of an inlier from its landmark's projection, normalised coordinates. `moving_evidence`: what images before tell of
-/// that, added to the gain of this one. Nothing with fewer than `min_inliers` (at least 4), or when they leave the pose
-/// open. The result depends on the input alone.
+/// inliers, each weighed by its own and its landmark's covariance (Cauchy loss). Each session of a map has its own
+/// landmark of one thing, but a keypoint shows it once: of its matches only those of the session count that agrees
+/// best. Where landmarks that moved since the day of the map explain the matches far better, all matches decide, and
+/// the covariance grows. `tolerance`: farthest of an inlier from its landmark's projection, normalised coordinates.
+/// `moving_evidence`: what images before tell of that, added to the gain of this one. Nothing with fewer than
+/// `min_inliers` (at least 4), or when they leave the pose open. The result depends on the input alone.
 std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, double tolerance,
                                     std::size_t min_inliers, double moving_evidence = 0.0);
 

@@ -39,7 +39,11 @@ MetricPose::Covariance atBase(const MetricPose::Covariance& of_camera, const Met
 
 void FocalCheck::add(double scale, double sigma) {
   if (!std::isfinite(scale) || !std::isfinite(sigma)) return;
-  if (images_.size() == kFocalImages) images_.erase(images_.begin());
+  if (std::exchange(added_, true)) {
+    images_.pop_back();
+  } else if (images_.size() == kFocalImages) {
+    images_.erase(images_.begin());
+  }
   images_.push_back({scale, 1.0 / (sigma * sigma + kLeastFocalSigma * kLeastFocalSigma)});
 }
 
@@ -92,6 +96,7 @@ void PoseVerifier::useOdometry(const OdometryTrack& track, const OdometryConfig&
 void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
                               const SensorMount& mount) {
   ++images_since_;
+  focal_.startImage();
   moving_.add(std::exchange(moving_gain_, 0.0));
   stamp_ns_ = stamp_ns;
   features_ = &features;
@@ -114,7 +119,7 @@ std::optional<MetricPose> PoseVerifier::near(const std::optional<Prediction>& pr
       sessions_.around(prediction->position_m, prediction->yaw_rad, static_cast<std::size_t>(config_.training_images));
   const std::optional<std::size_t> trial = sessions_.trial(prediction->position_m, prediction->yaw_rad);
   if (trial) images.push_back(*trial);
-  const auto pose = solve(images, few, trial);
+  const auto pose = solveAround(prediction->position_m, prediction->yaw_rad, images, few, trial);
   if (!pose) return std::nullopt;
   if (pose->inliers < static_cast<std::size_t>(config_.min_inliers) && !isPredicted(*pose)) return std::nullopt;
   return accepted(*pose);
@@ -129,7 +134,9 @@ std::optional<MetricPose> PoseVerifier::nearOneOf(const std::vector<std::size_t>
       continue;
     }
     tried.push_back(position_m);
-    const auto pose = solveLike(image);
+    const auto pose = solveAround(position_m, map_.yaw_rad(image),
+                                  sessions_.aroundLike(image, static_cast<std::size_t>(config_.training_images)),
+                                  static_cast<std::size_t>(config_.min_inliers));
     if (pose) {
       sessions_.choose(matched_.training_image);
       return accepted(*pose);
@@ -145,17 +152,21 @@ std::vector<std::size_t> PoseVerifier::compared() const {
   return images;
 }
 
-/// Near a training image: by the landmarks of its session, or else by those of all. What looks most alike need not have
-/// the best landmarks.
-std::optional<MetricPose> PoseVerifier::solveLike(std::size_t training_image) {
-  const auto count = static_cast<std::size_t>(config_.training_images);
-  const auto inliers = static_cast<std::size_t>(config_.min_inliers);
-  const std::vector<std::size_t> alike = sessions_.aroundLike(training_image, count);
-  const std::optional<MetricPose> pose = solve(alike, inliers);
-  if (pose) return pose;
-  const std::vector<std::size_t> any =
-      sessions_.aroundAny(map_.position_m(training_image), map_.yaw_rad(training_image), count);
-  return any == alike ? std::nullopt : solve(any, inliers);
+/// By the landmarks of these training images of one session. Where they make no pose that is sure to be right, those of
+/// the nearest images of all sessions join them: what looks most alike need not have the best landmarks.
+std::optional<MetricPose> PoseVerifier::solveAround(const Eigen::Vector2d& position_m, double yaw_rad,
+                                                    std::vector<std::size_t> images, std::size_t min_inliers,
+                                                    std::optional<std::size_t> trial) {
+  const std::optional<MetricPose> pose = solve(images, min_inliers, trial);
+  if (pose && isClear(*pose)) return pose;
+  const std::size_t of_session = images.size();
+  for (const std::size_t image :
+       sessions_.aroundAny(position_m, yaw_rad, static_cast<std::size_t>(config_.training_images))) {
+    if (std::find(images.begin(), images.end(), image) == images.end()) images.push_back(image);
+  }
+  if (images.size() == of_session) return pose;
+  const std::optional<MetricPose> by_all = solve(images, min_inliers);
+  return by_all ? by_all : pose;
 }
 
 /// `trial`: the last of the training images, if its session is being tried.
@@ -212,13 +223,14 @@ void PoseVerifier::match(std::size_t training_image, const ImageGeometry& geomet
   if (!indices_.empty() && indices_.back() >= features->size()) return;  // they could not be read
   features->subset(indices_, landmarks_);
   matchSymmetric(*features_, landmarks_, config_.match_ratio, found_);
+  const int session = map_.pose(training_image).session;
   for (const FeatureMatch& pair : found_) {
     if (!rays_.normalised[pair.a].allFinite()) continue;
     const SeenLandmark& landmark = geometry.landmarks[pair.b];
     matches.push_back({landmark.id,
                        pair.a,
                        landmark.feature,
-                       {rays_.normalised[pair.a], rays_.sigmas[pair.a],
+                       {pair.a, session, rays_.normalised[pair.a], rays_.sigmas[pair.a],
                         geometry.camera.position_m + landmark.offset_m.cast<double>(), covarianceOf(landmark)}});
   }
 }
@@ -246,10 +258,20 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
   return counts;
 }
 
+/// Of this pose and of those before it that it follows.
+std::size_t PoseVerifier::inliersTogether(const MetricPose& pose) const {
+  return (follows(pose) ? inliers_together_ : 0) + pose.inliers;
+}
+
+/// Whether enough landmarks agree for TRACKING.
+bool PoseVerifier::isClear(const MetricPose& pose) const {
+  return inliersTogether(pose) >= static_cast<std::size_t>(config_.min_inliers_tracking);
+}
+
 std::optional<MetricPose> PoseVerifier::accepted(MetricPose pose) {
   if (isAside(pose)) return std::nullopt;
-  inliers_together_ = (follows(pose) ? inliers_together_ : 0) + pose.inliers;
-  const bool clear = inliers_together_ >= static_cast<std::size_t>(config_.min_inliers_tracking);
+  const bool clear = isClear(pose);
+  inliers_together_ = inliersTogether(pose);
   const std::optional<bool> odometry_agrees = odometryAgrees(pose);
   pose.confirmed = !isElsewhere(pose, odometry_agrees) && focal_.confirms() && clear;
   if (odometry_agrees) judgeOdometry(*odometry_agrees);

@@ -25,8 +25,13 @@ class FocalCheck {
   explicit FocalCheck(double max_error) : max_error_(max_error) {}
 
   void configure(double max_error) { max_error_ = max_error; }
-  void reset() { images_.clear(); }
-  /// What an image says: the focal length as a share of the calibration's, and its standard deviation.
+  void reset() {
+    images_.clear();
+    added_ = false;
+  }
+  void startImage() { added_ = false; }
+  /// What the image says: the focal length as a share of the calibration's, and its standard deviation. Its last word
+  /// counts.
   void add(double scale, double sigma);
 
   /// The last images agree with the calibration, and are sure of it.
@@ -46,6 +51,7 @@ class FocalCheck {
 
   double max_error_;
   std::vector<Image> images_;  ///< the last ones
+  bool added_ = false;         ///< the last of them is the current image
 };
 
 /// Whether plants stand elsewhere than on the day of the map, by all images of a drive: one image may agree with a
@@ -138,7 +144,9 @@ class PoseVerifier {
 
   std::optional<MetricPose> solve(const std::vector<std::size_t>& training_images, std::size_t min_inliers,
                                   std::optional<std::size_t> trial = {});
-  std::optional<MetricPose> solveLike(std::size_t training_image);
+  std::optional<MetricPose> solveAround(const Eigen::Vector2d& position_m, double yaw_rad,
+                                        std::vector<std::size_t> training_images, std::size_t min_inliers,
+                                        std::optional<std::size_t> trial = {});
   const std::vector<Match>& matchesWith(std::size_t training_image);
   void match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches);
   std::vector<std::size_t> keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers);
@@ -151,6 +159,8 @@ class PoseVerifier {
   void judgeOdometry(bool agrees);
   bool isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees);
   bool isAside(const MetricPose& pose) const;
+  std::size_t inliersTogether(const MetricPose& pose) const;
+  bool isClear(const MetricPose& pose) const;
   std::optional<MetricPose> accepted(MetricPose pose);
 
   const TrainingMap& map_;

@@ -25,11 +25,13 @@ CameraPose somePose() {
   return {levelCamera(0.7) * tilt, {120.0, -340.0, 2.0}};
 }
 
-/// Points that the camera sees to `depth_m` away, seen exactly.
+/// Points that the camera sees, each by another keypoint than all others, seen exactly.
 std::vector<LandmarkMatch> exactMatches(const CameraPose& pose, std::size_t count, double nearest_m, double farthest_m,
                                         std::mt19937& random) {
+  static std::size_t keypoints = 0;
   std::vector<LandmarkMatch> matches(count);
   for (LandmarkMatch& match : matches) {
+    match.keypoint = keypoints++;
     const double x = uniform(random, -0.7, 0.7);
     match.normalised = {x, uniform(random, -0.5, 0.5)};
     const double depth_m = uniform(random, nearest_m, farthest_m);
@@ -301,6 +303,7 @@ TEST(PoseSolver, DoesNotPretendToKnowThePoseFromARow) {
     std::vector<LandmarkMatch> matches(5);
     for (std::size_t i = 0; i < matches.size(); ++i) {
       const Eigen::Vector3d in_camera(-2.0 + static_cast<double>(i), 0.5, 8.0 + 0.5 * static_cast<double>(i));
+      matches[i].keypoint = i;
       matches[i].landmark_m = truth.position_m + truth.rotation * in_camera;
       const double off = kSigma * std::normal_distribution<double>(0.0, 1.0)(random);
       matches[i].normalised = in_camera.hnormalized() + Eigen::Vector2d(off, -0.5 * off);
@@ -311,6 +314,52 @@ TEST(PoseSolver, DoesNotPretendToKnowThePoseFromARow) {
       EXPECT_GT(largestSigma_m(*solved), 2.0) << seed;
     }
   }
+}
+
+/// The same landmarks as another session has them.
+std::vector<LandmarkMatch> inAnotherSession(std::vector<LandmarkMatch> matches) {
+  for (LandmarkMatch& match : matches) match.session = 1;
+  return matches;
+}
+
+std::vector<LandmarkMatch> together(std::vector<LandmarkMatch> matches, const std::vector<LandmarkMatch>& others) {
+  matches.insert(matches.end(), others.begin(), others.end());
+  return matches;
+}
+
+TEST(PoseSolver, AKeypointCountsForOneSession) {
+  std::mt19937 random(11);
+  auto matches = exactMatches(somePose(), 30, 4.0, 25.0, random);
+  addNoise(matches, random);
+  const auto once = solvePose(matches, kTolerance, kMinInliers);
+  const auto twice = solvePose(together(matches, inAnotherSession(matches)), kTolerance, kMinInliers);
+  ASSERT_TRUE(once && twice);
+  EXPECT_EQ(twice->agreeing, once->agreeing);
+  EXPECT_LT((twice->covariance - once->covariance).norm(), 1e-3 * once->covariance.norm());
+  EXPECT_LT((twice->camera.position_m - once->camera.position_m).norm(), 1e-4);
+  EXPECT_EQ(twice->inliers.size(), 2 * once->inliers.size()) << "the landmarks of both agree";
+  EXPECT_TRUE(std::is_sorted(twice->inliers.begin(), twice->inliers.end()));
+}
+
+TEST(PoseSolver, FewKeypointsThatManySessionsShowAreFew) {
+  std::mt19937 random(12);
+  const auto matches = exactMatches(somePose(), kMinInliers - 1, 4.0, 25.0, random);
+  EXPECT_FALSE(solvePose(together(matches, inAnotherSession(matches)), kTolerance, kMinInliers));
+}
+
+TEST(PoseSolver, TheSessionThatAgreesCounts) {
+  std::mt19937 random(13);
+  const CameraPose truth = somePose();
+  auto right = exactMatches(truth, 30, 4.0, 25.0, random);
+  addNoise(right, random);
+  const auto elsewhere = exactMatches(truth, 30, 4.0, 25.0, random);
+  auto wrong = inAnotherSession(right);
+  for (std::size_t i = 0; i < wrong.size(); ++i) wrong[i].landmark_m = elsewhere[i].landmark_m;
+  const auto solved = solvePose(together(wrong, right), kTolerance, kMinInliers);
+  ASSERT_TRUE(solved);
+  EXPECT_LT(errorOf(solved->camera, truth).head<3>().norm(), 0.1);
+  EXPECT_GE(solved->agreeing, 28U);
+  for (const std::size_t i : solved->inliers) EXPECT_GE(i, wrong.size());
 }
 
 TEST(PoseSolver, DependsOnTheInputAlone) {

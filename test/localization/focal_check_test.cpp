@@ -10,6 +10,11 @@ namespace {
 
 constexpr double kMaxError = 0.01;
 
+void addImage(FocalCheck& check, double scale, double sigma) {
+  check.startImage();
+  check.add(scale, sigma);
+}
+
 TEST(FocalCheck, SaysNothingWithoutImages) {
   const FocalCheck check(kMaxError);
   EXPECT_FALSE(check.confirms());
@@ -19,70 +24,81 @@ TEST(FocalCheck, SaysNothingWithoutImages) {
 
 TEST(FocalCheck, ConfirmsByOneSureImage) {
   FocalCheck check(kMaxError);
-  check.add(1.002, 0.004);
+  addImage(check, 1.002, 0.004);
   EXPECT_TRUE(check.confirms());
   EXPECT_FALSE(check.contradicts());
 }
 
 TEST(FocalCheck, NeedsMoreThanAnUnsureImage) {
   FocalCheck check(kMaxError);
-  check.add(1.02, 0.05);
+  addImage(check, 1.02, 0.05);
   EXPECT_FALSE(check.confirms());
   EXPECT_FALSE(check.contradicts()) << "less than one sigma off";
 }
 
 TEST(FocalCheck, ContradictsWhatIsFarOff) {
   FocalCheck check(kMaxError);
-  check.add(0.3, 0.2);
+  addImage(check, 0.3, 0.2);
   EXPECT_TRUE(check.contradicts()) << "an image far off, though unsure";
   EXPECT_FALSE(check.confirms());
 }
 
 TEST(FocalCheck, FindsASmallErrorOverManyImages) {
   FocalCheck check(kMaxError);
-  check.add(1.014, 0.004);
+  addImage(check, 1.014, 0.004);
   EXPECT_FALSE(check.contradicts());
-  for (int i = 0; i < 20; ++i) check.add(1.014, 0.004);
+  for (int i = 0; i < 20; ++i) addImage(check, 1.014, 0.004);
   EXPECT_TRUE(check.contradicts());
   EXPECT_NEAR(check.scale(), 1.014, 1e-9);
 }
 
 TEST(FocalCheck, WeighsBySigma) {
   FocalCheck check(kMaxError);
-  check.add(1.0, 0.002);
-  check.add(1.3, 0.1);
+  addImage(check, 1.0, 0.002);
+  addImage(check, 1.3, 0.1);
   EXPECT_NEAR(check.scale(), 1.0, 0.001);
   EXPECT_TRUE(check.confirms());
 }
 
 TEST(FocalCheck, ForgetsOldImages) {
   FocalCheck check(kMaxError);
-  for (int i = 0; i < 20; ++i) check.add(1.1, 0.004);
+  for (int i = 0; i < 20; ++i) addImage(check, 1.1, 0.004);
   ASSERT_TRUE(check.contradicts());
-  for (int i = 0; i < 20; ++i) check.add(1.0, 0.004);
+  for (int i = 0; i < 20; ++i) addImage(check, 1.0, 0.004);
   EXPECT_TRUE(check.confirms());
 }
 
 TEST(FocalCheck, TheLastTwentyImagesCount) {
   FocalCheck check(kMaxError);
-  check.add(1.1, 0.004);
-  for (int i = 0; i < 19; ++i) check.add(1.0, 0.004);
+  addImage(check, 1.1, 0.004);
+  for (int i = 0; i < 19; ++i) addImage(check, 1.0, 0.004);
   EXPECT_NEAR(check.scale(), 1.005, 1e-9);
-  check.add(1.0, 0.004);
+  addImage(check, 1.0, 0.004);
   EXPECT_NEAR(check.scale(), 1.0, 1e-9);
+}
+
+TEST(FocalCheck, TheLastWordOfAnImageCounts) {
+  FocalCheck check(kMaxError);
+  addImage(check, 1.0, 0.004);
+  addImage(check, 1.3, 0.004);
+  check.add(1.002, 0.004);
+  EXPECT_NEAR(check.scale(), 1.001, 1e-9);
+  check.reset();
+  check.add(1.002, 0.004);
+  EXPECT_NEAR(check.scale(), 1.002, 1e-9);
 }
 
 TEST(FocalCheck, IgnoresWhatIsNotFinite) {
   FocalCheck check(kMaxError);
-  check.add(std::numeric_limits<double>::quiet_NaN(), 0.004);
-  check.add(1.0, std::numeric_limits<double>::infinity());
+  addImage(check, std::numeric_limits<double>::quiet_NaN(), 0.004);
+  addImage(check, 1.0, std::numeric_limits<double>::infinity());
   EXPECT_FALSE(check.confirms());
   EXPECT_DOUBLE_EQ(check.scale(), 1.0);
 }
 
 TEST(FocalCheck, WhatContradictsDoesNotConfirm) {
   FocalCheck check(kMaxError);
-  for (int i = 0; i < 20; ++i) check.add(1.05, 0.004);
+  for (int i = 0; i < 20; ++i) addImage(check, 1.05, 0.004);
   EXPECT_TRUE(check.contradicts());
   EXPECT_FALSE(check.confirms()) << "however sure it is";
 }
@@ -92,7 +108,7 @@ TEST(FocalCheck, IsSureWhenTheMeanIsKnownToAHundredth) {
   FocalCheck check(kMaxError);
   const double sigma = std::sqrt(std::pow(0.0205, 2) - std::pow(0.003, 2));  // 0.0205 / sqrt(n) <= 0.01 from 5 on
   for (int images = 1; images <= 6; ++images) {
-    check.add(1.0, sigma);
+    addImage(check, 1.0, sigma);
     EXPECT_EQ(check.confirms(), images >= 5) << images;
   }
 }
@@ -102,7 +118,7 @@ TEST(FocalCheck, ContradictsBeyondTheAllowedErrorAndThreeSigmas) {
   for (const double off : {0.0249, 0.0251}) {
     for (const double sign : {1.0, -1.0}) {
       FocalCheck check(kMaxError);
-      check.add(1.0 + sign * off, sigma);
+      addImage(check, 1.0 + sign * off, sigma);
       EXPECT_EQ(check.contradicts(), off > 0.025) << sign * off;
     }
   }

@@ -99,7 +99,7 @@ TEST_F(MatchedLandmarksTest, CountByHowWellTheyAreKnown) {
   std::vector<LandmarkMatch> sights;
   for (const FeatureMatch& match : matchSymmetric(seen, map_->sift(kImage)->subset(features), config.match_ratio)) {
     const SeenLandmark& landmark = geometry->landmarks[match.b];
-    sights.push_back({rays.normalised[match.a], rays.sigmas[match.a],
+    sights.push_back({match.a, 0, rays.normalised[match.a], rays.sigmas[match.a],
                       geometry->camera.position_m + landmark.offset_m.cast<double>(), covarianceOf(landmark)});
   }
   const double tolerance = config.tolerance_px / camera_.intrinsics().fx;

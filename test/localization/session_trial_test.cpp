@@ -41,6 +41,12 @@ std::shared_ptr<const TrainingMap> twoDays(const TrainingMap& street) {
 
 class SessionTrial : public testing::Test {
  protected:
+  /// So many inliers make a pose `TRACKING`.
+  static MetricConfig withTracking(std::size_t min_inliers) {
+    MetricConfig config;
+    config.min_inliers_tracking = static_cast<int>(min_inliers);
+    return config;
+  }
   /// Image by image along the street, beginning at this time: the session that is chosen after each.
   std::vector<std::size_t> chosenOnTheWay(std::int64_t begin_ns, std::size_t images) {
     std::vector<std::size_t> chosen;
@@ -64,28 +70,69 @@ class SessionTrial : public testing::Test {
 };
 
 TEST_F(SessionTrial, TheSessionThatShowsMoreInliersIsChosen) {
+  verifier_.configure(withTracking(1));
   EXPECT_EQ(chosenOnTheWay(0, 6), (std::vector<std::size_t>{0, 0, 0, 1, 1, 1})) << "the fourth image is a trial";
+}
+
+TEST_F(SessionTrial, WhereAllJoinTheSessionThatShowsMostInliersIsChosen) {
+  EXPECT_EQ(chosenOnTheWay(0, 2), (std::vector<std::size_t>{1, 1}));
 }
 
 TEST_F(SessionTrial, TheSessionThatShowsFewerInliersIsNot) {
   EXPECT_EQ(chosenOnTheWay(kEvening_ns, 12), std::vector<std::size_t>(12, 1));
 }
 
-TEST_F(SessionTrial, WhereTheSessionShowsTooFewLandmarksThoseOfAllAreTried) {
-  const SiftFeatures seen = street_.seenFrom(street_.trueNear(20, Eigen::Vector3d::Zero()));
-  const auto inliersAt = [&](std::size_t training_image) {
+/// Near training image 20, which both sessions have.
+class SessionsTogether : public SessionTrial {
+ protected:
+  std::optional<MetricPose> poseLike(std::size_t training_image, const MetricConfig& config = {}) {
+    verifier_.configure(config);
     verifier_.reset();
-    verifier_.startImage(0, seen, street_.camera());
-    const auto pose = verifier_.nearOneOf({training_image});
+    verifier_.startImage(0, seen_, street_.camera());
+    return verifier_.nearOneOf({training_image});
+  }
+  std::size_t inliersLike(std::size_t training_image, const MetricConfig& config = {}) {
+    const auto pose = poseLike(training_image, config);
     return pose ? pose->inliers : 0;
-  };
-  const std::size_t of_morning = inliersAt(20);
-  ASSERT_GT(of_morning, 0U);
-  ASSERT_GT(inliersAt(street_.map().size() + 20), of_morning);
-  MetricConfig config;
-  config.min_inliers = static_cast<int>(of_morning) + 1;
-  verifier_.configure(config);
-  EXPECT_GT(inliersAt(20), of_morning);
+  }
+  const std::size_t morning_ = 20;
+  const std::size_t evening_ = street_.map().size() + 20;
+  const SiftFeatures seen_ = street_.seenFrom(street_.trueNear(20, Eigen::Vector3d::Zero()));
+  const std::size_t of_morning_ = inliersLike(morning_, withTracking(1));
+  const std::size_t of_evening_ = inliersLike(evening_, withTracking(1));
+};
+
+TEST_F(SessionsTogether, WhereOneShowsTooFewLandmarksThoseOfAllAreTried) {
+  ASSERT_GT(of_morning_, 0U);
+  ASSERT_GT(of_evening_, of_morning_);
+  MetricConfig config = withTracking(1);
+  config.min_inliers = static_cast<int>(of_morning_) + 1;
+  EXPECT_GT(inliersLike(morning_, config), of_morning_);
+}
+
+TEST_F(SessionsTogether, OneIsEnoughWhereItMakesThePoseTracking) {
+  const auto pose = poseLike(morning_, withTracking(of_morning_));
+  ASSERT_TRUE(pose);
+  EXPECT_TRUE(pose->confirmed);
+  EXPECT_EQ(pose->inliers, of_morning_);
+  for (const std::size_t image : verifier_.compared()) EXPECT_LT(image, street_.map().size());
+}
+
+TEST_F(SessionsTogether, WhereTooFewLandmarksAgreeForTrackingThoseOfAllJoin) {
+  const auto pose = poseLike(morning_, withTracking(of_morning_ + 1));
+  ASSERT_TRUE(pose);
+  EXPECT_TRUE(pose->confirmed);
+  EXPECT_GT(pose->inliers, of_morning_);
+}
+
+TEST_F(SessionsTogether, TooFewOfAllAreNotTracking) {
+  const auto pose = poseLike(morning_, withTracking(10'000));
+  ASSERT_TRUE(pose);
+  EXPECT_FALSE(pose->confirmed);
+}
+
+TEST_F(SessionsTogether, ShowNoKeypointTwice) {
+  EXPECT_LE(inliersLike(morning_, withTracking(10'000)), of_evening_ + 2) << "the evening has all of the morning's";
 }
 
 }  // namespace
