@@ -13,7 +13,7 @@ namespace visual_localization {
 /// A landmark and where the image seems to show it.
 struct LandmarkMatch {
   std::size_t keypoint = 0;                                 ///< of the image
-  int session = 0;                                          ///< of the map, that the landmark is of
+  int session = 0;                                          ///< of the map, whose landmark it is
   Eigen::Vector2d normalised = Eigen::Vector2d::Zero();     ///< x/z, y/z in the camera's frame
   double sigma = 1.0;                                       ///< of each coordinate
   Eigen::Vector3d landmark_m = Eigen::Vector3d::Zero();     ///< map frame

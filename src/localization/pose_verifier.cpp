@@ -152,7 +152,7 @@ std::vector<std::size_t> PoseVerifier::compared() const {
   return images;
 }
 
-/// By the landmarks of these training images of one session. Where they make no pose that is sure to be right, those of
+/// By the landmarks of these training images of one session. Where they make no pose that would be TRACKING, those of
 /// the nearest images of all sessions join them: what looks most alike need not have the best landmarks.
 std::optional<MetricPose> PoseVerifier::solveAround(const Eigen::Vector2d& position_m, double yaw_rad,
                                                     std::vector<std::size_t> images, std::size_t min_inliers,

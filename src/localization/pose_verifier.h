@@ -29,9 +29,10 @@ class FocalCheck {
     images_.clear();
     added_ = false;
   }
+  /// The next image.
   void startImage() { added_ = false; }
-  /// What the image says: the focal length as a share of the calibration's, and its standard deviation. Its last word
-  /// counts.
+  /// What the image says: the focal length as a share of the calibration's, and its standard deviation. Replaces what
+  /// was added before for the same image.
   void add(double scale, double sigma);
 
   /// The last images agree with the calibration, and are sure of it.
