@@ -1,4 +1,5 @@
 """Runs the programs of the folder that the command line names first."""
+import os
 import subprocess
 import sys
 import tempfile
@@ -8,12 +9,13 @@ from pathlib import Path
 import rosbag
 
 PROGRAMS = Path(sys.argv[1]).resolve()
+TIMEOUT_S = 200 * int(os.environ.get('VISUAL_LOCALIZATION_TEST_SLOWNESS', '1'))  # of a program in this build
 
 
 def run(program: str, *arguments, **options) -> subprocess.CompletedProcess:
     """Runs a program to its end."""
     command = [str(PROGRAMS / program), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, **options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False, **options)
 
 
 def first_images(bag: Path, count: int, part: Path) -> Path:
