@@ -162,6 +162,23 @@ TEST(TrajectoryCleaner, HowFarANodeMayBeAsideFollowsFromTheNoiseOfItsFixes) {
   }
 }
 
+// A fix every 5 s, 1.41 m to the left and to the right of a straight way at 5 m/s in turn: each is a node of its own,
+// and all steps are alike. Their noise is that of the fixes, sqrt(2) (1.4826 / 2.449) 4 m = 3.42 m. To go aside and
+// back costs 2 ((v - 5) / hypot(3.42 / 5, 0.25))^2, to leave the fix out 8 + 1.5: equal at 6.59 m/s, 20.05 m aside.
+TEST(TrajectoryCleaner, AFixThatIsANodeOfItsOwnHasNoMedian) {
+  for (const double aside_m : {19.5, 20.6}) {
+    std::vector<Fix> fixes;
+    const LocalFrame frame(test::kDatum);
+    for (int i = 0; i < 100; ++i) {
+      const double side = i % 2 == 0 ? 1.0 : -1.0;
+      const Eigen::Vector2d on_the_way_m = Eigen::Vector2d::Constant(25.0 * i / std::sqrt(2.0));
+      fixes.push_back({stampOf(5.0 * i), frame.toGeodetic(on_the_way_m + side * Eigen::Vector2d(1.0, -1.0)), true});
+    }
+    shift(fixes[50], (aside_m - std::sqrt(2.0)) * Eigen::Vector2d(1.0, -1.0).normalized());
+    EXPECT_EQ(clean(fixes).verdicts[50], aside_m < 20.05 ? FixVerdict::kKept : FixVerdict::kSpike) << aside_m;
+  }
+}
+
 // Exact fixes in pairs, of a robot at 5 m/s: their second differences are the intervals, not noise.
 TEST(TrajectoryCleaner, UnevenIntervalsAreNoNoise) {
   std::vector<Fix> fixes;

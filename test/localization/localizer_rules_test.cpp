@@ -204,6 +204,18 @@ TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
   EXPECT_EQ(see(20.0).session, "");
 }
 
+TEST_F(LocalizerRules, AnImageThatIsNotRecognisedTeachesNothingAboutSessions) {
+  constexpr int kTrialEvery = 4;
+  make({}, twoSessions());
+  image_->best_of_others = 0.2;
+  for (int i = 1; i <= 80; ++i) {
+    image_->best = i % kTrialEvery == 0 ? 0.02 : 0.2;
+    const Estimate estimate = see(20.0);
+    EXPECT_EQ(estimate.tracked.best.recognised, i % kTrialEvery != 0) << i;
+    EXPECT_EQ(estimate.session, "first") << i;
+  }
+}
+
 TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
   make({}, twoSessions());
   for (int i = 0; i < 30; ++i) see(20.0);
