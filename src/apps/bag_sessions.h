@@ -8,7 +8,7 @@
 #include "apps/map_export.h"
 #include "editing/map_merger.h"
 #include "editing/map_selection.h"
-#include "visual_localization/geometry/geometry_config.h"
+#include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/map_builder.h"
 
 /// How recordings become sessions of a map, how maps grow, and what the programs say of it.

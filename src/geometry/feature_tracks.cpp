@@ -177,4 +177,48 @@ std::vector<FeatureTrack> cutTrack(const FeatureTrack& track, std::size_t max_vi
   return pieces;
 }
 
+namespace {
+
+constexpr double kNearest_m = 0.1;  ///< a point closer to a camera than this is none
+
+Eigen::Vector3d direction(const Sight& sight) {
+  return sight.camera->rotation * sight.normalised.homogeneous().normalized();
+}
+
+/// The direction farthest from `from`.
+Eigen::Vector3d farthest(const Eigen::Vector3d& from, const std::vector<Sight>& sights) {
+  Eigen::Vector3d found = from;
+  for (const Sight& sight : sights) {
+    const Eigen::Vector3d other = direction(sight);
+    if (from.dot(other) < from.dot(found)) found = other;
+  }
+  return found;
+}
+
+/// Of rays that lie in a plane, as those from a path do, it is the widest; of others all but that.
+double widestAngle_rad(const std::vector<Sight>& sights) {
+  const Eigen::Vector3d one_end = farthest(direction(sights.front()), sights);
+  return std::acos(std::clamp(one_end.dot(farthest(one_end, sights)), -1.0, 1.0));
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> triangulate(const std::vector<Sight>& sights, double min_angle_rad) {
+  if (sights.size() < 2 || widestAngle_rad(sights) < min_angle_rad) return std::nullopt;
+  const Eigen::Vector3d& origin = sights.front().camera->position_m;  // keeps the sums small
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
+  for (const Sight& sight : sights) {
+    const Eigen::Vector3d ray = direction(sight);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray * ray.transpose();
+    sum += across;
+    weighted += across * (sight.camera->position_m - origin);
+  }
+  const Eigen::Vector3d point = origin + Eigen::Vector3d(sum.ldlt().solve(weighted));
+  const bool visible = point.allFinite() && std::all_of(sights.begin(), sights.end(), [&point](const Sight& sight) {
+                         return sight.camera->toCamera(point).z() > kNearest_m;
+                       });
+  return visible ? std::optional<Eigen::Vector3d>(point) : std::nullopt;
+}
+
 }  // namespace visual_localization

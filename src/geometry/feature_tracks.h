@@ -3,11 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory.h"
+#include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {
 
@@ -62,5 +66,15 @@ class FeatureSets {
 /// what all sessions see on the same stretch, if they drive the same way. `session_of_image`: increasing.
 std::vector<FeatureTrack> cutTrack(const FeatureTrack& track, std::size_t max_views,
                                    const std::function<std::size_t(std::uint32_t image)>& session_of_image);
+
+/// A ray from a camera towards a point.
+struct Sight {
+  const CameraPose* camera = nullptr;
+  Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z in the camera's frame
+};
+
+/// The point nearest to all rays (least squares), map frame, metres. Nothing when the rays are all but parallel, the
+/// widest angle between two of them below `min_angle_rad`, or when the point is behind a camera.
+std::optional<Eigen::Vector3d> triangulate(const std::vector<Sight>& sights, double min_angle_rad);
 
 }  // namespace visual_localization

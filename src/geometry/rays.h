@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -11,7 +10,6 @@
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
-#include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {
 
@@ -56,20 +54,27 @@ struct KeypointRays {
 };
 
 /// A small feature is found to `sigma_px`, a large one, whose octave has larger pixels, less exactly.
-KeypointRays raysOf(const SiftFeatures& features, const CameraModel& camera, double sigma_px);
+inline KeypointRays raysOf(const SiftFeatures& features, const CameraModel& camera, double sigma_px) {
+  constexpr double kSmall_px = 6.0;
+  std::vector<Eigen::Vector2d> pixels;
+  KeypointRays rays;
+  for (const SiftKeypoint& keypoint : features.keypoints()) {
+    pixels.emplace_back(keypoint.x_px, keypoint.y_px);
+    const double growth = std::hypot(1.0, keypoint.size_px / kSmall_px);
+    rays.sigmas.push_back(sigma_px * growth / camera.intrinsics().fx);
+  }
+  rays.normalised = camera.undistort(pixels);
+  return rays;
+}
 
 /// The matches of which both features have a ray.
-std::vector<FeatureMatch> usable(const std::vector<FeatureMatch>& matches, const KeypointRays& a,
-                                 const KeypointRays& b);
-
-/// A ray from a camera towards a point.
-struct Sight {
-  const CameraPose* camera = nullptr;
-  Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z in the camera's frame
-};
-
-/// The point nearest to all rays (least squares), map frame, metres. Nothing when the rays are all but parallel, the
-/// widest angle between two of them below `min_angle_rad`, or when the point is behind a camera.
-std::optional<Eigen::Vector3d> triangulate(const std::vector<Sight>& sights, double min_angle_rad);
+inline std::vector<FeatureMatch> usable(const std::vector<FeatureMatch>& matches, const KeypointRays& a,
+                                        const KeypointRays& b) {
+  std::vector<FeatureMatch> kept;
+  for (const FeatureMatch& match : matches) {
+    if (a.normalised[match.a].allFinite() && b.normalised[match.b].allFinite()) kept.push_back(match);
+  }
+  return kept;
+}
 
 }  // namespace visual_localization

@@ -14,7 +14,7 @@
 #include "geometry/relative_rotation.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geo/trajectory.h"
-#include "visual_localization/geometry/geometry_config.h"
+#include "visual_localization/geometry/image_geometry.h"
 
 namespace visual_localization {
 

@@ -15,7 +15,6 @@
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/camera_pose.h"
-#include "visual_localization/geometry/geometry_config.h"
 #include "visual_localization/geometry/image_geometry.h"
 
 namespace visual_localization {

@@ -74,31 +74,21 @@ void MotionEvidence::add(double gain) { sum_ = std::clamp(sum_ + std::min(gain, 
 void PoseVerifier::configure(const MetricConfig& config) {
   config_ = config;
   focal_.configure(config.max_focal_error);
+  predictor_.configure(config);
 }
 
 void PoseVerifier::reset() {
-  last_.reset();
+  predictor_.reset();
   inliers_together_ = 0;
-  elsewhere_ = 0;
   moving_ = {};
   moving_gain_ = 0.0;
 }
 
-void PoseVerifier::doubtMotion() {
-  if (last_) last_->velocity_holds = false;
-}
-
-void PoseVerifier::useOdometry(const OdometryTrack& track, const OdometryConfig& config) {
-  odometry_ = &track;
-  odometry_config_ = config;
-}
-
 void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
                               const SensorMount& mount) {
-  ++images_since_;
+  predictor_.startImage(stamp_ns);
   focal_.startImage();
   moving_.add(std::exchange(moving_gain_, 0.0));
-  stamp_ns_ = stamp_ns;
   features_ = &features;
   rays_ = raysOf(features, camera, config_.keypoint_sigma_px);
   focal_px_ = camera.intrinsics().fx;
@@ -108,11 +98,11 @@ void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& feature
 
 /// Wheels may slip: then the velocity before may still lead there.
 std::optional<MetricPose> PoseVerifier::nearPrediction() {
-  const std::optional<MetricPose> pose = near(byOdometry());
-  return pose ? pose : near(byVelocity());
+  const std::optional<MetricPose> pose = near(predictor_.byOdometry());
+  return pose ? pose : near(predictor_.byVelocity());
 }
 
-std::optional<MetricPose> PoseVerifier::near(const std::optional<Prediction>& prediction) {
+std::optional<MetricPose> PoseVerifier::near(const std::optional<PredictedPose>& prediction) {
   if (!prediction) return std::nullopt;
   const auto few = static_cast<std::size_t>(std::min(config_.min_inliers, config_.min_inliers_predicted));
   std::vector<std::size_t> images =
@@ -121,7 +111,8 @@ std::optional<MetricPose> PoseVerifier::near(const std::optional<Prediction>& pr
   if (trial) images.push_back(*trial);
   const auto pose = solveAround(prediction->position_m, prediction->yaw_rad, images, few, trial);
   if (!pose) return std::nullopt;
-  if (pose->inliers < static_cast<std::size_t>(config_.min_inliers) && !isPredicted(*pose)) return std::nullopt;
+  if (pose->inliers < static_cast<std::size_t>(config_.min_inliers) && !predictor_.isPredicted(*pose))
+    return std::nullopt;
   return accepted(*pose);
 }
 
@@ -260,7 +251,7 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
 
 /// Of this pose and of those before it that it follows.
 std::size_t PoseVerifier::inliersTogether(const MetricPose& pose) const {
-  return (follows(pose) ? inliers_together_ : 0) + pose.inliers;
+  return (predictor_.follows(pose) ? inliers_together_ : 0) + pose.inliers;
 }
 
 /// Whether enough landmarks agree for TRACKING.
@@ -269,160 +260,11 @@ bool PoseVerifier::isClear(const MetricPose& pose) const {
 }
 
 std::optional<MetricPose> PoseVerifier::accepted(MetricPose pose) {
-  if (isAside(pose)) return std::nullopt;
+  if (predictor_.isAside(pose)) return std::nullopt;
   const bool clear = isClear(pose);
   inliers_together_ = inliersTogether(pose);
-  const std::optional<bool> odometry_agrees = odometryAgrees(pose);
-  pose.confirmed = !isElsewhere(pose, odometry_agrees) && focal_.confirms() && clear;
-  if (odometry_agrees) judgeOdometry(*odometry_agrees);
-  Known known{stamp_ns_, pose, {}, 0.0, true};
-  if (last_ && last_->velocity_holds) {
-    const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
-    if (elapsed_s > 0.0 && elapsed_s <= config_.max_gap_s) {
-      known.velocity_mps = (pose.base.translation() - last_->pose.base.translation()).head<2>() / elapsed_s;
-      known.turned_rad = angleDifference(yawOf(last_->pose.base), yawOf(pose.base));
-      if (isPredicted(pose)) speed_mps_ = known.velocity_mps->norm();  // two that agree
-    }
-  }
-  last_ = known;
-  images_since_ = 0;
+  pose.confirmed = predictor_.add(pose) && focal_.confirms() && clear;
   return pose;
-}
-
-// Where the motion since the last verified pose leads, and what a pose says about it.
-
-namespace {
-
-constexpr double kTurn = 0.5;            ///< how far off the straight way a robot may be, as a share of the way
-constexpr double kUnknownWay_m = 1.0;    ///< the same where one pose tells no speed
-constexpr double kShortWay_m = 10.0;     ///< after a longer one a robot may be anywhere
-constexpr double kTurn_rad_per_m = 0.1;  ///< standard deviation of how much it turns on the way
-constexpr double kSlipped_m = 0.3;       ///< odometry that is off by more, beside its own uncertainty, is wrong
-constexpr double kSlipped_rad = 0.3;
-constexpr std::size_t kImagesOfDistrust = 10;
-
-/// Where odometry leads from `last`. A wrong heading moves it aside, the more the farther it goes.
-PoseVerifier::Prediction predictedBy(const MetricPose& last, const OdometryIncrement& way,
-                                     const OdometryConfig& config) {
-  const MetricPose::Covariance covariance = last.covariance + last.map_covariance;
-  const double turn_rad = config.turn_sigma_rad_m * way.distance_m;
-  const Eigen::Vector2d way_m = Eigen::Rotation2Dd(yawOf(last.base)) * way.translation_m;
-  const Eigen::Vector2d aside_m(-way_m.y(), way_m.x());
-  const double yaw_variance = covariance(5, 5) + 0.25 * turn_rad * turn_rad;
-  PoseVerifier::Prediction prediction;
-  prediction.position_m = last.base.translation().head<2>() + way_m;
-  prediction.yaw_rad = std::remainder(yawOf(last.base) + way.rotation_rad, 2.0 * kPi);
-  prediction.sigma_m = config.distance_sigma * way.distance_m;
-  prediction.covariance_m2 = covariance.topLeftCorner<2, 2>() +
-                             prediction.sigma_m * prediction.sigma_m * Eigen::Matrix2d::Identity() +
-                             yaw_variance * aside_m * aside_m.transpose();
-  prediction.yaw_variance_rad2 = covariance(5, 5) + turn_rad * turn_rad;
-  prediction.by_odometry = true;
-  return prediction;
-}
-
-}  // namespace
-
-std::optional<PoseVerifier::Prediction> PoseVerifier::predicted() const {
-  const std::optional<Prediction> prediction = byOdometry();
-  return prediction ? prediction : byVelocity();
-}
-
-std::optional<PoseVerifier::Prediction> PoseVerifier::byOdometry() const {
-  if (!last_ || odometry_ == nullptr || distrust_ > 0) return std::nullopt;
-  const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
-  if (!way || way->distance_m > odometry_config_.max_distance_m) return std::nullopt;
-  return predictedBy(last_->pose, *way, odometry_config_);
-}
-
-std::optional<PoseVerifier::Prediction> PoseVerifier::byVelocity() const {
-  if (!last_ || !last_->velocity_holds) return std::nullopt;
-  const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
-  if (!(elapsed_s >= 0.0 && elapsed_s <= config_.max_gap_s)) return std::nullopt;
-  const MetricPose& last = last_->pose;
-  const Eigen::Vector2d way_m = last_->velocity_mps.value_or(Eigen::Vector2d::Zero()) * elapsed_s;
-  const MetricPose::Covariance covariance = last.covariance + last.map_covariance;
-  Prediction prediction;
-  prediction.position_m = last.base.translation().head<2>() + way_m;
-  prediction.yaw_rad = yawOf(last.base);
-  prediction.sigma_m = last_->velocity_mps ? kTurn * way_m.norm() : kUnknownWay_m;
-  prediction.covariance_m2 =
-      covariance.topLeftCorner<2, 2>() + prediction.sigma_m * prediction.sigma_m * Eigen::Matrix2d::Identity();
-  const double turn_rad = kTurn_rad_per_m * way_m.norm();
-  prediction.yaw_variance_rad2 = covariance(5, 5) + turn_rad * turn_rad;
-  return prediction;
-}
-
-/// By odometry or by the velocity before; of a robot that turned as this pose says, along the arc.
-bool PoseVerifier::isPredicted(const MetricPose& pose) const {
-  const auto agrees = [&](const std::optional<Prediction>& expected) {
-    return expected && (pose.base.translation().head<2>() - expected->position_m).norm() <=
-                           config_.max_prediction_error_m + expected->sigma_m + 2.0 * pose.sigma_m();
-  };
-  std::optional<Prediction> by_velocity = byVelocity();
-  if (agrees(byOdometry()) || agrees(by_velocity)) return true;
-  if (!by_velocity) return false;
-  const Eigen::Vector2d last_m = last_->pose.base.translation().head<2>();
-  const double turned_rad = angleDifference(yawOf(last_->pose.base), yawOf(pose.base));
-  const Eigen::Rotation2Dd along_arc(0.5 * (last_->turned_rad + turned_rad));
-  by_velocity->position_m = last_m + along_arc * (by_velocity->position_m - last_m);
-  return agrees(by_velocity);
-}
-
-/// Whether the robot may have driven here since the last verified pose: it is where the motion leads, or after a short
-/// way no farther than by the speed that it had.
-bool PoseVerifier::follows(const MetricPose& pose) const {
-  if (isPredicted(pose)) return true;
-  if (!last_ || !speed_mps_) return false;
-  const double way_m = *speed_mps_ * secondsBetween(last_->stamp_ns, stamp_ns_);
-  if (!(way_m >= 0.0 && way_m <= kShortWay_m)) return false;
-  const double driven_m = (pose.base.translation() - last_->pose.base.translation()).head<2>().norm();
-  return driven_m <= config_.max_prediction_error_m + (1.0 + kTurn) * way_m;
-}
-
-/// Whether the landmarks may be those of a thing that was moved since the day of the map, a parked car: the motion is
-/// known from the last two images, and the pose is beside where it leads. A robot that was pushed aside is there in the
-/// next image as well, and a kidnapped one is farther away.
-bool PoseVerifier::isAside(const MetricPose& pose) const {
-  if (images_since_ != 1 || !last_) return false;
-  const std::optional<Prediction> expected = predicted();
-  if (!expected || !(expected->by_odometry || last_->velocity_mps) || odometryAgrees(pose).value_or(false))
-    return false;
-  return !isPredicted(pose) && (pose.base.translation().head<2>() - expected->position_m).norm() < kApart_m;
-}
-
-/// Whether odometry since the last verified pose leads to this one; nothing when it does not know.
-std::optional<bool> PoseVerifier::odometryAgrees(const MetricPose& pose) const {
-  if (!last_ || odometry_ == nullptr) return std::nullopt;
-  const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
-  if (!way) return std::nullopt;
-  const Prediction expected = predictedBy(last_->pose, *way, odometry_config_);
-  const double off_m = (pose.base.translation().head<2>() - expected.position_m).norm();
-  const double turned_rad = std::abs(angleDifference(expected.yaw_rad, yawOf(pose.base)));
-  return off_m <= kSlipped_m + 3.0 * largerSigma(expected.covariance_m2) && turned_rad <= kSlipped_rad;
-}
-
-/// Wheels that slip or a robot that was carried: what odometry says is worth nothing until it agrees again for a while.
-void PoseVerifier::judgeOdometry(bool agrees) {
-  if (!agrees) {
-    distrust_ = kImagesOfDistrust;
-  } else if (distrust_ > 0) {
-    --distrust_;
-  }
-}
-
-/// Odometry that is believed leads elsewhere: the robot was carried, the wheels have slipped while nothing was seen, or
-/// this is the twin of the place. The first two stay, and a few more poses along the motion tell.
-bool PoseVerifier::isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees) {
-  const bool predicted = isPredicted(pose);
-  if (byOdometry() && !odometry_agrees.value_or(true) && !predicted) {
-    elsewhere_ = kImagesOfDistrust;
-  } else if (!odometry_agrees && !byVelocity()) {
-    elsewhere_ = 0;  // nobody knows any more how it came here
-  } else if (elsewhere_ > 0 && (predicted || odometry_agrees.value_or(false))) {
-    --elsewhere_;
-  }
-  return elsewhere_ > 0;
 }
 
 }  // namespace visual_localization

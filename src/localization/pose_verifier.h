@@ -8,6 +8,7 @@
 
 #include "geometry/pose_solver.h"
 #include "geometry/rays.h"
+#include "localization/pose_predictor.h"
 #include "localization/session_choice.h"
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geometry/camera_pose.h"
@@ -76,29 +77,17 @@ class MotionEvidence {
 /// predicts, or else of those that look most alike. The solved pose is judged, not the image that it came from.
 class PoseVerifier {
  public:
-  /// A pose that no image verifies.
-  struct Prediction {
-    Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-    double yaw_rad = 0.0;
-    double sigma_m = 0.0;                                     ///< of each axis of the way since the last verified pose
-    Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< of all of it, the map's own included
-    double yaw_variance_rad2 = 0.0;
-    bool by_odometry = false;
-  };
-
   /// `map` and `sessions`, which is told how well its sessions match, must outlive it.
   PoseVerifier(const TrainingMap& map, const MetricConfig& config, SessionChoice& sessions)
-      : map_(map), config_(config), sessions_(sessions), focal_(config.max_focal_error) {}
+      : map_(map), config_(config), sessions_(sessions), focal_(config.max_focal_error), predictor_(config) {}
 
   void configure(const MetricConfig& config);
-  /// How far odometry moves since the last verified pose are believed, from now on. Until then there is none. `track`
-  /// must outlive it.
-  void useOdometry(const OdometryTrack& track, const OdometryConfig& config);
-  /// The robot may be anywhere: forgets the last verified pose. How far odometry is believed does not depend on where
-  /// the robot is, and stays.
+  /// As PosePredictor::useOdometry().
+  void useOdometry(const OdometryTrack& track, const OdometryConfig& config) { predictor_.useOdometry(track, config); }
+  /// The robot may be anywhere: forgets the last verified pose.
   void reset();
-  /// For a while nothing was seen: the velocity no longer holds, but what odometry says of the way since does.
-  void doubtMotion();
+  /// As PosePredictor::doubtMotion().
+  void doubtMotion() { predictor_.doubtMotion(); }
   /// Another camera, or another calibration of it.
   void resetCamera() { focal_.reset(); }
   /// The next image. Its features, not pruned, must live until the one after it.
@@ -110,9 +99,8 @@ class PoseVerifier {
   std::optional<MetricPose> nearPrediction();
   /// The same near the first of `training_images` that verifies a pose; the most similar come first.
   std::optional<MetricPose> nearOneOf(const std::vector<std::size_t>& training_images);
-  /// Where the motion since the last verified pose leads to, by odometry or else by the velocity before; nothing when
-  /// that was longer ago than a prediction holds.
-  std::optional<Prediction> predicted() const;
+  /// Where the motion since the last verified pose leads to.
+  std::optional<PredictedPose> predicted() const { return predictor_.predicted(); }
   /// Training images whose landmarks were matched with the image, each once.
   std::vector<std::size_t> compared() const;
   /// What the last solved pose rests on: of the training image that shares most inliers with it.
@@ -120,16 +108,9 @@ class PoseVerifier {
   /// What the last images say about the calibration. While they contradict it no pose is verified.
   const FocalCheck& focal() const { return focal_; }
   /// Images since the last verified one; 0 when it was the last. No reset changes it.
-  std::size_t imagesSince() const { return images_since_; }
+  std::size_t imagesSince() const { return predictor_.imagesSince(); }
 
  private:
-  struct Known {
-    std::int64_t stamp_ns = 0;
-    MetricPose pose;
-    std::optional<Eigen::Vector2d> velocity_mps;
-    double turned_rad = 0.0;  ///< on the way that tells the velocity
-    bool velocity_holds = true;
-  };
   /// A landmark and the feature of the image that seems to show it.
   struct Match {
     std::uint32_t landmark = 0;
@@ -151,15 +132,7 @@ class PoseVerifier {
   const std::vector<Match>& matchesWith(std::size_t training_image);
   void match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches);
   std::vector<std::size_t> keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers);
-  std::optional<Prediction> byOdometry() const;
-  std::optional<Prediction> byVelocity() const;
-  std::optional<MetricPose> near(const std::optional<Prediction>& prediction);
-  bool isPredicted(const MetricPose& pose) const;
-  bool follows(const MetricPose& pose) const;
-  std::optional<bool> odometryAgrees(const MetricPose& pose) const;
-  void judgeOdometry(bool agrees);
-  bool isElsewhere(const MetricPose& pose, std::optional<bool> odometry_agrees);
-  bool isAside(const MetricPose& pose) const;
+  std::optional<MetricPose> near(const std::optional<PredictedPose>& prediction);
   std::size_t inliersTogether(const MetricPose& pose) const;
   bool isClear(const MetricPose& pose) const;
   std::optional<MetricPose> accepted(MetricPose pose);
@@ -167,18 +140,11 @@ class PoseVerifier {
   const TrainingMap& map_;
   MetricConfig config_;
   SessionChoice& sessions_;
-  std::optional<Known> last_;
   FocalCheck focal_;
-  MotionEvidence moving_;     ///< of the images before
-  double moving_gain_ = 0.0;  ///< of the pose last solved in the image
-  const OdometryTrack* odometry_ = nullptr;
-  OdometryConfig odometry_config_;
-  std::size_t distrust_ = 0;   ///< verified poses that odometry must agree with before it is believed again
-  std::size_t elsewhere_ = 0;  ///< verified poses that must follow before one that odometry contradicts is confirmed
-  std::optional<double> speed_mps_;   ///< of the last two verified poses that agree about it
+  PosePredictor predictor_;
+  MotionEvidence moving_;             ///< of the images before
+  double moving_gain_ = 0.0;          ///< of the pose last solved in the image
   std::size_t inliers_together_ = 0;  ///< of verified poses that follow each other
-  std::size_t images_since_ = 0;
-  std::int64_t stamp_ns_ = 0;
   const SiftFeatures* features_ = nullptr;
   KeypointRays rays_;  ///< of the features
   double focal_px_ = 0.0;

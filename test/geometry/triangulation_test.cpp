@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "geometry/rays.h"
+#include "geometry/feature_tracks.h"
 
 namespace visual_localization {
 namespace {

@@ -16,7 +16,6 @@
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
-#include "visual_localization/geometry/geometry_config.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/training_map.h"
 
