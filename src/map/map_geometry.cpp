@@ -12,6 +12,7 @@
 #include <GeographicLib/Geodesic.hpp>
 
 #include "base/numbers.h"
+#include "base/time.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/map/map_builder.h"
@@ -183,9 +184,37 @@ UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::siz
   return session;
 }
 
-/// From the antenna to the robot, which looks where it drives.
-void placeByAntenna(TrainingImage& image, const SensorMount& mount) {
-  image.position_m -= Eigen::Rotation2Dd(image.yaw_rad) * mount.antenna_m.head<2>();
+/// Where the robot was by the path of its antenna: it looks where it drives.
+std::vector<TrajectoryPoint> pathByAntenna(const TrainingMap& map, std::size_t begin, std::size_t end,
+                                           const SensorMount& mount) {
+  std::vector<TrajectoryPoint> path;
+  for (std::size_t i = begin; i < end; ++i) {
+    const double yaw_rad = map.yaw_rad(i);
+    const Eigen::Vector2d antenna_m = Eigen::Rotation2Dd(yaw_rad) * mount.antenna_m.head<2>();
+    path.push_back({map.pose(i).stamp_ns, map.position_m(i) - antenna_m, yaw_rad});
+  }
+  return path;
+}
+
+double wayAlong_m(const std::vector<TrajectoryPoint>& path, std::size_t begin, std::size_t end) {
+  double way_m = 0.0;
+  for (std::size_t i = begin; i < end; ++i) way_m += (path[i + 1].position_m - path[i].position_m).norm();
+  return way_m;
+}
+
+/// What is between `begin` and `end`, which have moved from where they were `before`, moves with them.
+void moveBetween(std::size_t begin, std::size_t end, const std::vector<TrajectoryPoint>& before,
+                 std::vector<TrajectoryPoint>& path) {
+  const Eigen::Vector2d moved_m = path[begin].position_m - before[begin].position_m;
+  const Eigen::Vector2d more_m = path[end].position_m - before[end].position_m - moved_m;
+  const double turned_rad = angleDifference(before[begin].yaw_rad, path[begin].yaw_rad);
+  const double more_rad = angleDifference(turned_rad, angleDifference(before[end].yaw_rad, path[end].yaw_rad));
+  const double elapsed_s = secondsBetween(path[begin].stamp_ns, path[end].stamp_ns);
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    const double share = secondsBetween(path[begin].stamp_ns, path[i].stamp_ns) / elapsed_s;
+    path[i].position_m += moved_m + share * more_m;
+    path[i].yaw_rad = std::remainder(path[i].yaw_rad + turned_rad + share * more_rad, 2.0 * kPi);
+  }
 }
 
 /// The first image of each session, and the end of the last one.
@@ -226,6 +255,22 @@ void keepFeatures(const std::vector<std::size_t>& kept, TrainingImage& image) {
     landmarks.push_back(landmark);
   }
   image.geometry->landmarks = std::move(landmarks);
+}
+
+std::vector<TrajectoryPoint> adjustedPath(const std::vector<TrajectoryPoint>& by_antenna, const SensorMount& mount,
+                                          const std::vector<std::optional<ImageGeometry>>& images) {
+  constexpr double kBetween_m = 30.0;
+  std::vector<TrajectoryPoint> path = by_antenna;
+  std::optional<std::size_t> last;  // that a camera has placed
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    if (!images[i]) continue;
+    const Eigen::Isometry3d base = mount.baseInMap(images[i]->camera);
+    path[i].position_m = base.translation().head<2>();
+    path[i].yaw_rad = yawOf(base);
+    if (last && wayAlong_m(by_antenna, *last, i) <= kBetween_m) moveBetween(*last, i, by_antenna, path);
+    last = i;
+  }
+  return path;
 }
 
 void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry) {
@@ -275,14 +320,15 @@ std::size_t writeThinned(const TrainingMap& unpruned, const std::vector<Session>
   std::size_t thinned = 0;
   for (std::size_t k = 0; k < geometries.size(); ++k) {
     SpacingFilter spacing(geometries[k] ? std::max(config.spacing_m, config.geometry.spacing_m) : config.spacing_m);
+    const SensorMount mount = sessions[k].mount.value_or(SensorMount());
+    std::vector<TrajectoryPoint> path = pathByAntenna(unpruned, begin[k], begin[k + 1], mount);
+    if (geometries[k]) path = adjustedPath(path, mount, geometries[k]->images);
     for (std::size_t i = begin[k]; i < begin[k + 1]; ++i) {
       TrainingImage image = unpruned.image(i);
-      const SensorMount mount = sessions[k].mount.value_or(SensorMount());
-      if (geometries[k] && geometries[k]->images[i - begin[k]]) {
-        placeByCamera(image, mount, std::move(*geometries[k]->images[i - begin[k]]));
-      } else {
-        placeByAntenna(image, mount);
-      }
+      const TrajectoryPoint& at = path[i - begin[k]];
+      image.position_m = at.position_m;
+      image.yaw_rad = at.yaw_rad;
+      if (geometries[k]) image.geometry = std::move(geometries[k]->images[i - begin[k]]);
       prune(i, image);
       if (spacing.keeps(image.position_m)) {
         sink(image);

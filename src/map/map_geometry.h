@@ -91,6 +91,12 @@ void requireUsable(const ImageGeometry& geometry, std::size_t feature_count);
 /// Of the image's features keeps those with these indices, which are in order, and the landmarks that they show.
 void keepFeatures(const std::vector<std::size_t>& kept, TrainingImage& image);
 
+/// Where the robot was at the images of a session: by the pose of its camera where landmarks tell it. Between two such
+/// images, at most 30 m apart along the path, the others move as these do, in proportion to the time: fixes bend aside
+/// for longer than a few images show nothing. `by_antenna`: the path by fixes, in order of time.
+std::vector<TrajectoryPoint> adjustedPath(const std::vector<TrajectoryPoint>& by_antenna, const SensorMount& mount,
+                                          const std::vector<std::optional<ImageGeometry>>& images);
+
 /// The image is where the robot was by the pose of its camera.
 void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry);
 
