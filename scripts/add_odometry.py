@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Copies a bag and adds wheel odometry on /odom, for measurements: that of a robot that drove the true positions.
+"""Copies a bag with wheel odometry on /odom, for measurements: that of a robot that drove the true positions.
 
 The wheels err as in make_round_bag.py (wheel_odometry.py). A covered camera, slipping wheels and a faster robot show
 what odometry is worth, and what it does when it is wrong. Times count from the first image.
@@ -61,6 +61,8 @@ def write(options: argparse.Namespace) -> int:
             copy.write(topic, message, message.header.stamp)
         images = 0
         for topic, message, stamp in bag.read_messages():
+            if topic == TOPIC:  # two sets of wheels contradict each other
+                continue
             if 'image' in topic:
                 images += 1
                 if (images - 1) % options.every:

@@ -134,6 +134,20 @@ class RoundBagTest(unittest.TestCase):
         stamps = [message.header.stamp for message in odometry]
         self.assertEqual(stamps, sorted(stamps))
 
+    def test_added_odometry_takes_the_place_of_what_the_bag_has(self):
+        self.write(tilted=True)
+        before = self.messages()
+        copy = self.folder / 'copy.bag'
+        subprocess.run([sys.executable, str(SCRIPTS / 'add_odometry.py'), '--bag', str(self.folder / 'round.bag'),
+                        '--output', str(copy), '--slip', '60', '90'], capture_output=True, timeout=100, check=True)
+        with rosbag.Bag(str(copy)) as bag:
+            counts = {topic: info.message_count for topic, info in bag.get_type_and_topic_info().topics.items()}
+            odometry = [message for _, message, _ in bag.read_messages(['/odom'])]
+        self.assertEqual(counts, {topic: len(messages) for topic, messages in before.items()})
+        places = np.array([(message.pose.pose.position.x, message.pose.pose.position.y) for message in odometry])
+        way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+        self.assertAlmostEqual(way, COUNT + 3 * 30, delta=8)
+
     def test_refuses_a_folder_without_calibration(self):
         self.write(tilted=True, calibrated=False)
         result = self.run_script()
