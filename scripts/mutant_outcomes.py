@@ -166,7 +166,7 @@ def main() -> int:
     command.add_argument('--resume', action='store_true', help='keep the outcomes that are there')
     command.add_argument('--jobs', type=int, default=os.cpu_count())
     command.add_argument('--sample', type=int, default=0, help='as many, chosen at random')
-    command.add_argument('--slowest', type=float, default=0.5, help='tests that take more processor time are left out [s]')
+    command.add_argument('--slowest', type=float, default=3.0, help='tests that take more processor time are left out [s]')
     command.add_argument('--seed', type=int, default=1)
     command.add_argument('program', nargs='+', help='GoogleTest programs')
     command.set_defaults(function=run)

@@ -51,11 +51,6 @@ void PosePredictor::useOdometry(const OdometryTrack& track, const OdometryConfig
   odometry_config_ = config;
 }
 
-void PosePredictor::reset() {
-  last_.reset();
-  elsewhere_ = 0;
-}
-
 void PosePredictor::doubtMotion() {
   if (last_) last_->velocity_holds = false;
 }

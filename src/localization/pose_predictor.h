@@ -33,7 +33,7 @@ class PosePredictor {
   void useOdometry(const OdometryTrack& track, const OdometryConfig& config);
   /// The robot may be anywhere: forgets the last verified pose. How far odometry is believed does not depend on where
   /// the robot is, and stays.
-  void reset();
+  void reset() { last_.reset(); }
   /// For a while nothing was seen: the velocity no longer holds, but what odometry says of the way since does.
   void doubtMotion();
   /// The next image, taken at this time.

@@ -67,6 +67,31 @@ TEST_F(Odometry, SaysNothingAboutTimesThatItDoesNotKnow) {
   EXPECT_FALSE(between(1e9, 1e9 + 1.0)) << "another clock";
 }
 
+TEST_F(Odometry, AJumpSpoilsNothingBeforeIt) {
+  driveOn(0.0, 1.0);
+  add(1.1, 50.0, 0.0);
+  EXPECT_TRUE(between(0.0, 1.0)) << "up to the reading before it";
+  EXPECT_FALSE(between(0.0, 1.05)) << "into it";
+  EXPECT_FALSE(between(1.0, 1.1));
+}
+
+TEST_F(Odometry, TheFastestSpeedIsNoJump) {
+  OdometryConfig config;
+  config.max_speed_mps = 2.0;
+  OdometryTrack track(config);
+  for (const double time_s : {0.0, 0.5, 1.0}) track.add({ns(time_s), {2.0 * time_s, 0.0}, 0.0});
+  EXPECT_TRUE(track.between(0, kSecond_ns));
+  track.add({ns(1.5), {3.0 + 1e-6, 0.0}, 0.0});
+  EXPECT_FALSE(track.between(0, ns(1.5)));
+}
+
+TEST_F(Odometry, TwentyThousandReadingsAreKept) {
+  constexpr std::int64_t kStep_ns = 10'000'000;
+  for (std::int64_t k = 0; k <= 20'000; ++k) track_.add({k * kStep_ns, {0.01 * static_cast<double>(k), 0.0}, 0.0});
+  EXPECT_FALSE(track_.between(0, 10 * kStep_ns));
+  EXPECT_TRUE(track_.between(kStep_ns, 10 * kStep_ns));
+}
+
 TEST_F(Odometry, SilenceAndJumpsAreNoMotion) {
   driveOn(0.0, 1.0);
   driveOn(2.0, 3.0);
