@@ -124,6 +124,16 @@ TEST(FeatureChoice, SiftLooksAfterASmallCloudEverySoManyImages) {
   EXPECT_EQ(kindsOf(choice, 10, false), "gggggggggg") << "as in the paper";
 }
 
+TEST(FeatureChoice, OtherThresholdsDoNotDelayTheNextLook) {
+  HybridConfig config;
+  config.sift_every = 4;
+  FeatureChoice choice("hybrid", config);
+  EXPECT_EQ(kindsOf(choice, 2, true), "Sg");
+  config.global_above_m += 1.0;
+  choice.configure("hybrid", config);
+  EXPECT_EQ(kindsOf(choice, 4, true), "ggSg");
+}
+
 TEST(FeatureChoice, ResetBeginsWithSiftAgain) {
   FeatureChoice choice = hybridAt(kGlobal);
   choice.reset();

@@ -226,9 +226,9 @@ TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
   EXPECT_TRUE(second);
 }
 
-TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
+/// Only odometry moves it.
+LocalizerConfig ofAStillSwarm() {
   LocalizerConfig config;
-  config.odometry.share = 1.0;
   config.dpso.quantum_share = 0.0;
   config.dpso.quantum_share_max = 0.0;
   config.dpso.inertia = 0.0;
@@ -236,6 +236,12 @@ TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
   config.dpso.phi2 = 0.0;
   config.dpso.phi2_min = 0.0;
   config.dpso.recovery = "none";
+  return config;
+}
+
+TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
+  LocalizerConfig config = ofAStillSwarm();
+  config.odometry.share = 1.0;
   make(config);
   for (int k = 0; k <= 100; ++k) localizer_->addOdometry({k * kSecond_ns / 10, {0.2 * k, 0.0}, 0.0});  // 2 m/s
   localizer_->relocalize(around({20.0, 0.0}, 1.0));
@@ -247,6 +253,23 @@ TEST_F(LocalizerRules, OdometryMovesTheParticlesByTheWaySinceTheLastImage) {
     EXPECT_NEAR(localizer_->particles().front().position_m.x(), x_m + 2.0, 1e-6) << i;
     x_m = localizer_->particles().front().position_m.x();
   }
+}
+
+TEST_F(LocalizerRules, AnotherShareOfOdometryHoldsFromTheNextImageOn) {
+  LocalizerConfig config = ofAStillSwarm();
+  config.odometry.share = 0.0;
+  make(config);
+  for (int k = 0; k <= 100; ++k) localizer_->addOdometry({k * kSecond_ns / 10, {0.2 * k, 0.0}, 0.0});  // 2 m/s
+  localizer_->relocalize(around({20.0, 0.0}, 1.0));
+  image_->best = 0.0;
+  see(20.0);
+  const double before_m = localizer_->particles().front().position_m.x();
+  see(20.0);
+  EXPECT_NEAR(localizer_->particles().front().position_m.x(), before_m, 1e-6);
+  config.odometry.share = 1.0;
+  localizer_->configure(config);
+  see(20.0);
+  EXPECT_NEAR(localizer_->particles().front().position_m.x(), before_m + 2.0, 1e-6);
 }
 
 TEST_F(LocalizerRules, SaysHowFarTheLastImagesAreFromASteadyMotion) {

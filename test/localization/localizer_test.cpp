@@ -240,6 +240,20 @@ TEST_F(LocalizerTest, RefusesABadConfiguration) {
   EXPECT_THROW(Localizer(map(), config), ParameterError);
 }
 
+TEST_F(LocalizerTest, ALiveImageIsRecognisedByThePresentThreshold) {
+  const FrontEndConfig front_end = frontEndConfigOf(LocalizerConfig(), map()->header());
+  LiveImage image(*map(), front_end, SimilarityConfig());
+  image.set(0, viewAt(12.0));
+  ASSERT_TRUE(image.compare(FeatureKind::kSift, 20).recognised);
+  SimilarityConfig strict;
+  strict.sift_recognised = strict.global_recognised = 1.0;
+  image.configure(front_end, strict);
+  image.set(1, viewAt(12.3));
+  const Score score = image.compare(FeatureKind::kSift, 20);
+  EXPECT_GT(score.matches, 0U);
+  EXPECT_FALSE(score.recognised);
+}
+
 TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
   const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
   LiveImage image(*map(), frontEndConfigOf(LocalizerConfig(), map()->header()), SimilarityConfig());

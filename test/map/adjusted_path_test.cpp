@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/numbers.h"
 #include "map/map_geometry.h"
 
 namespace visual_localization {
@@ -59,7 +60,7 @@ TEST(AdjustedPath, TurnsTheShorterWay) {
   std::vector<TrajectoryPoint> before = eastwards(3, 0.0);
   for (TrajectoryPoint& point : before) point.yaw_rad = 3.0;
   const auto path = adjusted(before, {seenFrom({0.0, 0.0}, 3.1), {}, seenFrom({8.0, 0.0}, -3.1)});
-  EXPECT_NEAR(path[1].yaw_rad, EIGEN_PI, 1e-9);
+  EXPECT_NEAR(path[1].yaw_rad, kPi, 1e-9);
 }
 
 TEST(AdjustedPath, StaysByItsFixesAtTheEndsAndFarFromLandmarks) {
