@@ -17,8 +17,8 @@ until one fails. Needs python3-clang (install_dependencies.sh --with-clang).
   --jobs N    mutants at a time (default: the number of cores)
   --resume    keep the outcomes of a run before; they hold for the code and tests of that run
   --test F    test programs of these folders, until the end of the line (default: localization geo)
-Writes build/mutation/outcomes.jsonl and build/mutation/report.md. With two cores: about 10 minutes to build, hours to
-run all. Exit code 0 when the run is complete, whatever survived.
+Writes build/mutation/outcomes.jsonl and build/mutation/report.md. With two cores: about 10 minutes to build, more
+than an hour to run all. Exit code 0 when the run is complete, whatever survived.
 USAGE
 }
 
