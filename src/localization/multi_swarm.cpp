@@ -63,7 +63,6 @@ TrackerEstimate MultiSwarm::update(const TrackerInput& input) {
 /// matched before says nothing.
 void MultiSwarm::restart() {
   active_ = 1;
-  swarms_.front().strength = 0.0;
   swarms_.front().images = 0;
   swarms_.front().unrecognised = 0;
   share();

@@ -254,6 +254,23 @@ TEST(MultiSwarmRules, IsDrawnToWhereItIsAttracted) {
   EXPECT_EQ(robot.tracker.update(robot.street.nowhere()).position_m, TwinStreet::at(170.0));
 }
 
+TEST(MultiSwarmRules, AResetBeginsTheLeadersStrengthAnew) {
+  StandingRobot robot(severalSwarms());
+  robot.look();
+  robot.street.setLikeness(0.5, 0.45);
+  int at_once = 0;
+  for (int i = 0; i < 400; ++i) {
+    robot.tracker.reset(around(TwinStreet::at(StandingRobot::kPlace_m), 1.0));
+    const double weight = robot.look().rival_weight;
+    if (robot.tracker.swarms() == 1U) continue;
+    ++at_once;
+    // A rival has matched half as well to nine tenths as well as the leader, whose images before do not count.
+    EXPECT_GE(weight, 0.5 / 1.5 - 1e-9);
+    EXPECT_LE(weight, 0.9 / 1.9 + 1e-9);
+  }
+  EXPECT_GT(at_once, 10);
+}
+
 TEST(MultiSwarmRules, OtherNumbersOfParticlesAreSharedOut) {
   StandingRobot robot(severalSwarms());
   ASSERT_TRUE(robot.lookUntil(2));

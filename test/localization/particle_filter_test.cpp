@@ -132,6 +132,23 @@ TEST(ParticleFilter, WhatIsInjectedHasAMeanWeightAndTheFirstSpeedInAnyDirection)
   EXPECT_LT(least_of_others, injected.front().weight) << "the worst were replaced, not the best";
 }
 
+TEST(ParticleFilter, OneOfFiftyIsInjectedWhereTheShareSaysSo) {
+  World world = roundWorld();
+  ParticleFilterConfig config;
+  config.particles = 50;
+  config.random_share = 0.02;
+  ParticleFilter filter = makeFilter(world, "pf_gaussian", 7, config);
+  filter.reset(around(onCircle(0.0), 2.0));
+  int far_away = 0;
+  for (int image = 0; image < 20; ++image) {
+    filter.update(world.from(onCircle(0.0)));
+    far_away += std::any_of(filter.particles().begin(), filter.particles().end(), [](const Particle& particle) {
+      return (particle.position_m - onCircle(0.0)).norm() > 15.0;
+    });
+  }
+  EXPECT_GE(far_away, 15);
+}
+
 TEST(ParticleFilter, BeforeTheFirstImageAllWeighAlikeAndNothingMoves) {
   World world = roundWorld();
   ParticleFilterConfig config;

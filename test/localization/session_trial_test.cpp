@@ -10,11 +10,14 @@
 
 #include "localization/pose_verifier.h"
 #include "test/localization/street_map.h"
+#include "test/support/stamps.h"
+#include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
+
 constexpr std::int64_t kEvening_ns = 36'000 * kSecond_ns;
 
 /// The street on two days; on the first one, in the morning, half of its landmarks were seen.
@@ -80,6 +83,32 @@ TEST_F(SessionTrial, WhereAllJoinTheSessionThatShowsMostInliersIsChosen) {
 
 TEST_F(SessionTrial, TheSessionThatShowsFewerInliersIsNot) {
   EXPECT_EQ(chosenOnTheWay(kEvening_ns, 12), std::vector<std::size_t>(12, 1));
+}
+
+/// Its landmarks are those of the map, and yet it looks like no training image.
+class UnlikeImage final : public test::FakeImage {
+ public:
+  explicit UnlikeImage(const TrainingMap& map) : seen(map) {}
+  Score compare(FeatureKind kind, std::size_t i) override {
+    Score score = seen.compare(kind, i);
+    score.recognised = false;
+    return score;
+  }
+  const SiftFeatures* unprunedSift() override { return seen.unprunedSift(); }
+
+  test::GivenImage seen;
+};
+
+TEST_F(SessionTrial, WhereAPoseIsVerifiedTheSessionStaysThoughNothingLooksAlike) {
+  const auto image = std::make_shared<UnlikeImage>(*map_);
+  Localizer localizer(map_, {}, image);
+  for (std::size_t i = 10; i < 30; ++i) {
+    image->seen.features = street_.seenFrom(street_.trueNear(i, Eigen::Vector3d::Zero()));
+    const Estimate estimate = localizer.process(kEvening_ns + static_cast<std::int64_t>(i) * kSecond_ns, cv::Mat());
+    ASSERT_TRUE(estimate.metric) << i;
+    ASSERT_FALSE(estimate.tracked.best.recognised) << i;
+    EXPECT_EQ(estimate.session, "evening") << i;
+  }
 }
 
 /// Near training image 20, which both sessions have.

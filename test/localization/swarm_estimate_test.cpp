@@ -65,23 +65,57 @@ TEST(SwarmEstimate, TheCentreOfTheBestIsThatOfThoseWithAnyWeight) {
   EXPECT_GE(few, 10);
 }
 
-TEST(SwarmEstimate, WithoutTravellersItsSpeedIsThatOfTheWeightedCentre) {
-  World world = roundWorld();
+/// Without smoothing; `quantum_share` of the particles are quantum ones, the others standard.
+DpsoConfig withQuantumShare(double quantum_share) {
   DpsoConfig config;
-  config.quantum_share = 1.0;
-  config.quantum_share_max = 1.0;
+  config.quantum_share = quantum_share;
+  config.quantum_share_max = quantum_share;
   config.high_energy_share = 0.0;
   config.recovery = "none";
   config.ema_alpha = 1.0;
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
-  swarm.update(world.from(onCircle(0.0)));
+  return config;
+}
+
+/// Expects v_sw to be the speed of a point of the swarm while it follows a robot.
+template <class Point>
+void expectSpeedOf(const Point& point_m, World& world, Dpso& swarm) {
   for (int image = 1; image < 10; ++image) {
-    const Eigen::Vector2d before_m = momentsOf(swarm.particles()).mean_m;
+    const Eigen::Vector2d before_m = point_m(swarm);
     TrackerInput input = world.from(onCircle(2.0 * image));
     input.travel.seconds = 0.5;
     swarm.update(input);
-    const double speed_mps = (momentsOf(swarm.particles()).mean_m - before_m).norm() / 0.5;
-    EXPECT_NEAR(swarm.tuning().speed_mps, speed_mps, 1e-9) << image;
+    EXPECT_NEAR(swarm.tuning().speed_mps, (point_m(swarm) - before_m).norm() / 0.5, 1e-9) << image;
+  }
+}
+
+TEST(SwarmEstimate, WithoutTravellersItsSpeedIsThatOfTheWeightedCentre) {
+  World world = roundWorld();
+  Dpso swarm(world.map(), withQuantumShare(1.0), FitnessConfig(), 1);
+  swarm.update(world.from(onCircle(0.0)));
+  expectSpeedOf([](const Dpso& all) { return momentsOf(all.particles()).mean_m; }, world, swarm);
+}
+
+TEST(SwarmEstimate, OneTravellerIsACentre) {
+  World world = roundWorld();
+  DpsoConfig config = withQuantumShare(0.9);
+  config.particles = 10;
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  swarm.update(world.from(onCircle(0.0)));
+  expectSpeedOf([](const Dpso& all) { return all.particles().back().position_m; }, world, swarm);
+}
+
+TEST(SwarmEstimate, AfterAnotherNumberOfParticlesItsSpeedIsThatOfThoseItHas) {
+  World world = roundWorld();
+  for (const std::size_t particles : {std::size_t{20}, std::size_t{90}}) {
+    Dpso swarm(world.map(), withQuantumShare(0.0), FitnessConfig(), 1);
+    for (int image = 0; image < 10; ++image) swarm.update(world.from(onCircle(0.0)));
+    swarm.resize(particles);
+    const auto centre_m = [](const Dpso& all) {
+      Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
+      for (const Particle& particle : all.particles()) sum_m += particle.position_m;
+      return Eigen::Vector2d(sum_m / static_cast<double>(all.particles().size()));
+    };
+    expectSpeedOf(centre_m, world, swarm);
   }
 }
 
