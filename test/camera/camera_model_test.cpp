@@ -8,6 +8,8 @@
 #include <gtest/gtest.h>
 #include <opencv2/calib3d.hpp>
 
+#include "test/support/refusal.h"
+
 namespace visual_localization {
 namespace {
 
@@ -34,13 +36,8 @@ Intrinsics fisheye() {
   return {{640, 480}, 300.0, 301.0, 320.5, 239.0, Distortion::kEquidistant, {-0.01, 0.004, -0.003, 0.0005}};
 }
 
-std::string refusalOf(const Intrinsics& intrinsics) {
-  try {
-    const CameraModel camera(intrinsics);
-  } catch (const CameraError& error) {
-    return error.what();
-  }
-  return "accepted";
+std::string refusalOfLens(const Intrinsics& intrinsics) {
+  return test::refusalOf<CameraError>([&] { const CameraModel camera(intrinsics); });
 }
 
 /// What OpenCV says about a point in front of the camera.
@@ -125,7 +122,7 @@ TEST(CameraModel, RefusesNumbersOutsideTheirRange) {
   const auto with = [](auto change) {
     Intrinsics values = plumbBob();
     change(values);
-    return refusalOf(values);
+    return refusalOfLens(values);
   };
   EXPECT_EQ(with([](Intrinsics&) {}), "accepted");
   EXPECT_THAT(with([](Intrinsics& v) { v.fx = 0.0; }), HasSubstr("fx = 0 is not in [64, 64000]"));
@@ -147,7 +144,7 @@ TEST(CameraModel, RefusesNumbersOutsideTheirRange) {
 TEST(CameraModel, RefusesADistortionThatCannotBeUndone) {
   Intrinsics folded = plumbBob();
   folded.coefficients = {-5.0, 0.0, 0.0, 0.0};  // the radius shrinks from 0.26 on, 120 pixels from the centre
-  EXPECT_THAT(refusalOf(folded), HasSubstr("cannot be undone at pixel"));
+  EXPECT_THAT(refusalOfLens(folded), HasSubstr("cannot be undone at pixel"));
 }
 
 TEST(CameraModel, MarksPixelsBeyondAFishEyeLens) {

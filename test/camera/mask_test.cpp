@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 
 namespace visual_localization {
@@ -23,17 +24,6 @@ cv::Mat bonnet(int width = 64, int height = 48) {
   return grey;
 }
 
-template <class Action>
-std::string refusalOf(Action action) {
-  try {
-    action();
-  } catch (const CameraError& error) {
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-    return error.what();
-  }
-  return "accepted";
-}
-
 class MaskFile : public testing::Test {
  protected:
   std::string write(const cv::Mat& image, const std::string& name = "mask.png") const {
@@ -41,7 +31,7 @@ class MaskFile : public testing::Test {
     return folder_ / name;
   }
   std::string refusal(const std::string& path) const {
-    return refusalOf([&path] { readMask(path); });
+    return test::refusalOf<CameraError>([&path] { readMask(path); });
   }
 
   test::TemporaryFolder folder_;
@@ -89,7 +79,7 @@ TEST(Mask, RefusesWhatIsNone) {
 
 TEST(Mask, FitsImagesOfItsShapeOnly) {
   EXPECT_EQ(fittedTo({320, 240}, Mask(bonnet())).size(), cv::Size(320, 240));
-  EXPECT_THAT(refusalOf([] {
+  EXPECT_THAT(test::refusalOf<CameraError>([] {
                 fittedTo({320, 200}, Mask(bonnet()));
               }),
               HasSubstr("the mask is for 64 x 48 px, but the images have 320 x 200 px"));
@@ -100,7 +90,10 @@ TEST(CameraModel, FitsImagesOfItsShapeOnly) {
   const CameraModel camera({{1226, 370}, 707.0, 707.0, 601.0, 183.0, Distortion::kPlumbBob, {}});
   EXPECT_EQ(fittedTo({1226, 370}, camera), camera);
   EXPECT_EQ(fittedTo({409, 123}, camera).size(), cv::Size(409, 123));  // a third, rounded
-  EXPECT_THAT(refusalOf([&camera] { fittedTo({1226, 300}, camera); }), HasSubstr("the calibration is for 1226 x 370"));
+  EXPECT_THAT(test::refusalOf<CameraError>([&camera] {
+                fittedTo({1226, 300}, camera);
+              }),
+              HasSubstr("the calibration is for 1226 x 370"));
 }
 
 TEST_F(MaskFile, IsRead) { EXPECT_TRUE(readMask(write(bonnet())) == Mask(bonnet())); }

@@ -5,6 +5,7 @@
 
 #include "editing/map_selection.h"
 #include "test/support/example_map.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -19,13 +20,8 @@ MatchedLandmarks matched(std::size_t image, const std::vector<std::uint32_t>& in
   return landmarks;
 }
 
-std::string refusal(const std::string& text) {
-  try {
-    MapUsage::fromCsv(text);
-  } catch (const UsageFileError& error) {
-    return error.what();
-  }
-  return "";
+std::string refusalOfUsage(const std::string& text) {
+  return test::refusalOf<UsageFileError>([&] { MapUsage::fromCsv(text); });
 }
 
 /// `count` images on one spot, in two sessions by turns.
@@ -66,13 +62,14 @@ TEST(MapUsage, ReadsWhatItWrites) {
 }
 
 TEST(MapUsage, RefusesWhatIsNoRecordOfUse) {
-  EXPECT_THAT(refusal(""), HasSubstr("line 1: must be 'stamp_ns,poses,landmarks'"));
-  EXPECT_THAT(refusal("stamp_ns,poses,landmarks\n1,2\n"), "");
-  EXPECT_THAT(refusal("stamp_ns,poses,landmarks\nx,2,\n"), HasSubstr("line 2: 'x'"));
-  EXPECT_THAT(refusal("stamp_ns,poses,landmarks\n1,-2,\n"), HasSubstr("line 2: '-2'"));
-  EXPECT_THAT(refusal("stamp_ns,poses,landmarks\n1,2,3\n"), HasSubstr("line 2: ''"));
-  EXPECT_THAT(refusal("stamp_ns,poses,landmarks\n1,2,3:4\n1,2,\n"), AllOf(HasSubstr("line 3"), HasSubstr("before")));
-  EXPECT_THAT(refusal("stamp_ns,poses,landmarks\n99999999999999999999,2,\n"), HasSubstr("line 2"));
+  EXPECT_THAT(refusalOfUsage(""), HasSubstr("line 1: must be 'stamp_ns,poses,landmarks'"));
+  EXPECT_THAT(refusalOfUsage("stamp_ns,poses,landmarks\n1,2\n"), "accepted");
+  EXPECT_THAT(refusalOfUsage("stamp_ns,poses,landmarks\nx,2,\n"), HasSubstr("line 2: 'x'"));
+  EXPECT_THAT(refusalOfUsage("stamp_ns,poses,landmarks\n1,-2,\n"), HasSubstr("line 2: '-2'"));
+  EXPECT_THAT(refusalOfUsage("stamp_ns,poses,landmarks\n1,2,3\n"), HasSubstr("line 2: ''"));
+  EXPECT_THAT(refusalOfUsage("stamp_ns,poses,landmarks\n1,2,3:4\n1,2,\n"),
+              AllOf(HasSubstr("line 3"), HasSubstr("before")));
+  EXPECT_THAT(refusalOfUsage("stamp_ns,poses,landmarks\n99999999999999999999,2,\n"), HasSubstr("line 2"));
 }
 
 TEST(MapSummary, KeepsWhatWasUsedMostButOneImageOfEachSession) {

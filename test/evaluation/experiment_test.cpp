@@ -8,6 +8,7 @@
 
 #include "base/files.h"
 #include "test/evaluation/small_experiment.h"
+#include "test/support/refusal.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -26,18 +27,13 @@ struct Mistake {
   std::string expected;     ///< what the refusal says
 };
 
-std::string refusal(const std::string& yaml) {
-  try {
-    parseExperiment(yaml, "e.yaml");
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "accepted";
+std::string refusalOfYaml(const std::string& yaml) {
+  return test::refusalOf<ParameterError>([&] { parseExperiment(yaml, "e.yaml"); });
 }
 
 void expectRefused(const std::vector<Mistake>& mistakes) {
   for (const Mistake& mistake : mistakes) {
-    EXPECT_THAT(refusal(test::smallYamlWith(mistake.part, mistake.replacement)),
+    EXPECT_THAT(refusalOfYaml(test::smallYamlWith(mistake.part, mistake.replacement)),
                 AllOf(StartsWith("e.yaml: "), HasSubstr(mistake.expected), Not(HasSubstr("\n"))))
         << mistake.replacement;
   }
@@ -157,9 +153,9 @@ TEST(Experiment, EveryExperimentThatShipsIsValid) {
 }
 
 TEST(Experiment, RefusesAFileThatIsNoExperiment) {
-  for (const char* text : {"", "# nothing", "[]", "words"}) EXPECT_EQ(refusal(text), "e.yaml: must be a mapping");
-  EXPECT_EQ(refusal("{}"), "e.yaml: 'experiment' is missing");
-  EXPECT_THAT(refusal("experiment: {a: "), StartsWith("e.yaml: not valid YAML"));
+  for (const char* text : {"", "# nothing", "[]", "words"}) EXPECT_EQ(refusalOfYaml(text), "e.yaml: must be a mapping");
+  EXPECT_EQ(refusalOfYaml("{}"), "e.yaml: 'experiment' is missing");
+  EXPECT_THAT(refusalOfYaml("experiment: {a: "), StartsWith("e.yaml: not valid YAML"));
 }
 
 TEST(Experiment, RefusesUnknownMissingAndRepeatedKeys) {

@@ -9,8 +9,8 @@ namespace visual_localization {
 namespace {
 
 /// An image of a tracker.
-StepRecord step(LocalizationState state, float error_m, float heading_err_deg = std::nanf(""),
-                float nees = std::nanf("")) {
+StepRecord stepOf(LocalizationState state, float error_m, float heading_err_deg = std::nanf(""),
+                  float nees = std::nanf("")) {
   StepRecord record;
   record.state = state;
   record.source = PoseSource::kMetric;
@@ -22,18 +22,18 @@ StepRecord step(LocalizationState state, float error_m, float heading_err_deg = 
 
 TEST(PoseFigures, CountWhatIsWrongAmongAllImages) {
   PoseFigures figures;
-  figures.add(step(LocalizationState::kTracking, 0.9F));
-  figures.add(step(LocalizationState::kTracking, 1.1F));
-  figures.add(step(LocalizationState::kTracking, 5.1F));
-  figures.add(step(LocalizationState::kUncertain, 90.0F));
+  figures.add(stepOf(LocalizationState::kTracking, 0.9F));
+  figures.add(stepOf(LocalizationState::kTracking, 1.1F));
+  figures.add(stepOf(LocalizationState::kTracking, 5.1F));
+  figures.add(stepOf(LocalizationState::kUncertain, 90.0F));
   EXPECT_DOUBLE_EQ(figures.wrong1mShare(), 0.5);
   EXPECT_DOUBLE_EQ(figures.wrong5mShare(), 0.25);
 }
 
 TEST(PoseFigures, ShareOfImagesWithAPoseFromLandmarks) {
   PoseFigures figures;
-  figures.add(step(LocalizationState::kTracking, 1.0F));
-  StepRecord place = step(LocalizationState::kTracking, 1.0F);
+  figures.add(stepOf(LocalizationState::kTracking, 1.0F));
+  StepRecord place = stepOf(LocalizationState::kTracking, 1.0F);
   place.source = PoseSource::kPlace;
   for (int i = 0; i < 3; ++i) figures.add(place);
   EXPECT_DOUBLE_EQ(figures.metricShare(), 0.25);
@@ -41,10 +41,10 @@ TEST(PoseFigures, ShareOfImagesWithAPoseFromLandmarks) {
 
 TEST(PoseFigures, RecallAsksForPositionAndHeading) {
   PoseFigures figures;
-  figures.add(step(LocalizationState::kTracking, 0.25F, 2.0F));
-  figures.add(step(LocalizationState::kTracking, 0.2F, 2.1F));
-  figures.add(step(LocalizationState::kTracking, 0.6F, 1.0F));
-  figures.add(step(LocalizationState::kRecovering, 40.0F, 0.0F));
+  figures.add(stepOf(LocalizationState::kTracking, 0.25F, 2.0F));
+  figures.add(stepOf(LocalizationState::kTracking, 0.2F, 2.1F));
+  figures.add(stepOf(LocalizationState::kTracking, 0.6F, 1.0F));
+  figures.add(stepOf(LocalizationState::kRecovering, 40.0F, 0.0F));
   EXPECT_DOUBLE_EQ(figures.absolute.recall(0), 0.25);
   EXPECT_DOUBLE_EQ(figures.absolute.recall(1), 0.5);
   EXPECT_DOUBLE_EQ(figures.absolute.recall(2), 0.75);
@@ -53,17 +53,17 @@ TEST(PoseFigures, RecallAsksForPositionAndHeading) {
 
 TEST(PoseFigures, TheEllipseHoldsWhatChiSquaredSays) {
   PoseFigures figures;
-  figures.add(step(LocalizationState::kTracking, 1.0F, 1.0F, 5.99F));
-  figures.add(step(LocalizationState::kTracking, 1.0F, 1.0F, 6.01F));
-  figures.add(step(LocalizationState::kRecovering, 1.0F, 1.0F));  // claims nothing
+  figures.add(stepOf(LocalizationState::kTracking, 1.0F, 1.0F, 5.99F));
+  figures.add(stepOf(LocalizationState::kTracking, 1.0F, 1.0F, 6.01F));
+  figures.add(stepOf(LocalizationState::kRecovering, 1.0F, 1.0F));  // claims nothing
   EXPECT_DOUBLE_EQ(figures.absolute.insideShare(), 0.5);
   EXPECT_NEAR(figures.absolute.meanNees(), 6.0, 1e-6);
 }
 
 TEST(PoseFigures, LeaveOutWhatIsNotKnown) {
   PoseFigures figures;
-  figures.add(step(LocalizationState::kTracking, std::nanf(""), 1.0F, 1.0F));
-  StepRecord without_states = step(LocalizationState::kNoMap, 3.0F);
+  figures.add(stepOf(LocalizationState::kTracking, std::nanf(""), 1.0F, 1.0F));
+  StepRecord without_states = stepOf(LocalizationState::kNoMap, 3.0F);
   without_states.source = PoseSource::kNone;
   figures.add(without_states);
   EXPECT_EQ(figures.images, 0U);
@@ -76,8 +76,8 @@ TEST(PoseFigures, LeaveOutWhatIsNotKnown) {
 
 TEST(PoseFigures, Add) {
   PoseFigures one;
-  one.add(step(LocalizationState::kTracking, 2.0F, 1.0F, 1.0F));
-  StepRecord relative = step(LocalizationState::kTracking, 0.0F, 3.0F, 3.0F);
+  one.add(stepOf(LocalizationState::kTracking, 2.0F, 1.0F, 1.0F));
+  StepRecord relative = stepOf(LocalizationState::kTracking, 0.0F, 3.0F, 3.0F);
   relative.relative = {0.5F, 4.0F, 8.0F};
   PoseFigures other;
   other.add(relative);
@@ -94,7 +94,7 @@ TEST(PoseFigures, Add) {
 TEST(PoseFigures, NinetyFivePercentOfTheErrorsAreBelow) {
   RunRecord run;
   for (int i = 0; i <= 20; ++i) {
-    run.steps.push_back(step(LocalizationState::kTracking, static_cast<float>(i)));
+    run.steps.push_back(stepOf(LocalizationState::kTracking, static_cast<float>(i)));
     run.steps.back().relative.position_m = 0.5F * static_cast<float>(i);
   }
   const UnitResult unit = summariseRuns({run}, {});

@@ -7,6 +7,7 @@
 #include "base/files.h"
 #include "evaluation/evaluator.h"
 #include "test/evaluation/small_experiment.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -17,19 +18,10 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-std::string refusal(const std::function<void()>& use) {
-  try {
-    use();
-  } catch (const ResultError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 class ResultFolderTest : public ::testing::Test {
  protected:
   std::string refusalToOpen(const std::string& yaml, const std::string& provenance = "rounds") const {
-    return refusal([&] { ResultFolder(path_, yaml, provenance); });
+    return test::refusalOf<ResultError>([&] { ResultFolder(path_, yaml, provenance); });
   }
   ResultFolder withAResult() const {
     ResultFolder results = test::smallResults(path_);
@@ -76,7 +68,7 @@ TEST_F(ResultFolderTest, AnAttemptWithoutResultsDoesNotBindTheFolder) {
 TEST_F(ResultFolderTest, SavesNothingBesideTheResultsOfAnotherExperiment) {
   const ResultFolder results = test::smallResults(path_);
   const ResultFolder thief(path_, test::smallYamlWith("starts: 3", "starts: 4"), "rounds");
-  EXPECT_THAT(refusal([&] { results.save(0, 0, unit_); }), HasSubstr("another configuration"));
+  EXPECT_THAT(test::refusalOf<ResultError>([&] { results.save(0, 0, unit_); }), HasSubstr("another configuration"));
   EXPECT_FALSE(results.has(0, 0));
 }
 
@@ -98,7 +90,8 @@ TEST_F(ResultFolderTest, NamesADamagedExperiment) {
 }
 
 TEST_F(ResultFolderTest, RefusesWhatCannotBeAFolder) {
-  EXPECT_THAT(refusal([] { ResultFolder("", test::smallYaml(), "rounds"); }), HasSubstr("no name of a folder"));
+  EXPECT_THAT(test::refusalOf<ResultError>([] { ResultFolder("", test::smallYaml(), "rounds"); }),
+              HasSubstr("no name of a folder"));
   test::writeAll(path_, "a file");
   EXPECT_THAT(refusalToOpen(test::smallYaml()), StartsWith(path_ + ": cannot be created"));
 }
@@ -108,8 +101,10 @@ TEST_F(ResultFolderTest, NamesADamagedOrMissingResult) {
   test::writeAll(test::unitFile(results, 0, 0), serialise(unit_).substr(0, 40));
   EXPECT_TRUE(results.has(0, 0));
   EXPECT_FALSE(results.hasWhole(0, 0));
-  EXPECT_THAT(refusal([&] { results.load(0, 0); }), StartsWith(test::unitFile(results, 0, 0) + ": is damaged: "));
-  EXPECT_THAT(refusal([&] { results.load(0, 1); }), StartsWith(test::unitFile(results, 0, 1) + ": cannot be read"));
+  EXPECT_THAT(test::refusalOf<ResultError>([&] { results.load(0, 0); }),
+              StartsWith(test::unitFile(results, 0, 0) + ": is damaged: "));
+  EXPECT_THAT(test::refusalOf<ResultError>([&] { results.load(0, 1); }),
+              StartsWith(test::unitFile(results, 0, 1) + ": cannot be read"));
   fs::create_directory(test::unitFile(results, 0, 2));
   EXPECT_FALSE(results.hasWhole(0, 2));
 }
@@ -141,7 +136,8 @@ TEST_F(MergeResults, ReplacesADamagedResult) {
 
 TEST_F(MergeResults, NamesADamagedResultOfTheShard) {
   test::writeAll(test::unitFile(shard_, 1, 1), "runs\n");
-  EXPECT_THAT(refusal([&] { merge(shard_.path()); }), StartsWith(test::unitFile(shard_, 1, 1) + ": is damaged"));
+  EXPECT_THAT(test::refusalOf<ResultError>([&] { merge(shard_.path()); }),
+              StartsWith(test::unitFile(shard_, 1, 1) + ": is damaged"));
 }
 
 TEST_F(MergeResults, OfAFolderWithItselfChangesNothing) {
@@ -151,12 +147,13 @@ TEST_F(MergeResults, OfAFolderWithItselfChangesNothing) {
 
 TEST_F(MergeResults, RefusesAnotherExperimentsFolder) {
   const ResultFolder other(folder_ / "other", test::smallYamlWith("starts: 3", "starts: 4"), "rounds");
-  EXPECT_THAT(refusal([&] { merge(other.path()); }), StartsWith(other.path() + ": holds results of another"));
+  EXPECT_THAT(test::refusalOf<ResultError>([&] { merge(other.path()); }),
+              StartsWith(other.path() + ": holds results of another"));
 }
 
 TEST_F(MergeResults, LeavesAFolderAloneThatHoldsNoResults) {
   fs::create_directory(folder_ / "photos");
-  EXPECT_THAT(refusal([&] { merge(folder_ / "photos"); }),
+  EXPECT_THAT(test::refusalOf<ResultError>([&] { merge(folder_ / "photos"); }),
               StartsWith((folder_ / "photos") + ": is not a folder of results"));
   EXPECT_TRUE(fs::is_empty(folder_ / "photos"));
 }

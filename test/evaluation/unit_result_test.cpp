@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "base/text.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -45,13 +46,8 @@ std::map<std::string, std::string> fieldsOf(const std::string& row) {
   return fields;
 }
 
-std::string refusal(const std::string& text) {
-  try {
-    parseUnit(text);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "accepted";
+std::string refusalOfUnit(const std::string& text) {
+  return test::refusalOf<std::runtime_error>([&] { parseUnit(text); });
 }
 
 TEST(UnitResult, SumsUpKnownRuns) {
@@ -96,7 +92,7 @@ TEST(UnitResult, ReadsBackAsItWasWritten) {
 TEST(UnitResult, RefusesATextThatIsCutOffAnywhere) {
   const std::string text = serialise(exampleUnit());
   for (std::size_t length = 0; length < text.size(); ++length) {
-    EXPECT_NE(refusal(text.substr(0, length)), "accepted") << length << " of " << text.size();
+    EXPECT_NE(refusalOfUnit(text.substr(0, length)), "accepted") << length << " of " << text.size();
   }
 }
 
@@ -107,8 +103,8 @@ TEST(UnitResult, RefusesATextThatLostALineOrHasOneTwice) {
     const std::string line = text.substr(begin, end - begin);
     const bool is_trace = begin > text.find("trace\n") && begin < text.find("all\n") && line.find(',') != line.npos;
     if (!is_trace) {
-      EXPECT_NE(refusal(text.substr(0, begin) + text.substr(end)), "accepted") << "without " << line;
-      EXPECT_NE(refusal(text.substr(0, end) + text.substr(begin)), "accepted") << "twice " << line;
+      EXPECT_NE(refusalOfUnit(text.substr(0, begin) + text.substr(end)), "accepted") << "without " << line;
+      EXPECT_NE(refusalOfUnit(text.substr(0, end) + text.substr(begin)), "accepted") << "twice " << line;
     }
     begin = end;
   }
@@ -139,7 +135,7 @@ TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
       "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\ntrajectory\n\ntrust\n1,2,3,4,5,6,7\n\n"
       "poses\n9,8,6,5\n1,2,3,4,5,6,7,8,9,10\n0,0,0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0,0,0.5\n\n"
       "all\n2,1,3,0\n\n";
-  ASSERT_EQ(refusal(good), "accepted");
+  ASSERT_EQ(refusalOfUnit(good), "accepted");
   const auto with = [&good](const std::string& part, const std::string& replacement) {
     return std::string(good).replace(good.find(part), part.size(), replacement);
   };
@@ -149,18 +145,19 @@ TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
         with("2,1,3,0\n", "2,1,3,0,4\n"), with("2,1,3,0\n", "1e999,1,3,0\n"), with("9,8,6,5\n", "9,8,6\n"),
         with("9,10\n", "9\n"), with("0.5\n", "nan\n"), with("1,2,3,4,5,6,7", "1,2,3,4,5,6"),
         with("0,1,1,2", "99999999999999999999999,1,1,2")}) {
-    EXPECT_THAT(refusal(bad), HasSubstr("no list of numbers")) << bad;
+    EXPECT_THAT(refusalOfUnit(bad), HasSubstr("no list of numbers")) << bad;
   }
-  EXPECT_THAT(refusal(with("trace\n", "trace\n1,2\n")), HasSubstr("trace that is not whole"));
-  EXPECT_THAT(refusal(good + "more"), HasSubstr("behind its end"));
-  EXPECT_THAT(refusal(with("1,1,2,7,1\n", "2,1,2,7,1\n")), HasSubstr("do not fit together"));
-  EXPECT_THAT(refusal(with("trajectory\n", "trajectory\n1 2 3 4 5 6 7\n")), HasSubstr("trajectory that is not whole"));
-  EXPECT_THAT(refusal(with("trajectory\n", "trajectory\n1 2 3 4 5 6 7 8\n")),
+  EXPECT_THAT(refusalOfUnit(with("trace\n", "trace\n1,2\n")), HasSubstr("trace that is not whole"));
+  EXPECT_THAT(refusalOfUnit(good + "more"), HasSubstr("behind its end"));
+  EXPECT_THAT(refusalOfUnit(with("1,1,2,7,1\n", "2,1,2,7,1\n")), HasSubstr("do not fit together"));
+  EXPECT_THAT(refusalOfUnit(with("trajectory\n", "trajectory\n1 2 3 4 5 6 7\n")),
+              HasSubstr("trajectory that is not whole"));
+  EXPECT_THAT(refusalOfUnit(with("trajectory\n", "trajectory\n1 2 3 4 5 6 7 8\n")),
               HasSubstr("a trajectory that do not fit"));
-  EXPECT_THAT(refusal(with("9,8,6,5\n", "9,8,6,5\n1\n")), HasSubstr("no list of numbers"));
-  EXPECT_THAT(refusal(with("0.5\n", "0.5\n1\n")), HasSubstr("more than five lines of poses"));
-  EXPECT_THAT(refusal(with("0,1,1,2,1,7,1,1,1,0,0,0\n", "")), HasSubstr("has no run"));
-  EXPECT_THAT(refusal("something else\n"), HasSubstr("'runs' is missing"));
+  EXPECT_THAT(refusalOfUnit(with("9,8,6,5\n", "9,8,6,5\n1\n")), HasSubstr("no list of numbers"));
+  EXPECT_THAT(refusalOfUnit(with("0.5\n", "0.5\n1\n")), HasSubstr("more than five lines of poses"));
+  EXPECT_THAT(refusalOfUnit(with("0,1,1,2,1,7,1,1,1,0,0,0\n", "")), HasSubstr("has no run"));
+  EXPECT_THAT(refusalOfUnit("something else\n"), HasSubstr("'runs' is missing"));
 }
 
 }  // namespace

@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include "evaluation/metrics.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
+
 constexpr double kSigma_m = 0.05;
 const Eigen::Matrix2d kCovariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix2d::Identity();
 

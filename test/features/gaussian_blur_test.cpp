@@ -8,7 +8,7 @@
 namespace visual_localization {
 namespace {
 
-FloatPlane noise(int width, int height, std::uint32_t seed) {
+FloatPlane noisePlane(int width, int height, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> grey(0.0F, 255.0F);
   FloatPlane plane;
@@ -63,7 +63,7 @@ TEST(GaussianBlur, IsTheDefinitionForEverySize) {
   for (const int width : {1, 2, 3, 15, 16, 17, 31, 33, 70}) {
     for (const int height : {1, 2, 5, 16, 17, 40}) {
       for (const double sigma_px : {1.2, 3.1}) {
-        const FloatPlane plane = noise(width, height, static_cast<std::uint32_t>(100 * width + height));
+        const FloatPlane plane = noisePlane(width, height, static_cast<std::uint32_t>(100 * width + height));
         const GaussianKernel kernel(sigma_px);
         blurred.resize(width, height);
         blur.blurRows(plane, kernel, 0, height, blurred);
@@ -79,7 +79,7 @@ TEST(GaussianBlur, IsTheDefinitionForEverySize) {
 }
 
 TEST(GaussianBlur, StripsMakeTheSameImage) {
-  const FloatPlane plane = noise(50, 45, 3);
+  const FloatPlane plane = noisePlane(50, 45, 3);
   const GaussianKernel kernel(2.0);
   GaussianBlur blur;
   FloatPlane at_once;

@@ -27,7 +27,7 @@ cv::Mat spot(int width, int height, double x, double y, double sigma_px, double 
   return image;
 }
 
-cv::Mat noise(int width, int height, std::uint32_t seed) {
+cv::Mat noiseImage(int width, int height, std::uint32_t seed) {
   cv::RNG random(seed);
   cv::Mat image(height, width, CV_8UC1);
   random.fill(image, cv::RNG::UNIFORM, 0, 256);
@@ -131,8 +131,8 @@ TEST(NativeSift, GivesTheSameEveryTimeWhateverCameBefore) {
   const cv::Mat image = test::viewOf(test::wall(320, 240, 7), 0);
   NativeSiftExtractor extractor{SiftConfig()};
   const SiftFeatures first = extractor.extract(image);
-  extractor.extract(noise(401, 333, 1));
-  extractor.extract(noise(37, 16, 2));
+  extractor.extract(noiseImage(401, 333, 1));
+  extractor.extract(noiseImage(37, 16, 2));
   const SiftFeatures again = extractor.extract(image);
   EXPECT_EQ(first.descriptors(), again.descriptors());
   ASSERT_EQ(first.size(), again.size());
@@ -150,9 +150,9 @@ TEST(NativeSift, ImagesWithoutTextureHaveNoFeatures) {
 }
 
 TEST(NativeSift, KeypointsLieInTheImageAndDescriptorsHaveTheirLength) {
-  cv::Mat saturated = noise(90, 70, 4);
+  cv::Mat saturated = noiseImage(90, 70, 4);
   cv::threshold(saturated, saturated, 127.0, 255.0, cv::THRESH_BINARY);
-  for (const cv::Mat& image : {noise(320, 240, 3), saturated, noise(16, 2000, 6), noise(500, 17, 7)}) {
+  for (const cv::Mat& image : {noiseImage(320, 240, 3), saturated, noiseImage(16, 2000, 6), noiseImage(500, 17, 7)}) {
     const SiftFeatures features = extract(image);
     EXPECT_FALSE(features.empty()) << image.size();
     for (std::size_t i = 0; i < features.size(); ++i) {

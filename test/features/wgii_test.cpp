@@ -67,7 +67,7 @@ struct Bounds {
   Sums most{};
 };
 
-void expectAgreement(Wgii& wgii, const cv::Mat& image) {
+void expectWithinBounds(Wgii& wgii, const cv::Mat& image) {
   const Histogram histogram = wgii.extract(image);
   const Bounds bounds(image);
   for (std::size_t i = 0; i < histogram.size(); ++i) {
@@ -153,11 +153,11 @@ TEST(Wgii, AgreesWithThePlainFormula) {
                               cv::Size(16, 16), cv::Size(17, 31), cv::Size(33, 200)}) {
     cv::Mat noise(size, CV_8UC1);
     random.fill(noise, cv::RNG::UNIFORM, 0, 256);
-    expectAgreement(wgii, noise);
+    expectWithinBounds(wgii, noise);
     cv::Mat soft;
     cv::GaussianBlur(noise, soft, cv::Size(), 4.0);
-    expectAgreement(wgii, soft);
-    expectAgreement(wgii, test::wall(size.width, size.height, 5));
+    expectWithinBounds(wgii, soft);
+    expectWithinBounds(wgii, test::wall(size.width, size.height, 5));
   }
 }
 

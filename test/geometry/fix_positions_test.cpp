@@ -1,11 +1,12 @@
 #include <gtest/gtest.h>
 
 #include "geometry/reconstruction.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
 
 /// An image a second, two metres apart on the way east.
 std::vector<TrajectoryPoint> pathOf(std::size_t count) {

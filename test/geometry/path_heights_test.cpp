@@ -6,11 +6,13 @@
 
 #include "base/numbers.h"
 #include "geometry/reconstruction.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
+
 constexpr std::size_t kImages = 100;
 
 /// A hill of 3 m, 100 m along: up at first, then down.

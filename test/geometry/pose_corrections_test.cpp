@@ -5,10 +5,10 @@
 namespace visual_localization {
 namespace {
 
-using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
+using TiedPairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
 /// A straight drive to the east, a camera every two metres.
-std::vector<CameraPose> straight(std::size_t count) {
+std::vector<CameraPose> straightDrive(std::size_t count) {
   std::vector<CameraPose> cameras;
   for (std::size_t i = 0; i < count; ++i) {
     cameras.push_back({levelCamera(0.0), {2.0 * static_cast<double>(i), 0.0, 1.0}});
@@ -16,8 +16,8 @@ std::vector<CameraPose> straight(std::size_t count) {
   return cameras;
 }
 
-Pairs oneAfterTheOther(std::size_t count) {
-  Pairs pairs;
+TiedPairs oneAfterTheOther(std::size_t count) {
+  TiedPairs pairs;
   for (std::size_t i = 1; i < count; ++i) pairs.emplace_back(i - 1, i);
   return pairs;
 }
@@ -30,7 +30,7 @@ PoseTie tie(std::size_t camera, const CameraPose& at, const Eigen::Vector3d& off
 }
 
 TEST(PoseCorrections, NoTiesMoveNothing) {
-  const auto cameras = straight(5);
+  const auto cameras = straightDrive(5);
   for (const PoseCorrection& correction : correctionsBy({}, cameras, oneAfterTheOther(5))) {
     EXPECT_TRUE(correction.shift_m.isZero());
     EXPECT_TRUE(correction.turn.isApprox(Eigen::Quaterniond::Identity()));
@@ -38,7 +38,7 @@ TEST(PoseCorrections, NoTiesMoveNothing) {
 }
 
 TEST(PoseCorrections, FollowTheTiesAndFadeBeyondThem) {
-  const auto cameras = straight(300);
+  const auto cameras = straightDrive(300);
   std::vector<PoseTie> ties;
   for (std::size_t i = 0; i < 50; ++i) ties.push_back(tie(i, cameras[i], {0.4, -0.3, 0.0}));
   const auto corrections = correctionsBy(ties, cameras, oneAfterTheOther(cameras.size()));
@@ -50,7 +50,7 @@ TEST(PoseCorrections, FollowTheTiesAndFadeBeyondThem) {
 }
 
 TEST(PoseCorrections, TurnsBendThePath) {
-  const auto cameras = straight(100);
+  const auto cameras = straightDrive(100);
   const double turn_rad = 0.02;
   std::vector<PoseTie> ties;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -67,7 +67,7 @@ TEST(PoseCorrections, TurnsBendThePath) {
 }
 
 TEST(PoseCorrections, AWrongTieHasNoSay) {
-  const auto cameras = straight(40);
+  const auto cameras = straightDrive(40);
   std::vector<PoseTie> ties;
   for (std::size_t i = 0; i < cameras.size(); ++i) ties.push_back(tie(i, cameras[i], {0.3, 0.0, 0.0}));
   ties[20].pose.position_m += Eigen::Vector3d(0.0, 5.0, 0.0);
@@ -76,7 +76,7 @@ TEST(PoseCorrections, AWrongTieHasNoSay) {
 }
 
 TEST(PoseCorrections, HeightsMoveAsAWhole) {
-  const auto cameras = straight(300);
+  const auto cameras = straightDrive(300);
   std::vector<PoseTie> ties;
   for (std::size_t i = 0; i < 50; ++i) ties.push_back(tie(i, cameras[i], {0.0, 0.0, -7.0}));
   for (const PoseCorrection& correction : correctionsBy(ties, cameras, oneAfterTheOther(cameras.size()))) {
@@ -85,10 +85,10 @@ TEST(PoseCorrections, HeightsMoveAsAWhole) {
 }
 
 TEST(PoseCorrections, AnotherSessionAtTheSamePlaceComesAlong) {
-  auto cameras = straight(30);
-  const auto again = straight(30);
+  auto cameras = straightDrive(30);
+  const auto again = straightDrive(30);
   cameras.insert(cameras.end(), again.begin(), again.end());
-  Pairs pairs = oneAfterTheOther(30);
+  TiedPairs pairs = oneAfterTheOther(30);
   for (std::size_t i = 1; i < 30; ++i) pairs.emplace_back(30 + i - 1, 30 + i);
   for (std::size_t i = 0; i < 30; ++i) pairs.emplace_back(i, 30 + i);
   std::vector<PoseTie> ties;

@@ -12,9 +12,9 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kSigma = 0.3 / 450.0;
+constexpr double kRaySigma = 0.3 / 450.0;
 constexpr double kTolerance = 3.0 / 450.0;
-constexpr std::size_t kMinInliers = 12;
+constexpr std::size_t kLeastInliers = 12;
 
 double uniform(std::mt19937& random, double from, double to) {
   return std::uniform_real_distribution<double>(from, to)(random);
@@ -36,7 +36,7 @@ std::vector<LandmarkMatch> exactMatches(const CameraPose& pose, std::size_t coun
     match.normalised = {x, uniform(random, -0.5, 0.5)};
     const double depth_m = uniform(random, nearest_m, farthest_m);
     match.landmark_m = pose.position_m + pose.rotation * (depth_m * match.normalised.homogeneous());
-    match.sigma = kSigma;
+    match.sigma = kRaySigma;
   }
   return matches;
 }
@@ -82,7 +82,7 @@ double largestSigma_m(const SolvedPose& solved) {
 TEST(PoseSolver, IsExactWithoutNoise) {
   std::mt19937 random(1);
   const CameraPose truth = somePose();
-  const auto solved = solvePose(exactMatches(truth, 40, 4.0, 25.0, random), kTolerance, kMinInliers);
+  const auto solved = solvePose(exactMatches(truth, 40, 4.0, 25.0, random), kTolerance, kLeastInliers);
   ASSERT_TRUE(solved);
   EXPECT_LT(errorOf(solved->camera, truth).norm(), 1e-6);
   EXPECT_EQ(solved->inliers.size(), 40U);
@@ -98,7 +98,7 @@ TEST(PoseSolver, SolvesWhereAllLandmarksAreOnOnePlane) {
     const Eigen::Vector3d ray = match.normalised.homogeneous();
     match.landmark_m = truth.position_m + truth.rotation * (8.0 / normal.dot(ray) * ray);
   }
-  const auto solved = solvePose(matches, kTolerance, kMinInliers);
+  const auto solved = solvePose(matches, kTolerance, kLeastInliers);
   ASSERT_TRUE(solved);
   EXPECT_LT(errorOf(solved->camera, truth).norm(), 1e-6);
 }
@@ -114,7 +114,7 @@ TEST(PoseSolver, DropsFourOutliersInTen) {
       const double x = uniform(random, -0.7, 0.7);
       matches[i].normalised = {x, uniform(random, -0.5, 0.5)};
     }
-    const auto solved = solvePose(matches, kTolerance, kMinInliers);
+    const auto solved = solvePose(matches, kTolerance, kLeastInliers);
     ASSERT_TRUE(solved) << seed;
     const Eigen::Matrix<double, 6, 1> error = errorOf(solved->camera, truth);
     EXPECT_LT(error.dot(solved->covariance.inverse() * error), 30.0) << seed << ": 4 in 100 000 are above";
@@ -133,7 +133,7 @@ TEST(PoseSolver, DoesNotGoAstrayForOneMoreInlier) {
     LandmarkMatch moved = exactMatches(truth, 1, 5.0, 8.0, random).front();
     moved.landmark_m += truth.rotation * Eigen::Vector3d(0.35, 0.0, 0.0);
     matches.push_back(moved);
-    const auto solved = solvePose(matches, kTolerance, kMinInliers);
+    const auto solved = solvePose(matches, kTolerance, kLeastInliers);
     ASSERT_TRUE(solved);
     EXPECT_LT(errorOf(solved->camera, truth).head<3>().norm(), 0.15) << seed;
   }
@@ -143,14 +143,14 @@ TEST(PoseSolver, IsNothingWithTooFewInliers) {
   std::mt19937 random(3);
   const CameraPose truth = somePose();
   auto matches = exactMatches(truth, 30, 4.0, 25.0, random);
-  for (std::size_t i = kMinInliers - 1; i < matches.size(); ++i) {
+  for (std::size_t i = kLeastInliers - 1; i < matches.size(); ++i) {
     const double x = uniform(random, -0.7, 0.7);
     matches[i].normalised = {x, uniform(random, -0.5, 0.5)};
   }
-  EXPECT_FALSE(solvePose(matches, kTolerance, kMinInliers + 3)) << "some outliers may fit by accident";
-  matches.resize(kMinInliers - 1);
-  EXPECT_FALSE(solvePose(matches, kTolerance, kMinInliers));
-  EXPECT_TRUE(solvePose(matches, kTolerance, kMinInliers - 1));
+  EXPECT_FALSE(solvePose(matches, kTolerance, kLeastInliers + 3)) << "some outliers may fit by accident";
+  matches.resize(kLeastInliers - 1);
+  EXPECT_FALSE(solvePose(matches, kTolerance, kLeastInliers));
+  EXPECT_TRUE(solvePose(matches, kTolerance, kLeastInliers - 1));
   matches.resize(3);
   EXPECT_FALSE(solvePose(matches, kTolerance, 0));
   EXPECT_FALSE(solvePose({}, kTolerance, 0));
@@ -161,11 +161,11 @@ TEST(PoseSolver, SaysHowLittleFarLandmarksTell) {
   const CameraPose truth = somePose();
   std::mt19937 random(4);
   auto matches = exactMatches(truth, 40, 4.0, 25.0, random);
-  const auto close = solvePose(matches, kTolerance, kMinInliers);
+  const auto close = solvePose(matches, kTolerance, kLeastInliers);
   for (LandmarkMatch& match : matches) {
     match.landmark_m = truth.position_m + 100.0 * (match.landmark_m - truth.position_m);
   }
-  const auto far = solvePose(matches, kTolerance, kMinInliers);
+  const auto far = solvePose(matches, kTolerance, kLeastInliers);
   ASSERT_TRUE(close && far);
   EXPECT_NEAR(largestSigma_m(*far) / largestSigma_m(*close), 100.0, 1.0);
   EXPECT_NEAR(std::sqrt(far->covariance(5, 5) / close->covariance(5, 5)), 1.0, 0.01) << "but not the heading";
@@ -181,7 +181,7 @@ double meanNees(double nearest_m, double farthest_m) {
     auto matches = exactMatches(truth, 40, nearest_m, farthest_m, random);
     giveCovariances(matches, truth);
     addNoise(matches, random);
-    const auto solved = solvePose(matches, 3.0 * kTolerance, kMinInliers);
+    const auto solved = solvePose(matches, 3.0 * kTolerance, kLeastInliers);
     if (!solved) return -1.0;
     const Eigen::Matrix<double, 6, 1> error = errorOf(solved->camera, truth);
     sum += error.dot(solved->covariance.ldlt().solve(error));
@@ -228,7 +228,7 @@ TEST(PoseSolver, IsNotSurerThanLeavesInTheWindAllow) {
     move(matches, 0.1, random);
     giveCovariances(matches, truth);
     addNoise(matches, random);
-    const auto solved = solvePose(matches, kTolerance, kMinInliers);
+    const auto solved = solvePose(matches, kTolerance, kLeastInliers);
     if (!solved) continue;
     const Eigen::Vector2d error = errorOf(solved->camera, truth).head<2>();
     const Eigen::Matrix2d covariance = solved->covariance.topLeftCorner<2, 2>();
@@ -236,7 +236,7 @@ TEST(PoseSolver, IsNotSurerThanLeavesInTheWindAllow) {
     within += squared_sigmas <= 9.21 ? 1 : 0;  // 99 % of them
     nees += squared_sigmas;
     few_agree += solved->agreeing < solved->inliers.size() / 2 ? 1 : 0;
-    EXPECT_GE(solved->agreeing, kMinInliers);
+    EXPECT_GE(solved->agreeing, kLeastInliers);
     errors_m.push_back(error.norm());
   }
   ASSERT_GT(errors_m.size(), 80U);
@@ -267,8 +267,8 @@ TEST(PoseSolver, BelievesEarlierImagesThatPlantsMoved) {
     move(matches, 0.05, random);
     giveCovariances(matches, truth);
     addNoise(matches, random);
-    const auto alone = solvePose(matches, kTolerance, kMinInliers);
-    const auto informed = solvePose(matches, kTolerance, kMinInliers, 30.0);
+    const auto alone = solvePose(matches, kTolerance, kLeastInliers);
+    const auto informed = solvePose(matches, kTolerance, kLeastInliers, 30.0);
     ASSERT_TRUE(alone && informed);
     EXPECT_EQ(alone->moving_gain, informed->moving_gain) << "of this image alone";
     undecided += std::abs(alone->moving_gain) < 12.0 ? 1 : 0;
@@ -288,8 +288,8 @@ TEST(PoseSolver, SeesThatNothingMoved) {
   std::vector<LandmarkMatch> matches = exactMatches(truth, 100, 4.0, 25.0, random);
   giveCovariances(matches, truth);
   addNoise(matches, random);
-  const auto alone = solvePose(matches, kTolerance, kMinInliers);
-  const auto informed = solvePose(matches, kTolerance, kMinInliers, 30.0);
+  const auto alone = solvePose(matches, kTolerance, kLeastInliers);
+  const auto informed = solvePose(matches, kTolerance, kLeastInliers, 30.0);
   ASSERT_TRUE(alone && informed);
   EXPECT_LT(alone->moving_gain, -30.0);
   EXPECT_EQ(informed->covariance, alone->covariance);
@@ -305,9 +305,9 @@ TEST(PoseSolver, DoesNotPretendToKnowThePoseFromARow) {
       const Eigen::Vector3d in_camera(-2.0 + static_cast<double>(i), 0.5, 8.0 + 0.5 * static_cast<double>(i));
       matches[i].keypoint = i;
       matches[i].landmark_m = truth.position_m + truth.rotation * in_camera;
-      const double off = kSigma * std::normal_distribution<double>(0.0, 1.0)(random);
+      const double off = kRaySigma * std::normal_distribution<double>(0.0, 1.0)(random);
       matches[i].normalised = in_camera.hnormalized() + Eigen::Vector2d(off, -0.5 * off);
-      matches[i].sigma = kSigma;
+      matches[i].sigma = kRaySigma;
     }
     const auto solved = solvePose(matches, kTolerance, 4);
     if (solved) {
@@ -331,8 +331,8 @@ TEST(PoseSolver, AKeypointCountsForOneSession) {
   std::mt19937 random(11);
   auto matches = exactMatches(somePose(), 30, 4.0, 25.0, random);
   addNoise(matches, random);
-  const auto once = solvePose(matches, kTolerance, kMinInliers);
-  const auto twice = solvePose(together(matches, inAnotherSession(matches)), kTolerance, kMinInliers);
+  const auto once = solvePose(matches, kTolerance, kLeastInliers);
+  const auto twice = solvePose(together(matches, inAnotherSession(matches)), kTolerance, kLeastInliers);
   ASSERT_TRUE(once && twice);
   EXPECT_EQ(twice->agreeing, once->agreeing);
   EXPECT_LT((twice->covariance - once->covariance).norm(), 1e-3 * once->covariance.norm());
@@ -343,8 +343,8 @@ TEST(PoseSolver, AKeypointCountsForOneSession) {
 
 TEST(PoseSolver, FewKeypointsThatManySessionsShowAreFew) {
   std::mt19937 random(12);
-  const auto matches = exactMatches(somePose(), kMinInliers - 1, 4.0, 25.0, random);
-  EXPECT_FALSE(solvePose(together(matches, inAnotherSession(matches)), kTolerance, kMinInliers));
+  const auto matches = exactMatches(somePose(), kLeastInliers - 1, 4.0, 25.0, random);
+  EXPECT_FALSE(solvePose(together(matches, inAnotherSession(matches)), kTolerance, kLeastInliers));
 }
 
 TEST(PoseSolver, TheSessionThatAgreesCounts) {
@@ -355,7 +355,7 @@ TEST(PoseSolver, TheSessionThatAgreesCounts) {
   const auto elsewhere = exactMatches(truth, 30, 4.0, 25.0, random);
   auto wrong = inAnotherSession(right);
   for (std::size_t i = 0; i < wrong.size(); ++i) wrong[i].landmark_m = elsewhere[i].landmark_m;
-  const auto solved = solvePose(together(wrong, right), kTolerance, kMinInliers);
+  const auto solved = solvePose(together(wrong, right), kTolerance, kLeastInliers);
   ASSERT_TRUE(solved);
   EXPECT_LT(errorOf(solved->camera, truth).head<3>().norm(), 0.1);
   EXPECT_GE(solved->agreeing, 28U);
@@ -367,9 +367,9 @@ TEST(PoseSolver, DependsOnTheInputAlone) {
   const CameraPose truth = somePose();
   auto matches = exactMatches(truth, 40, 4.0, 25.0, random);
   addNoise(matches, random);
-  const auto first = solvePose(matches, kTolerance, kMinInliers);
-  solvePose(exactMatches(truth, 20, 4.0, 25.0, random), kTolerance, kMinInliers);
-  const auto second = solvePose(matches, kTolerance, kMinInliers);
+  const auto first = solvePose(matches, kTolerance, kLeastInliers);
+  solvePose(exactMatches(truth, 20, 4.0, 25.0, random), kTolerance, kLeastInliers);
+  const auto second = solvePose(matches, kTolerance, kLeastInliers);
   ASSERT_TRUE(first && second);
   EXPECT_EQ(first->camera.position_m, second->camera.position_m);
   EXPECT_EQ(first->covariance, second->covariance);

@@ -11,7 +11,7 @@ namespace {
 using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
 /// A straight drive to the east, an image every metre.
-std::vector<PathImage> straight(std::uint32_t session, std::size_t images, double north_m, double yaw_rad = 0.0) {
+std::vector<PathImage> straightPath(std::uint32_t session, std::size_t images, double north_m, double yaw_rad = 0.0) {
   std::vector<PathImage> path;
   for (std::size_t i = 0; i < images; ++i) {
     const double way_m = static_cast<double>(i);
@@ -26,20 +26,20 @@ std::vector<PathImage> joined(std::vector<PathImage> a, const std::vector<PathIm
   return a;
 }
 
-TEST(Revisits, AreNoneOnAStraightDrive) { EXPECT_TRUE(revisits(straight(0, 200, 0.0)).empty()); }
+TEST(Revisits, AreNoneOnAStraightDrive) { EXPECT_TRUE(revisits(straightPath(0, 200, 0.0)).empty()); }
 
 TEST(Revisits, AreTheNearestImagesOfTheOtherSession) {
-  const Pairs pairs = revisits(joined(straight(0, 100, 0.0), straight(1, 100, 2.0)));
+  const Pairs pairs = revisits(joined(straightPath(0, 100, 0.0), straightPath(1, 100, 2.0)));
   ASSERT_EQ(pairs.size(), 100U);
   for (const auto& [a, b] : pairs) EXPECT_EQ(a + 100, b);
 }
 
 TEST(Revisits, NeedSessionsThatAreNear) {
-  EXPECT_TRUE(revisits(joined(straight(0, 100, 0.0), straight(1, 100, 8.5))).empty());
+  EXPECT_TRUE(revisits(joined(straightPath(0, 100, 0.0), straightPath(1, 100, 8.5))).empty());
 }
 
 TEST(Revisits, NeedImagesThatFaceAlike) {
-  EXPECT_TRUE(revisits(joined(straight(0, 100, 0.0), straight(1, 100, 0.0, kPi))).empty());
+  EXPECT_TRUE(revisits(joined(straightPath(0, 100, 0.0), straightPath(1, 100, 0.0, kPi))).empty());
 }
 
 TEST(Revisits, CloseARound) {
@@ -59,7 +59,7 @@ TEST(Revisits, CloseARound) {
 
 TEST(Revisits, AreThreeForAnImageAtMost) {
   std::vector<PathImage> path;
-  for (std::uint32_t session = 0; session < 6; ++session) path = joined(path, straight(session, 3, 0.5 * session));
+  for (std::uint32_t session = 0; session < 6; ++session) path = joined(path, straightPath(session, 3, 0.5 * session));
   EXPECT_EQ(revisits(path).size(), 3U * (0 + 1 + 2 + 3 + 3 + 3));
 }
 

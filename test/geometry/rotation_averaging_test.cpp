@@ -12,8 +12,6 @@ namespace {
 
 using test::DrivenPose;
 
-constexpr double kDegree_rad = kPi / 180.0;
-
 /// Of each pose and the next three, exact.
 std::vector<RelativeRotation> relativeOf(const std::vector<DrivenPose>& poses) {
   std::vector<RelativeRotation> relative;
@@ -58,11 +56,11 @@ TEST(RotationAveraging, IsExactWhenAllAgree) {
 // In the turns a camera that looks up rolls: that tells its pitch far better than the belief that it is level.
 TEST(RotationAveraging, FindsThePitchOfTheMountingInTurns) {
   test::StreetDrive street;
-  street.pitch_rad = 5.0 * kDegree_rad;
+  street.pitch_rad = toRadians(5.0);
   const auto poses = test::drive(street);
   const auto averaged = averageRotations(travelYawsOf(poses), relativeOf(poses));
-  EXPECT_NEAR(averaged.mounting_rad.x(), street.pitch_rad, 0.1 * kDegree_rad);
-  EXPECT_LT(largestError_rad(averaged, poses), 0.1 * kDegree_rad);
+  EXPECT_NEAR(averaged.mounting_rad.x(), street.pitch_rad, toRadians(0.1));
+  EXPECT_LT(largestError_rad(averaged, poses), toRadians(0.1));
 }
 
 // A residual of many sigmas pulls by 1 / residual, 20 % of them by less than a thousandth of a degree.
@@ -72,7 +70,7 @@ TEST(RotationAveraging, IgnoresPairsThatAreWrong) {
   std::mt19937 random(1);
   for (std::size_t i = 0; i < relative.size(); i += 5) relative[i].b_from_a = randomRotation(random);
   const auto averaged = averageRotations(travelYawsOf(poses), relative);
-  EXPECT_LT(largestError_rad(averaged, poses), 0.1 * kDegree_rad);
+  EXPECT_LT(largestError_rad(averaged, poses), toRadians(0.1));
 }
 
 // 20 degrees are 4.4 sigmas of one direction; by the Cauchy loss a fifth of them pull the rest by 0.055 sigmas, which
@@ -81,24 +79,24 @@ TEST(RotationAveraging, IgnoresDirectionsOfTravelThatAreWrongInPlaces) {
   const auto poses = test::drive({});
   auto yaws_rad = travelYawsOf(poses);
   for (std::size_t i = 0; i < yaws_rad.size(); ++i) {
-    if (i % 25 >= 10 && i % 25 < 15) yaws_rad[i] += 20.0 * kDegree_rad;
+    if (i % 25 >= 10 && i % 25 < 15) yaws_rad[i] += toRadians(20.0);
   }
   const auto averaged = averageRotations(yaws_rad, relativeOf(poses));
-  EXPECT_LT(largestError_rad(averaged, poses), 0.5 * kDegree_rad);
+  EXPECT_LT(largestError_rad(averaged, poses), toRadians(0.5));
 }
 
 // Which way a camera looks on its robot cannot be seen from rotations alone: all of them are turned alike.
 TEST(RotationAveraging, KeepsTheShapeWhenTheCameraLooksAside) {
   test::StreetDrive street;
-  street.yaw_rad = 15.0 * kDegree_rad;
+  street.yaw_rad = toRadians(15.0);
   const auto poses = test::drive(street);
   const auto averaged = averageRotations(travelYawsOf(poses), relativeOf(poses));
   const Eigen::Quaterniond off = averaged.camera_in_map[0] * poses[0].camera.rotation.conjugate();
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Eigen::Quaterniond expected = off * poses[i].camera.rotation;
-    EXPECT_LT(averaged.camera_in_map[i].angularDistance(expected), 0.1 * kDegree_rad) << i;
+    EXPECT_LT(averaged.camera_in_map[i].angularDistance(expected), toRadians(0.1)) << i;
   }
-  EXPECT_LT(std::abs(averaged.mounting_rad.x()), 0.1 * kDegree_rad);
+  EXPECT_LT(std::abs(averaged.mounting_rad.x()), toRadians(0.1));
 }
 
 TEST(RotationAveraging, WithoutPairsFollowsTheDirectionsOfTravel) {

@@ -9,8 +9,6 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kDegree_rad = kPi / 180.0;
-
 /// A metre ahead and half a metre to the left, looking 15 degrees to the left.
 SensorMount aside() {
   SensorMount mount;
@@ -38,10 +36,10 @@ TEST(SensorMount, IsWhereTheCameraIsUnlessSaid) {
 
 TEST(SensorMount, TakesTheRobotFromItsCamera) {
   // The robot at (10, 20) looks north: the camera is a metre north and half a metre west of it.
-  const CameraPose camera{levelCamera(90.0 * kDegree_rad + 15.0 * kDegree_rad), {9.5, 21.0, 1.2}};
+  const CameraPose camera{levelCamera(toRadians(90.0 + 15.0)), {9.5, 21.0, 1.2}};
   const Eigen::Isometry3d base = aside().baseInMap(camera);
   EXPECT_LT((base.translation() - Eigen::Vector3d(10.0, 20.0, 0.0)).norm(), 1e-9);
-  EXPECT_NEAR(yawOf(base), 90.0 * kDegree_rad, 1e-9);
+  EXPECT_NEAR(yawOf(base), toRadians(90.0), 1e-9);
 }
 
 TEST(SensorMount, KnowsTheAntennaFromTheCamera) {

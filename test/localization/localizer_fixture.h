@@ -11,12 +11,11 @@
 #include <gtest/gtest.h>
 
 #include "test/support/fake_image.h"
+#include "test/support/stamps.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization::test {
-
-inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 /// What a robot sees from a position: training images near it look alike.
 class SeenFrom final : public FakeImage {

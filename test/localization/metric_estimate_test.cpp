@@ -12,14 +12,15 @@
 
 #include "base/time.h"
 #include "test/localization/street_map.h"
+#include "test/support/stamps.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
 namespace {
 
 using test::GivenImage;
+using test::kSecond_ns;
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 const Eigen::Vector3d kHere_m = Eigen::Vector3d::Zero();
 
 /// A robot on the street, one image a second and a metre.

@@ -37,7 +37,7 @@ std::unique_ptr<MotionModel> combined(Models... models) {
   return std::make_unique<CombinedMotion>(std::move(parts));
 }
 
-Particle particleAt(double x, double y) {
+Particle standingAt(double x, double y) {
   Particle particle;
   particle.position_m = {x, y};
   return particle;
@@ -84,7 +84,7 @@ TEST(MotionModel, PullsAShareOfTheWayToTheNearestTrainingImage) {
   const auto map = test::mapAt({{0.0, 0.0}, {10.0, 0.0}});
   Random random(3);
   for (const double share : {0.0, 0.2, 1.0}) {
-    Particle particle = particleAt(7.0, 5.0);
+    Particle particle = standingAt(7.0, 5.0);
     particle.velocity_m = {1.0, 2.0};
     PullToMap(*map, share).move(particle, Travel(), random);
     EXPECT_DOUBLE_EQ(particle.position_m.x(), 7.0 + share * 3.0);
@@ -98,7 +98,7 @@ TEST(MotionModel, PartsMoveOneAfterTheOther) {
   Random random(4);
   Travel travel;
   travel.odometry = OdometryIncrement{{60.0, 0.0}, 0.0};
-  Particle particle = particleAt(10.0, 0.0);
+  Particle particle = standingAt(10.0, 0.0);
   particle.velocity_m = {1.0, 0.0};
   Particle other = particle;
   combined(OdometryMotion(), PullToMap(*map, 0.5))->move(particle, travel, random);
@@ -117,7 +117,7 @@ TEST(MotionModel, EveryPartStartsAParticle) {
 
 TEST(MotionModel, WithoutPartsNothingMoves) {
   Random random(6);
-  Particle particle = particleAt(1.0, 2.0);
+  Particle particle = standingAt(1.0, 2.0);
   combined()->move(particle, Travel(), random);
   EXPECT_EQ(particle.position_m, Eigen::Vector2d(1.0, 2.0));
 }
@@ -178,7 +178,7 @@ TEST(MotionModel, OfAFilterFollowsOdometryWithAShareOfItsParticles) {
   std::vector<Particle> moved;
   constexpr int kParticles = 4000;
   for (int i = 0; i < kParticles; ++i) {
-    Particle particle = particleAt(0.0, 5.0);
+    Particle particle = standingAt(0.0, 5.0);
     motion->move(particle, travel, random);
     if (particle.position_m != Eigen::Vector2d(0.0, 5.0)) moved.push_back(particle);
   }

@@ -16,13 +16,13 @@ using test::kTwin_m;
 using test::severalSwarms;
 using test::TwinStreet;
 
-constexpr double kStep_m = 1.0;
+constexpr double kEvery_m = 1.0;
 
 /// How many of the images from 20 to 60 m have an estimate at the twin, by a tracker that begins there.
 int imagesAtTwin(Tracker& tracker, TwinStreet& street) {
   tracker.reset(around(TwinStreet::at(20.0 + kTwin_m), 3.0));
   int wrong = 0;
-  for (double along_m = 20.0; along_m < 60.0; along_m += kStep_m) {
+  for (double along_m = 20.0; along_m < 60.0; along_m += kEvery_m) {
     const TrackerEstimate estimate = tracker.update(street.from(along_m));
     if (std::abs(estimate.position_m.x() - along_m) > 5.0) ++wrong;
   }
@@ -47,7 +47,7 @@ TEST(MultiSwarm, ARivalFollowsTheTwinAndEndsWithIt) {
   MultiSwarm tracker(street.map(), severalSwarms(), 1);
   tracker.reset(around(TwinStreet::at(0.0), 3.0));
   double most_weight = 0.0;
-  for (double along_m = 0.0; along_m < 60.0; along_m += kStep_m) {
+  for (double along_m = 0.0; along_m < 60.0; along_m += kEvery_m) {
     const TrackerEstimate estimate = tracker.update(street.from(along_m));
     if (along_m < 20.0) {
       EXPECT_EQ(estimate.rival_weight, 0.0) << along_m;
@@ -61,7 +61,7 @@ TEST(MultiSwarm, ARivalFollowsTheTwinAndEndsWithIt) {
   EXPECT_GT(most_weight, 0.4);
   EXPECT_LT(most_weight, 0.55);
   TrackerEstimate estimate;
-  for (double along_m = 60.0; along_m < 75.0; along_m += kStep_m) estimate = tracker.update(street.from(along_m));
+  for (double along_m = 60.0; along_m < 75.0; along_m += kEvery_m) estimate = tracker.update(street.from(along_m));
   EXPECT_EQ(tracker.swarms(), 1U);
   EXPECT_EQ(estimate.rival_weight, 0.0);
 }
@@ -70,7 +70,7 @@ TEST(MultiSwarm, TheNumberOfParticlesStays) {
   TwinStreet street(1.0, 0.9);
   MultiSwarm tracker(street.map(), severalSwarms(5), 1);
   std::size_t most = 0;
-  for (double along_m = 0.0; along_m < 100.0; along_m += kStep_m) {
+  for (double along_m = 0.0; along_m < 100.0; along_m += kEvery_m) {
     tracker.update(street.from(along_m));
     ASSERT_EQ(tracker.particles().size(), 80U);
     most = std::max(most, tracker.swarms());
@@ -83,7 +83,7 @@ TEST(MultiSwarm, AVerifiedPoseAndAResetEndAllRivals) {
   MultiSwarm tracker(street.map(), severalSwarms(), 1);
   const auto drive = [&] {
     tracker.reset(around(TwinStreet::at(15.0), 3.0));
-    for (double along_m = 15.0; along_m < 45.0; along_m += kStep_m) tracker.update(street.from(along_m));
+    for (double along_m = 15.0; along_m < 45.0; along_m += kEvery_m) tracker.update(street.from(along_m));
   };
   drive();
   ASSERT_GT(tracker.swarms(), 1U);
@@ -105,13 +105,13 @@ TEST(MultiSwarm, StaysAtThePlaceAfterVerifiedPoses) {
   for (Tracker* tracker : {static_cast<Tracker*>(&one), static_cast<Tracker*>(&several)}) {
     tracker->reset(around(TwinStreet::at(0.0), 3.0));
   }
-  for (double along_m = 0.0; along_m < 25.0; along_m += kStep_m) {
+  for (double along_m = 0.0; along_m < 25.0; along_m += kEvery_m) {
     TrackerInput verified = street.from(along_m);
     verified.verified_m = TwinStreet::at(along_m);
     const TrackerEstimate expected = one.update(verified);
     EXPECT_NEAR(several.update(verified).spread_m.x(), expected.spread_m.x(), 1e-9) << along_m;
   }
-  for (double along_m = 25.0; along_m < 60.0; along_m += kStep_m) {
+  for (double along_m = 25.0; along_m < 60.0; along_m += kEvery_m) {
     const TrackerEstimate estimate = several.update(street.from(along_m));
     EXPECT_LT((estimate.position_m - TwinStreet::at(along_m)).norm(), 5.0) << along_m;
     EXPECT_LT(estimate.rival_weight, 0.55) << along_m;

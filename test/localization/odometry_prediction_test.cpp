@@ -9,14 +9,14 @@
 #include "base/numbers.h"
 #include "localization/pose_verifier.h"
 #include "test/localization/street_map.h"
+#include "test/support/stamps.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
 namespace {
 
 using test::GivenImage;
-
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
 
 /// A robot on the street, one image a second and a metre, whose odometry begins somewhere else.
 class DriveWithOdometry : public testing::Test {

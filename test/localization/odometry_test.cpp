@@ -7,14 +7,15 @@
 #include <gtest/gtest.h>
 
 #include "base/numbers.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using test::kSecond_ns;
+using test::ns;
 
-std::int64_t ns(double seconds) { return static_cast<std::int64_t>(std::llround(seconds * 1e9)); }
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 class Odometry : public testing::Test {
  protected:

@@ -19,14 +19,14 @@ using test::roundWorld;
 using test::World;
 using testing::HasSubstr;
 
-constexpr int kImages = 60;
+constexpr int kDrivenImages = 60;
 
 /// Runs a swarm around the circle, with a dark image now and then, and has `check` look at it after each image.
 template <class Check>
 void drive(const DpsoConfig& config, const Check& check) {
   World world = roundWorld();
   Dpso swarm(world.map(), config, FitnessConfig(), 4);
-  for (int image = 0; image < kImages; ++image) {
+  for (int image = 0; image < kDrivenImages; ++image) {
     const TrackerEstimate estimate = swarm.update(image % 10 == 9 ? world.inTheDark() : world.from(onCircle(image)));
     check(world.map(), swarm, estimate);
   }
@@ -48,8 +48,8 @@ int countOutside(const std::string& confine) {
 
 TEST(PaperDpso, ParticlesLeaveTheBoxUnlessItConfinesThem) {
   EXPECT_EQ(countOutside("box"), 0);
-  EXPECT_GT(countOutside("none"), kImages);
-  EXPECT_GT(countOutside("corridor"), kImages);
+  EXPECT_GT(countOutside("none"), kDrivenImages);
+  EXPECT_GT(countOutside("corridor"), kDrivenImages);
 }
 
 TEST(PaperDpso, ACorridorReachesSoFarFromATrainingImage) {
@@ -64,7 +64,7 @@ TEST(PaperDpso, ACorridorReachesSoFarFromATrainingImage) {
       at_its_border += distance_m > 3.0 - 1e-6 ? 1 : 0;
     }
   });
-  EXPECT_GT(at_its_border, kImages);
+  EXPECT_GT(at_its_border, kDrivenImages);
 }
 
 /// The fastest of the standard particles, and of those of high energy, by the norm in shares of the range and of v0.
@@ -110,7 +110,7 @@ TEST(PaperDpso, TheEstimateIsTheBestParticleTheBestFewOrTheWeightedCentre) {
       ASSERT_LT((estimate.position_m - expected_m).norm(), 1e-9) << position;
       apart += (few_m - centre_m).norm() > 1e-3 && (few_m - order[0].position_m).norm() > 1e-3 ? 1 : 0;
     });
-    EXPECT_GT(apart, kImages / 2) << position;
+    EXPECT_GT(apart, kDrivenImages / 2) << position;
   }
 }
 

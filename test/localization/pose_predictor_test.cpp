@@ -7,10 +7,12 @@
 
 #include <gtest/gtest.h>
 
+#include "test/support/stamps.h"
+
 namespace visual_localization {
 namespace {
 
-std::int64_t ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
+using test::ns;
 
 /// Looks ahead along x, exactly known.
 MetricPose poseAt(double x_m, double y_m) {

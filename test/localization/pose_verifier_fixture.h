@@ -10,11 +10,10 @@
 #include "localization/pose_verifier.h"
 #include "test/localization/street_map.h"
 #include "test/support/fake_image.h"
+#include "test/support/stamps.h"
 #include "visual_localization/features/sift_matcher.h"
 
 namespace visual_localization::test {
-
-inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 /// Known by its features.
 class SeenImage final : public FakeImage {

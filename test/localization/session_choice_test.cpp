@@ -19,7 +19,7 @@ namespace {
 constexpr std::int64_t kHour_ns = 3'600'000'000'000;
 
 /// A street along x, an image every 2 m, once at 8, at 13 and at 18 o'clock; the last session has only its second half.
-std::shared_ptr<const TrainingMap> street() {
+std::shared_ptr<const TrainingMap> threeHours() {
   MapHeader header;
   header.image_size = {320, 240};
   header.sessions = {{"morning"}, {"noon"}, {"evening"}};
@@ -52,7 +52,7 @@ class SessionChoiceTest : public testing::Test {
     return 0;
   }
 
-  std::shared_ptr<const TrainingMap> map_ = street();
+  std::shared_ptr<const TrainingMap> map_ = threeHours();
   SessionChoice sessions_{*map_, true};
 };
 
@@ -214,7 +214,7 @@ TEST(SessionChoice, TheFirstImageOfTheMapCountsAsAnyOther) {
 
 /// Images until a session that matches `ratio` times as well as the first one is chosen; 100: never.
 int imagesUntilChosen(double ratio) {
-  const auto map = street();
+  const auto map = threeHours();
   SessionChoice sessions(*map, true);
   sessions.startImage(8 * kHour_ns);
   for (int images = 1; images < 100; ++images) {

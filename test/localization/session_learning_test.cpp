@@ -14,7 +14,7 @@ constexpr std::size_t kOfFirst = 3;    ///< a training image of the first sessio
 constexpr std::size_t kOfSecond = 13;  ///< of the second one, at the same position
 
 /// A street along x that two sessions drove and a third one did not.
-std::shared_ptr<const TrainingMap> street() {
+std::shared_ptr<const TrainingMap> drivenTwice() {
   MapHeader header;
   header.image_size = {320, 240};
   header.sessions = {{"first"}, {"second"}, {"elsewhere"}};
@@ -41,7 +41,7 @@ class SessionLearning : public testing::Test {
     sessions_.learn(chosen, match, other, ratio * (match + kLeast) - kLeast);
   }
 
-  std::shared_ptr<const TrainingMap> map_ = street();
+  std::shared_ptr<const TrainingMap> map_ = drivenTwice();
   SessionChoice sessions_{*map_, true};
 };
 

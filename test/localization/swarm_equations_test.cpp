@@ -270,7 +270,7 @@ struct Adaptations {
 
 /// Lets a swarm follow a robot and checks its speed and the limit after each image.
 template <class Way>
-Adaptations follow(World& world, int images, const Way& way) {
+Adaptations adaptationsOn(World& world, int images, const Way& way) {
   Eigen::Vector2d range_m = world.map().area().range();
   if (range_m.y() == 0.0) range_m.y() = 1.0;  // nothing moves across a straight street
   DpsoConfig config;
@@ -312,7 +312,7 @@ Adaptations follow(World& world, int images, const Way& way) {
 TEST(SwarmEquations, TheSpeedOfTheSwarmIsAMovingAverageThatTheLimitFollowsByTenths) {
   World world = roundWorld();
   double arc_m = 0.0;
-  const Adaptations seen = follow(world, 400, [&arc_m](int image) {
+  const Adaptations seen = adaptationsOn(world, 400, [&arc_m](int image) {
     arc_m += image < 150 ? 0.2 : image < 250 ? 3.0 : 1.0;
     return onCircle(arc_m);
   });
@@ -322,7 +322,7 @@ TEST(SwarmEquations, TheSpeedOfTheSwarmIsAMovingAverageThatTheLimitFollowsByTent
 TEST(SwarmEquations, OnAStraightStreetOnlyTheSpeedAlongItCounts) {
   World world(test::mapAt(test::street(200, 1.0)));
   const Adaptations seen =
-      follow(world, 150, [](int image) { return Eigen::Vector2d(image < 50 ? 20.0 : 2.0 * (image - 40), 0.0); });
+      adaptationsOn(world, 150, [](int image) { return Eigen::Vector2d(image < 50 ? 20.0 : 2.0 * (image - 40), 0.0); });
   EXPECT_GT(seen.slower, 3);
   EXPECT_GT(seen.faster, 3);
 }

@@ -7,11 +7,12 @@
 
 #include "base/numbers.h"
 #include "map/map_geometry.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
 
 /// East along x with an image every 4 m; the receiver has all of it `aside_m` too far north.
 std::vector<TrajectoryPoint> eastwards(std::size_t images, double aside_m) {

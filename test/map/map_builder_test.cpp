@@ -82,7 +82,7 @@ TEST(MapBuilder, OneImageKeepsAllItsFeatures) {
 }
 
 /// One of each second.
-std::shared_ptr<const TrainingMap> mapOf(const std::vector<cv::Mat>& images) {
+std::shared_ptr<const TrainingMap> mapOfImages(const std::vector<cv::Mat>& images) {
   MapBuilder builder({});
   builder.beginSession("round", straightRound());
   std::int64_t stamp_ns = 0;
@@ -93,7 +93,7 @@ std::shared_ptr<const TrainingMap> mapOf(const std::vector<cv::Mat>& images) {
 TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   cv::Mat large;
   cv::resize(scene(1, 3), large, {640, 480});
-  const auto map = mapOf({scene(1, 0), large});
+  const auto map = mapOfImages({scene(1, 0), large});
   EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
   for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
@@ -167,7 +167,7 @@ TEST(MapBuilder, ImagesThatNoMapMayHaveAreUnusable) {
 TEST(MapBuilder, GlobalFeaturesAreThoseOfTheImageInTheMapsSize) {
   cv::Mat large;
   cv::resize(scene(1, 3), large, {640, 480});
-  const auto map = mapOf({scene(1, 0), large});
+  const auto map = mapOfImages({scene(1, 0), large});
   cv::Mat small;
   cv::resize(large, small, {320, 240}, 0.0, 0.0, cv::INTER_AREA);
   GlobalExtractor extractor;

@@ -18,7 +18,7 @@ struct Place {
   int session;
 };
 
-std::shared_ptr<const TrainingMap> mapOf(const std::vector<Place>& places) {
+std::shared_ptr<const TrainingMap> mapOfPlaces(const std::vector<Place>& places) {
   std::vector<TrainingImage> images(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
     images[i].position_m = {places[i].east_m, 0.0};
@@ -33,7 +33,7 @@ std::shared_ptr<const TrainingMap> mapOf(const std::vector<Place>& places) {
 }
 
 TEST(PruningNeighbours, AreTheTwoNearest) {
-  const auto map = mapOf({{0, 0, 0}, {1, 0, 0}, {2.5, 0, 0}, {3, 0, 0}, {9, 0, 0}});
+  const auto map = mapOfPlaces({{0, 0, 0}, {1, 0, 0}, {2.5, 0, 0}, {3, 0, 0}, {9, 0, 0}});
   const PruningNeighbours neighbours(*map);
   EXPECT_THAT(neighbours.of(0), ElementsAre(1U, 2U));
   EXPECT_THAT(neighbours.of(2), ElementsAre(3U, 1U));
@@ -41,7 +41,7 @@ TEST(PruningNeighbours, AreTheTwoNearest) {
 }
 
 TEST(PruningNeighbours, AreOfTheSameSession) {
-  const auto map = mapOf({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 0, 1}, {1, 0, 1}, {2, 0, 1}});
+  const auto map = mapOfPlaces({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 0, 1}, {1, 0, 1}, {2, 0, 1}});
   const PruningNeighbours neighbours(*map);
   EXPECT_THAT(neighbours.of(0), ElementsAre(1U, 2U));
   EXPECT_THAT(neighbours.of(4), ElementsAre(3U, 5U));
@@ -51,7 +51,7 @@ TEST(PruningNeighbours, FaceTheSameWay) {
   // There and back again; beyond the first dozens all others face the other way.
   std::vector<Place> places{{0, 0, 0}, {100, 0, 0}, {101, 0.3, 0}};
   for (int i = 0; i < 60; ++i) places.push_back({0.1 * i, kPi, 0});
-  const auto map = mapOf(places);
+  const auto map = mapOfPlaces(places);
   const PruningNeighbours neighbours(*map);
   EXPECT_THAT(neighbours.of(0), ElementsAre(1U, 2U));
   EXPECT_THAT(neighbours.of(1), ElementsAre(2U, 0U));
@@ -63,18 +63,18 @@ TEST(PruningNeighbours, AreFoundBehindAThousandThatFaceAnotherWay) {
   for (int i = 1; i <= 1000; ++i) places.push_back({0.001 * i, kPi, 0});
   places.push_back({2, 0, 0});
   for (int i = 1; i <= 100; ++i) places.push_back({2 + 0.001 * i, kPi, 0});
-  EXPECT_THAT(PruningNeighbours(*mapOf(places)).of(0), ElementsAre(1001U));
+  EXPECT_THAT(PruningNeighbours(*mapOfPlaces(places)).of(0), ElementsAre(1001U));
 }
 
 TEST(PruningNeighbours, AreNotLookedForWithoutEnd) {
   std::vector<Place> places{{0, 0, 0}};
   for (int i = 1; i <= 1023; ++i) places.push_back({0.001 * i, kPi, 0});
   places.push_back({2, 0, 0});
-  EXPECT_THAT(PruningNeighbours(*mapOf(places)).of(0), IsEmpty());
+  EXPECT_THAT(PruningNeighbours(*mapOfPlaces(places)).of(0), IsEmpty());
 }
 
 TEST(PruningNeighbours, AnImageOnItsOwnHasNone) {
-  const auto map = mapOf({{0, 0, 0}, {0.5, 0, 1}, {1, 0, 1}});
+  const auto map = mapOfPlaces({{0, 0, 0}, {0.5, 0, 1}, {1, 0, 1}});
   const PruningNeighbours neighbours(*map);
   EXPECT_THAT(neighbours.of(0), IsEmpty());
   EXPECT_THAT(neighbours.of(1), ElementsAre(2U));

@@ -5,11 +5,10 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "test/support/stamps.h"
 #include "visual_localization/geo/trajectory.h"
 
 namespace visual_localization::test {
-
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 /// Five fixes a second for eight seconds, eastwards at 0.7 m/s.
 inline std::vector<Fix> straightRound() {

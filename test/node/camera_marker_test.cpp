@@ -11,10 +11,10 @@ namespace {
 
 using visualization_msgs::Marker;
 
-std_msgs::Header header() { return test::mapHeader({12, 5}); }
+std_msgs::Header cameraHeader() { return test::mapHeader({12, 5}); }
 
 /// Level, 2 m up, looking north.
-Estimate metricEstimate() {
+Estimate levelEstimate() {
   Estimate estimate;
   estimate.metric = MetricPose();
   estimate.metric->camera.position_m = {10.0, 20.0, 2.0};
@@ -36,11 +36,11 @@ std::size_t finitePoints(const Marker& marker) {
 }
 
 TEST(CameraMarker, IsAFrustumAtTheCameraThatOpensWhereItLooks) {
-  const Marker marker = toCameraMarker(metricEstimate(), test::exampleCamera(), header());
+  const Marker marker = toCameraMarker(levelEstimate(), test::exampleCamera(), cameraHeader());
   EXPECT_EQ(marker.action, Marker::ADD);
   EXPECT_EQ(marker.type, Marker::LINE_LIST);
   EXPECT_EQ(marker.header.frame_id, "map");
-  EXPECT_EQ(marker.header.stamp, header().stamp);
+  EXPECT_EQ(marker.header.stamp, cameraHeader().stamp);
   ASSERT_EQ(marker.points.size(), 20U) << "four rays, four edges and a roof of two";
   EXPECT_EQ(finitePoints(marker), marker.points.size());
   const auto& upper_left = marker.points[1];
@@ -54,34 +54,35 @@ TEST(CameraMarker, IsAFrustumAtTheCameraThatOpensWhereItLooks) {
 }
 
 TEST(CameraMarker, HasTheFieldOfViewOfTheCalibration) {
-  const Marker marker = toCameraMarker(
-      metricEstimate(), CameraModel({{640, 480}, 320.0, 320.0, 319.5, 239.5, Distortion::kPlumbBob, {}}), header());
+  const Marker marker =
+      toCameraMarker(levelEstimate(), CameraModel({{640, 480}, 320.0, 320.0, 319.5, 239.5, Distortion::kPlumbBob, {}}),
+                     cameraHeader());
   const auto& upper_left = marker.points[1];
   EXPECT_NEAR((10.0 - upper_left.x) / (upper_left.y - 20.0), 1.0, 1e-6) << "90 degrees wide";
   EXPECT_NEAR((upper_left.z - 2.0) / (upper_left.y - 20.0), 0.75, 1e-6);
 }
 
 TEST(CameraMarker, IsFiniteForALensThatShowsNothingInTheCorners) {
-  const Marker marker = toCameraMarker(metricEstimate(), fisheye(), header());
+  const Marker marker = toCameraMarker(levelEstimate(), fisheye(), cameraHeader());
   EXPECT_EQ(marker.action, Marker::ADD);
   ASSERT_EQ(marker.points.size(), 20U);
   EXPECT_EQ(finitePoints(marker), marker.points.size());
 }
 
 TEST(CameraMarker, IsTakenAwayWithoutAMetricPoseOrACamera) {
-  EXPECT_EQ(toCameraMarker(Estimate(), test::exampleCamera(), header()).action, Marker::DELETE);
-  EXPECT_EQ(toCameraMarker(metricEstimate(), std::nullopt, header()).action, Marker::DELETE);
-  const Marker shown = toCameraMarker(metricEstimate(), test::exampleCamera(), header());
-  const Marker taken_away = toCameraMarker(Estimate(), test::exampleCamera(), header());
+  EXPECT_EQ(toCameraMarker(Estimate(), test::exampleCamera(), cameraHeader()).action, Marker::DELETE);
+  EXPECT_EQ(toCameraMarker(levelEstimate(), std::nullopt, cameraHeader()).action, Marker::DELETE);
+  const Marker shown = toCameraMarker(levelEstimate(), test::exampleCamera(), cameraHeader());
+  const Marker taken_away = toCameraMarker(Estimate(), test::exampleCamera(), cameraHeader());
   EXPECT_EQ(taken_away.ns, shown.ns);
   EXPECT_EQ(taken_away.id, shown.id);
   EXPECT_TRUE(taken_away.points.empty());
 }
 
 TEST(CameraMarker, HasNothingThatIsNotFinite) {
-  Estimate estimate = metricEstimate();
+  Estimate estimate = levelEstimate();
   estimate.metric->camera.position_m.x() = std::nan("");
-  EXPECT_EQ(toCameraMarker(estimate, test::exampleCamera(), header()).action, Marker::DELETE);
+  EXPECT_EQ(toCameraMarker(estimate, test::exampleCamera(), cameraHeader()).action, Marker::DELETE);
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 #include <sys/resource.h>
 #include <zlib.h>
 
+#include "test/support/refusal.h"
+
 namespace visual_localization {
 namespace {
 
@@ -133,13 +135,8 @@ std::size_t find(const std::vector<std::uint8_t>& data, const std::vector<std::u
   return static_cast<std::size_t>(std::search(data.begin(), data.end(), what.begin(), what.end()) - data.begin());
 }
 
-std::string refusalOf(const sensor_msgs::CompressedImage& message) {
-  try {
-    toGrey(message);
-  } catch (const ImageError& error) {
-    return error.what();
-  }
-  return "taken";
+std::string refusalOfImage(const sensor_msgs::CompressedImage& message) {
+  return test::refusalOf<ImageError>([&] { toGrey(message); });
 }
 
 TEST(ImageConversion, ASizeInFrontOfTheOneThatTheDecoderReadsIsNotBelieved) {
@@ -151,7 +148,7 @@ TEST(ImageConversion, ASizeInFrontOfTheOneThatTheDecoderReadsIsNotBelieved) {
   const std::size_t end = message.data.size() - 2;
   insert(message.data, end, std::vector<std::uint8_t>(4 + 0xFFE0 - end));
   insert(message.data, message.data.size() - 2, {0xFF, 0xC0, 0, 11, 8, 0, 16, 0, 16, 1, 1, 0x11, 0});
-  const std::string refusal = refusalOf(message);
+  const std::string refusal = refusalOfImage(message);
   EXPECT_NE(refusal.find("image is too large"), std::string::npos) << refusal;
 }
 
@@ -163,7 +160,8 @@ TEST(ImageConversion, RawAndCompressedImagesMayHaveTheSameNumberOfPixels) {
     cv::imencode(extension, largest, message.data);
     EXPECT_EQ(toGrey(message).size(), largest.size()) << extension;
     cv::imencode(extension, too_large, message.data);
-    EXPECT_EQ(refusalOf(message), "image is too large: 4096x4097 pixels, at most 16777216 are allowed and 16384 a side")
+    EXPECT_EQ(refusalOfImage(message),
+              "image is too large: 4096x4097 pixels, at most 16777216 are allowed and 16384 a side")
         << extension;
   }
   sensor_msgs::Image raw;
@@ -182,7 +180,7 @@ TEST(ImageConversion, AJpegOfThousandsOfScansIsRefused) {
   const std::vector<std::uint8_t> scan(message.data.begin() + static_cast<std::ptrdiff_t>(first),
                                        message.data.begin() + static_cast<std::ptrdiff_t>(first) + 10);
   for (int i = 0; i < 1000; ++i) insert(message.data, message.data.size() - 2, scan);
-  EXPECT_EQ(refusalOf(message), "JPEG is broken or has more than 100 scans");
+  EXPECT_EQ(refusalOfImage(message), "JPEG is broken or has more than 100 scans");
 }
 
 TEST(ImageConversion, EveryKindOfPngIsDecodedAsByOpenCv) {

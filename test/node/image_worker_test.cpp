@@ -20,13 +20,13 @@ namespace {
 
 using testing::HasSubstr;
 
-cv::Mat noise() {
+cv::Mat smallNoise() {
   cv::Mat image(240, 320, CV_8UC1);
   cv::randu(image, 0, 255);
   return image;
 }
 
-ReceivedImage imageAt(double stamp_s, std::function<cv::Mat()> decode = noise) {
+ReceivedImage imageAt(double stamp_s, std::function<cv::Mat()> decode = smallNoise) {
   ReceivedImage image;
   image.header.stamp = ros::Time(stamp_s);
   image.decode = std::move(decode);
@@ -90,7 +90,7 @@ class ImageWorkerTest : public testing::Test {
 
 TEST_F(ImageWorkerTest, AnImageIsPublishedWithItsHeaderAndItsPixels) {
   start();
-  const cv::Mat grey = noise();
+  const cv::Mat grey = smallNoise();
   ReceivedImage image = imageAt(5.0, [grey] { return grey; });
   image.header.frame_id = "left";
   show(image);
@@ -165,7 +165,7 @@ TEST_F(ImageWorkerTest, WhatIsReplacedBeforeItsTurnIsDropped) {
   worker_.push(imageAt(1.0, [&begun, release] {
     begun.set_value();
     release.wait();
-    return noise();
+    return smallNoise();
   }));
   begun.get_future().wait();
   for (const double stamp_s : {2.0, 3.0, 4.0}) worker_.push(imageAt(stamp_s));

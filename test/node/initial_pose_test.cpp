@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "node/shared_localizer.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -25,16 +26,12 @@ Pose goodPose() {
   return pose;
 }
 
-/// The reason for refusing a good pose after `spoil`, as a running node gives it; empty when it was not refused.
-std::string refusal(const std::function<void(Pose&)>& spoil) {
+/// Of a good pose after `spoil`, as a running node gives it.
+std::string refusalOfPose(const std::function<void(Pose&)>& spoil) {
   Pose pose = goodPose();
   spoil(pose);
-  try {
-    SharedLocalizer{LocalizerConfig{}}.relocalizeAt(guessFrom(pose, "map"));
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return {};
+  return test::refusalOf<std::invalid_argument>(
+      [&] { SharedLocalizer{LocalizerConfig{}}.relocalizeAt(guessFrom(pose, "map")); });
 }
 
 TEST(InitialPose, TakesPositionAndItsCovariance) {
@@ -44,20 +41,21 @@ TEST(InitialPose, TakesPositionAndItsCovariance) {
 }
 
 TEST(InitialPose, ALeadingSlashIsTheSameFrame) {
-  EXPECT_EQ(refusal([](Pose& pose) { pose.header.frame_id = "/map"; }), "");
+  EXPECT_EQ(refusalOfPose([](Pose& pose) { pose.header.frame_id = "/map"; }), "accepted");
 }
 
 TEST(InitialPose, ZeroCovarianceIsAPosition) {
-  EXPECT_EQ(refusal([](Pose& pose) { pose.pose.covariance.assign(0.0); }), "");
+  EXPECT_EQ(refusalOfPose([](Pose& pose) { pose.pose.covariance.assign(0.0); }), "accepted");
 }
 
 TEST(InitialPose, AnotherFrameIsRefused) {
-  EXPECT_NE(refusal([](Pose& pose) { pose.header.frame_id = "odom"; }).find("'odom'"), std::string::npos);
-  EXPECT_NE(refusal([](Pose& pose) { pose.header.frame_id = ""; }), "");
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.header.frame_id = "odom"; }).find("'odom'"), std::string::npos);
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.header.frame_id = ""; }), "accepted");
 }
 
 TEST(InitialPose, AFrameOfSeveralLinesIsNamedInOne) {
-  const std::string reason = refusal([](Pose& pose) { pose.header.frame_id = "a\nb" + std::string(100'000, 'x'); });
+  const std::string reason =
+      refusalOfPose([](Pose& pose) { pose.header.frame_id = "a\nb" + std::string(100'000, 'x'); });
   EXPECT_EQ(reason.find('\n'), std::string::npos);
   EXPECT_LT(reason.size(), 200U);
 }
@@ -65,27 +63,28 @@ TEST(InitialPose, AFrameOfSeveralLinesIsNamedInOne) {
 TEST(InitialPose, NumbersThatAreNotFiniteAreRefused) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.position.x = kNan; }), "");
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.position.y = kInfinity; }), "");
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.orientation.z = kNan; }), "");
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[7] = kNan; }), "");
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[35] = kInfinity; }), "");
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.pose.position.x = kNan; }), "accepted");
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.pose.position.y = kInfinity; }), "accepted");
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.pose.orientation.z = kNan; }), "accepted");
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.covariance[7] = kNan; }), "accepted");
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.covariance[35] = kInfinity; }), "accepted");
 }
 
 TEST(InitialPose, WhatIsLargerThanAnyLocalMapIsRefused) {
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.pose.position.x = 1e300; }).find("1000 km"), std::string::npos);
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[0] = 1e300; }).find("1000 km"), std::string::npos);
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.pose.position.x = 1e300; }).find("1000 km"), std::string::npos);
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.covariance[0] = 1e300; }).find("1000 km"), std::string::npos);
 }
 
 TEST(InitialPose, CovarianceMustBePositiveSemiDefinite) {
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[0] = -1.0; }).find("semi-definite"), std::string::npos);
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[1] = pose.pose.covariance[6] = 10.0; }), "");
-  EXPECT_NE(refusal([](Pose& pose) { pose.pose.covariance[1] = 0.5; }).find("symmetric"), std::string::npos);
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.covariance[0] = -1.0; }).find("semi-definite"), std::string::npos);
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.covariance[1] = pose.pose.covariance[6] = 10.0; }), "accepted");
+  EXPECT_NE(refusalOfPose([](Pose& pose) { pose.pose.covariance[1] = 0.5; }).find("symmetric"), std::string::npos);
 }
 
 TEST(InitialPose, RoundingOfACovarianceIsNoFault) {
-  EXPECT_EQ(refusal([](Pose& pose) { pose.pose.covariance[1] += 1e-7; }), "");
-  EXPECT_EQ(refusal([](Pose& pose) { pose.pose.covariance[0] = pose.pose.covariance[7] = 1.0 - 1e-7; }), "");
+  EXPECT_EQ(refusalOfPose([](Pose& pose) { pose.pose.covariance[1] += 1e-7; }), "accepted");
+  EXPECT_EQ(refusalOfPose([](Pose& pose) { pose.pose.covariance[0] = pose.pose.covariance[7] = 1.0 - 1e-7; }),
+            "accepted");
 }
 
 }  // namespace

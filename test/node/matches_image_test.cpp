@@ -105,7 +105,7 @@ int pixelsMoreOf(const cv::Mat& canvas, int channel, int than) {
 int greenPixels(const cv::Mat& canvas) { return pixelsMoreOf(canvas, 1, 2); }
 int redPixels(const cv::Mat& canvas) { return pixelsMoreOf(canvas, 2, 1); }
 
-MatchedLandmarks landmarksOf(const TrainingMap& map, std::size_t training, bool inlier) {
+MatchedLandmarks matchedIn(const TrainingMap& map, std::size_t training, bool inlier) {
   MatchedLandmarks matched{training, {}};
   for (std::uint32_t i = 0; i < 10; ++i) {
     const SiftKeypoint& keypoint = map.sift(training)->keypoints()[i];
@@ -117,18 +117,18 @@ MatchedLandmarks landmarksOf(const TrainingMap& map, std::size_t training, bool 
 TEST(MatchesImage, LandmarksAreGreenWhenTheyAgreeAndRedWhenNot) {
   const auto map = test::smallMap();
   const cv::Mat grey(240, 320, CV_8UC1, cv::Scalar(100));
-  const cv::Mat agreeing = drawLandmarks(grey, landmarksOf(*map, 3, true), *map);
+  const cv::Mat agreeing = drawLandmarks(grey, matchedIn(*map, 3, true), *map);
   EXPECT_EQ(agreeing.size(), cv::Size(960, 360));
   EXPECT_GT(greenPixels(agreeing), 500);
   EXPECT_EQ(redPixels(agreeing), 0);
-  const cv::Mat contradicting = drawLandmarks(grey, landmarksOf(*map, 3, false), *map);
+  const cv::Mat contradicting = drawLandmarks(grey, matchedIn(*map, 3, false), *map);
   EXPECT_GT(redPixels(contradicting), 500);
   EXPECT_EQ(greenPixels(contradicting), 0);
 }
 
 TEST(MatchesImage, LandmarksWhoseFeatureCannotBeReadAreNotDrawn) {
   const auto map = test::smallMap();
-  MatchedLandmarks matched = landmarksOf(*map, 3, true);
+  MatchedLandmarks matched = matchedIn(*map, 3, true);
   for (MatchedLandmark& landmark : matched.landmarks) landmark.training_feature += 1000;
   const cv::Mat canvas = drawLandmarks(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)), matched, *map);
   EXPECT_EQ(colouredPixels(canvas, {{}, canvas.size()}), 0);

@@ -7,6 +7,7 @@
 
 #include "base/numbers.h"
 #include "ros/message_readers.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -24,13 +25,8 @@ nav_msgs::Odometry message() {
   return odometry;
 }
 
-std::string refusal(const nav_msgs::Odometry& odometry) {
-  try {
-    toReading(odometry, 1, "base_link", "map");
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
+std::string refusalOfOdometry(const nav_msgs::Odometry& odometry) {
+  return test::refusalOf<std::invalid_argument>([&] { toReading(odometry, 1, "base_link", "map"); });
 }
 
 TEST(OdometryMessage, IsAPoseInThePlane) {
@@ -43,27 +39,27 @@ TEST(OdometryMessage, IsAPoseInThePlane) {
 TEST(OdometryMessage, FramesMayHaveALeadingSlashAndTheRobotsMayBeMissing) {
   nav_msgs::Odometry odometry = message();
   odometry.child_frame_id = "/base_link";
-  EXPECT_EQ(refusal(odometry), "");
+  EXPECT_EQ(refusalOfOdometry(odometry), "accepted");
   odometry.child_frame_id = "";
-  EXPECT_EQ(refusal(odometry), "");
+  EXPECT_EQ(refusalOfOdometry(odometry), "accepted");
 }
 
 TEST(OdometryMessage, RefusesWhatIsNoOdometryOfTheRobot) {
   nav_msgs::Odometry odometry = message();
   odometry.child_frame_id = "left_wheel";
-  EXPECT_THAT(refusal(odometry), HasSubstr("'left_wheel' instead of 'base_link'"));
+  EXPECT_THAT(refusalOfOdometry(odometry), HasSubstr("'left_wheel' instead of 'base_link'"));
   odometry = message();
   odometry.header.frame_id = "/map";
-  EXPECT_THAT(refusal(odometry), HasSubstr("which is the map's"));
+  EXPECT_THAT(refusalOfOdometry(odometry), HasSubstr("which is the map's"));
   for (double* value : {&odometry.pose.pose.position.x, &odometry.pose.pose.position.y,
                         &odometry.pose.pose.orientation.w, &odometry.pose.pose.orientation.x}) {
     odometry = message();
     *value = std::numeric_limits<double>::quiet_NaN();
-    EXPECT_THAT(refusal(odometry), HasSubstr("not finite"));
+    EXPECT_THAT(refusalOfOdometry(odometry), HasSubstr("not finite"));
   }
   odometry = message();
   odometry.pose.pose.orientation.w = odometry.pose.pose.orientation.z = 0.0;
-  EXPECT_THAT(refusal(odometry), HasSubstr("no unit quaternion"));
+  EXPECT_THAT(refusalOfOdometry(odometry), HasSubstr("no unit quaternion"));
 }
 
 }  // namespace

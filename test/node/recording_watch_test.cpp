@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include "node/map_recorder.h"
+#include "test/support/stamps.h"
 #include "test/support/synthetic.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
+
 constexpr std::size_t kMany = 300;  ///< features
 
 /// A robot that drives east, with a fix and an image every second.

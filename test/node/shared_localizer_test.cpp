@@ -10,12 +10,13 @@
 #include <gtest/gtest.h>
 
 #include "test/node/small_map.h"
+#include "test/support/stamps.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1000000000;
+using test::kSecond_ns;
 
 cv::Mat noise() {
   cv::Mat image(240, 320, CV_8UC1);

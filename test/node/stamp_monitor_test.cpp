@@ -4,11 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "node/image_worker.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1000000000;
+using test::kSecond_ns;
 
 /// One letter per image: . in order, L late, B back.
 std::string verdicts(const std::vector<int>& stamps_s) {

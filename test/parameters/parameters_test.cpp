@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "test/support/refusal.h"
+
 namespace visual_localization {
 namespace {
 
@@ -31,14 +33,9 @@ struct Engine {
   }
 };
 
-std::string refusal(const ParameterValues& values) {
+std::string refusalOfValues(const ParameterValues& values) {
   Engine engine;
-  try {
-    assignParameters(engine, values);
-  } catch (const ParameterError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return test::refusalOf<ParameterError>([&] { assignParameters(engine, values); });
 }
 
 class TemporaryYaml {
@@ -68,22 +65,22 @@ TEST(Parameters, AnIntegerIsANumberButANumberIsNoInteger) {
   Engine engine;
   assignParameters(engine, {{"engine/power", std::int64_t{7}}});
   EXPECT_EQ(engine.power_w, 7.0);
-  EXPECT_THAT(refusal({{"engine/cylinders", 3.5}}), HasSubstr("'engine/cylinders' = 3.5"));
+  EXPECT_THAT(refusalOfValues({{"engine/cylinders", 3.5}}), HasSubstr("'engine/cylinders' = 3.5"));
 }
 
 TEST(Parameters, RefusalsNameParameterValueAndRange) {
-  EXPECT_THAT(refusal({{"engine/power", 100.5}}),
+  EXPECT_THAT(refusalOfValues({{"engine/power", 100.5}}),
               HasSubstr("'engine/power' = 100.5 is not allowed: must be in [0, 100]"));
-  EXPECT_THAT(refusal({{"engine/power", std::nan("")}}), HasSubstr("'engine/power' = nan"));
-  EXPECT_THAT(refusal({{"engine/power", true}}), HasSubstr("a number in [0, 100]"));
-  EXPECT_THAT(refusal({{"engine/cylinders", std::int64_t{13}}}), HasSubstr("an integer in [1, 12]"));
-  EXPECT_THAT(refusal({{"engine/turbo", std::string("yes")}}), HasSubstr("true or false"));
-  EXPECT_THAT(refusal({{"engine/fuel", std::string("water")}}), HasSubstr("one of petrol, diesel"));
-  EXPECT_THAT(refusal({{"name", 1.0}}), HasSubstr("a string"));
+  EXPECT_THAT(refusalOfValues({{"engine/power", std::nan("")}}), HasSubstr("'engine/power' = nan"));
+  EXPECT_THAT(refusalOfValues({{"engine/power", true}}), HasSubstr("a number in [0, 100]"));
+  EXPECT_THAT(refusalOfValues({{"engine/cylinders", std::int64_t{13}}}), HasSubstr("an integer in [1, 12]"));
+  EXPECT_THAT(refusalOfValues({{"engine/turbo", std::string("yes")}}), HasSubstr("true or false"));
+  EXPECT_THAT(refusalOfValues({{"engine/fuel", std::string("water")}}), HasSubstr("one of petrol, diesel"));
+  EXPECT_THAT(refusalOfValues({{"name", 1.0}}), HasSubstr("a string"));
 }
 
 TEST(Parameters, UnknownNamesAreRefusedWithTheKnownOnes) {
-  const std::string text = refusal({{"engine/powr", 1.0}});
+  const std::string text = refusalOfValues({{"engine/powr", 1.0}});
   EXPECT_THAT(text, HasSubstr("'engine/powr' = 1 is unknown"));
   EXPECT_THAT(text, HasSubstr("engine/power"));
 }
@@ -149,14 +146,14 @@ TEST(Parameters, TableHasARowForEveryParameter) {
 }
 
 TEST(Parameters, ConstraintsAcrossFieldsNameBothValues) {
-  EXPECT_EQ(refusal({{"engine/power", 3.0}}),
+  EXPECT_EQ(refusalOfValues({{"engine/power", 3.0}}),
             "parameter 'engine/cylinders' = 4 is not allowed: must not exceed 'engine/power' = 3");
-  EXPECT_EQ(refusal({{"engine/cylinders", std::int64_t{1}}, {"engine/turbo", true}}),
+  EXPECT_EQ(refusalOfValues({{"engine/cylinders", std::int64_t{1}}, {"engine/turbo", true}}),
             "parameter 'engine/turbo' = true is not allowed: must be false with one cylinder");
 }
 
 TEST(Parameters, ARenamedParameterIsRefusedWithItsNewName) {
-  EXPECT_EQ(refusal({{"engine/horses", 3.0}}), "parameter 'engine/horses' is renamed to 'engine/power'");
+  EXPECT_EQ(refusalOfValues({{"engine/horses", 3.0}}), "parameter 'engine/horses' is renamed to 'engine/power'");
 }
 
 TEST(Parameters, SeveralDocumentsAreRefused) {

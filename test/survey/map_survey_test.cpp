@@ -7,11 +7,12 @@
 
 #include "base/numbers.h"
 #include "test/support/example_map.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
 
 /// Collects images of a map.
 class Rounds {
