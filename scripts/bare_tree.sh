@@ -38,3 +38,17 @@ make_tree() {
     && install -m 755 /dev/stdin "$tree/usr/sbin/policy-rc.d" <<<$'#!/bin/sh\nexit 101' \
     && touch "$tree/root/.is_whole"
 }
+
+# Installs the Debian package `package` with all that it needs.
+install_package() {
+  # shellcheck disable=SC2154
+  cp "$package" "$tree/root/visual-localization.deb" && in_tree 'apt-get update
+    apt-get install --yes --no-install-recommends --reinstall /root/visual-localization.deb'
+}
+
+# As a user would: the programs, the nodelet in a manager with a real roscore, every launch file.
+try_package() {
+  # shellcheck disable=SC2154
+  install -m 755 "$repo/scripts/try_installed.sh" "$tree/root/" && in_tree 'rm -rf /root/try
+    /root/try_installed.sh /root/try'
+}

@@ -34,17 +34,6 @@ build_package() {
     && rm -rf "$build/_CPack_Packages"  # roslaunch would find each launch file twice in this checkout
 }
 
-install_package() {
-  cp "$build"/*.deb "$tree/root/visual-localization.deb" && in_tree 'apt-get update
-    apt-get install --yes --no-install-recommends --reinstall /root/visual-localization.deb'
-}
-
-# As a user would: the programs, the nodelet in a manager with a real roscore, every launch file.
-try_package() {
-  install -m 755 "$repo/scripts/try_installed.sh" "$tree/root/" && in_tree 'rm -rf /root/try
-    /root/try_installed.sh /root/try'
-}
-
 main() {
   local jobs tree='' mirror='' release log=$build/build.log step depends
   jobs=$(nproc)
@@ -74,6 +63,8 @@ main() {
   release=$(. /etc/os-release && echo "$VERSION_CODENAME")
   mkdir -p "$(dirname "$tree")"
   tree=$(cd "$(dirname "$tree")" && pwd)/$(basename "$tree")
+  local package
+  package=$(ls "$build"/*.deb)
   local steps=(install_package try_package)
   if ! is_tree; then steps=(make_tree "${steps[@]}"); fi
   for step in "${steps[@]}"; do

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs, builds and tests the checkout's HEAD in a bare tree of each Debian release. By hand and as root.
+# Installs, builds, tests and packages the checkout's HEAD in bare trees of each Debian release. By hand and as root.
 set -euo pipefail
 repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo
@@ -13,17 +13,19 @@ readonly source_dir=/root/visual_localization build_dir=/root/visual_localizatio
 
 usage() {
   cat <<'USAGE'
-Usage: test_releases.sh [--release NAME]... [--directory DIR] [--mirror URL] [--jobs N] [--keep] [--reuse]
+Usage: test_releases.sh [--release NAME]... [--directory DIR] [--mirror URL] [--jobs N] [--no-tests] [--keep]
+                        [--reuse]
   --release NAME   bullseye, bookworm or trixie; may be repeated (default: all three)
   --directory DIR  for the trees and their logs (default: build/releases)
   --mirror URL     Debian mirror (default: that of this machine's apt)
   --jobs N         parallel jobs (default: number of processors)
+  --no-tests       only the Debian package
   --keep           leave the trees when they have passed; those that failed are always left
   --reuse          use the trees that were left, with HEAD copied and built anew
 Makes a bare tree with debootstrap, copies HEAD into it, and there runs scripts/install_dependencies.sh, the build with
 warnings as errors, and all tests. For Debian 11 it first builds CLI11 and Highway from the source packages of
-Debian 12. Needs debootstrap and 5 GB of disk a release. Prints one line of result a release; exit code 0 when all
-passed.
+Debian 12. Then it builds a Debian package there, and installs and uses that in a second bare tree, DIR/NAME-package.
+Needs debootstrap and 7 GB of disk a release. Prints one line of result a release; exit code 0 when all passed.
 USAGE
 }
 
@@ -63,28 +65,44 @@ run_tests() {
   in_tree "cd $build_dir && ctest --output-on-failure --no-tests=error --parallel $jobs"
 }
 
-# Runs one step after the other; the log holds everything. Prints the result.
-test_release() {
-  local step steps=(make_tree copy_checkout) tree=$directory/$release log=$directory/$release.log
-  if [[ $release == bullseye ]]; then steps+=(install_sources); fi
-  if [[ $reuse == true ]] && is_tree; then steps=(copy_checkout); fi
-  steps+=(install_packages configure build run_tests)
-  : >"$log"
-  for step in "${steps[@]}"; do
+build_package() { in_tree "$source_dir/scripts/build_deb.sh --jobs $jobs"; }
+
+# Runs one step after the other; the log holds everything.
+run_steps() {
+  local step
+  for step in "$@"; do
     if ! with_progress "$release ${step//_/ }" "$log" "$step"; then
       results+=("$release: FAILED in ${step//_/ }; log $log, tree $tree")
       return 1
     fi
   done
-  local summary not_run
-  summary=$(grep -E 'tests passed, .* tests failed out of' "$log" | tail -n 1)
-  not_run=$(grep -cE '\*\*\*(Skipped|Not Run)' "$log") || true
-  results+=("$release: $summary, $not_run skipped; log $log")
-  if [[ $keep == false ]]; then rm -rf --one-file-system "$tree"; fi
+}
+
+test_release() {
+  local steps=(make_tree copy_checkout) tree=$directory/$release log=$directory/$release.log tested='not tested'
+  if [[ $release == bullseye ]]; then steps+=(install_sources); fi
+  if [[ $reuse == true ]] && is_tree; then steps=(copy_checkout); fi
+  steps+=(install_packages)
+  if [[ $tests == true ]]; then steps+=(configure build run_tests); fi
+  : >"$log"
+  run_steps "${steps[@]}" build_package || return 1
+  if [[ $tests == true ]]; then
+    tested=$(grep -E 'tests passed, .* tests failed out of' "$log" | tail -n 1)
+    tested+=", $(grep -cE '\*\*\*(Skipped|Not Run)' "$log" || true) skipped"
+  fi
+
+  local built=$tree package
+  package=$(ls "$built$source_dir"/build/deb/*.deb)
+  tree=$directory/$release-package
+  steps=(make_tree)
+  if [[ $reuse == true ]] && is_tree; then steps=(); fi
+  run_steps "${steps[@]}" install_package try_package || return 1
+  results+=("$release: $tested, the package works; log $log")
+  if [[ $keep == false ]]; then rm -rf --one-file-system "$built" "$tree"; fi
 }
 
 main() {
-  local directory=$repo/build/releases mirror='' jobs keep=false reuse=false chosen=() release results=() result=0
+  local directory=$repo/build/releases mirror='' jobs tests=true keep=false reuse=false chosen=() release results=() result=0
   jobs=$(nproc)
   while (($#)); do
     case $1 in
@@ -96,6 +114,7 @@ main() {
       --directory) directory=${2:?--directory needs a folder}; shift ;;
       --mirror) mirror=${2:?--mirror needs a URL}; shift ;;
       --jobs) jobs=${2:?--jobs needs a number}; shift ;;
+      --no-tests) tests=false ;;
       --keep) keep=true ;;
       --reuse) reuse=true ;;
       -h | --help) usage; exit 0 ;;
