@@ -52,7 +52,7 @@ main() {
     if [[ -z $mirror ]]; then mirror=$(mirror_of_host); fi
     require_trees
   fi
-  "$repo/scripts/install_dependencies.sh"
+  "$repo/scripts/install_dependencies.sh" --with-packaging
   depends=$("$repo/scripts/install_dependencies.sh" --run-only --list)
   mkdir -p "$build"
   : >"$log"
