@@ -17,7 +17,8 @@ BLOCK = re.compile(r'^namespace \{\n(.*?)^\}  // namespace\n', re.DOTALL | re.MU
 TYPE = re.compile(r'^(?:class|struct|enum class|enum|union) (\w+)', re.MULTILINE)
 ALIAS = re.compile(r'^using (\w+) = (.*?);', re.DOTALL | re.MULTILINE)
 OTHER = re.compile(
-    r'^(?!using|template|class|struct|enum|union|TEST|INSTANTIATE|//|#|\}|\s)[^\n=;({]*?\b(\w+)(?:\[\w*\])?(?:\(| =|\{|;)', re.MULTILINE)
+    r'^(?!using|template|class|struct|enum|union|TEST|INSTANTIATE|//|#|\}|\s)'
+    r'[^\n=;({]*?\b(\w+)(?:\[\w*\])?(?:\(| =|\{|;)', re.MULTILINE)
 
 
 def private_names(text: str) -> dict:
