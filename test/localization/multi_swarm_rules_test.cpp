@@ -256,12 +256,15 @@ TEST(MultiSwarmRules, IsDrawnToWhereItIsAttracted) {
 
 TEST(MultiSwarmRules, AResetBeginsTheLeadersStrengthAnew) {
   StandingRobot robot(severalSwarms());
-  robot.look();
-  robot.street.setLikeness(0.5, 0.45);
+  const auto lookAfterReset = [&robot](double own, double twin) {
+    robot.street.setLikeness(own, twin);
+    robot.tracker.reset(around(TwinStreet::at(StandingRobot::kPlace_m), 1.0));
+    return robot.look().rival_weight;
+  };
   int at_once = 0;
   for (int i = 0; i < 400; ++i) {
-    robot.tracker.reset(around(TwinStreet::at(StandingRobot::kPlace_m), 1.0));
-    const double weight = robot.look().rival_weight;
+    lookAfterReset(1.0, 0.0);
+    const double weight = lookAfterReset(0.5, 0.45);
     if (robot.tracker.swarms() == 1U) continue;
     ++at_once;
     // A rival has matched half as well to nine tenths as well as the leader, whose images before do not count.
