@@ -76,14 +76,14 @@ Usage: install_dependencies.sh [--with-lint] [--with-rviz] [--with-clang] [--wit
                                [--core-only | --run-only] [--list] [--log FILE]
 Installs with apt what is missing; does nothing when everything is there. Needs root or sudo only to install.
 Before it installs, it prints what is missing, what for, and the command for root.
-  --with-lint   also clang-format, clang-tidy and shellcheck
-  --with-rviz   also rviz, a virtual display and what the window of plot_status.py needs
-  --with-clang  also clang with its sanitizers and libFuzzer
+  --with-lint       also clang-format, clang-tidy and shellcheck
+  --with-rviz       also rviz, a virtual display and what the window of plot_status.py needs
+  --with-clang      also clang with its sanitizers and libFuzzer
   --with-packaging  also what build_deb.sh needs
-  --core-only   only what the library without ROS needs
-  --run-only    only what the built package runs, beside the libraries that it is linked with
-  --list        print the packages, one a line, and install nothing
-  --log FILE    add apt's output to FILE (default: a temporary file, kept when apt fails)
+  --core-only       only what the library without ROS needs
+  --run-only        only what the built package runs, beside the libraries that it is linked with
+  --list            print the packages, one a line, and install nothing
+  --log FILE        add apt's output to FILE (default: a temporary file, kept when apt fails)
 USAGE
 }
 

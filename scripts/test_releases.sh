@@ -102,7 +102,8 @@ test_release() {
 }
 
 main() {
-  local directory=$repo/build/releases mirror='' jobs tests=true keep=false reuse=false chosen=() release results=() result=0
+  local directory=$repo/build/releases mirror='' jobs tests=true keep=false reuse=false
+  local chosen=() release results=() result=0
   jobs=$(nproc)
   while (($#)); do
     case $1 in

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "test/support/refusal.h"
+
 namespace visual_localization::apps {
 namespace {
 
@@ -15,12 +17,7 @@ const char* const kSquare = R"([[9.0, 48.0], [9.1, 48.0], [9.1, 48.1], [9.0, 48.
 std::string polygon(const std::string& rings) { return R"({"type": "Polygon", "coordinates": [)" + rings + "]}"; }
 
 std::string refusal(const std::string& text) {
-  try {
-    const Region region(text);
-  } catch (const RegionError& error) {
-    return error.what();
-  }
-  return "";
+  return test::refusalOf<RegionError>([&] { const Region region(text); });
 }
 
 TEST(Region, HasWhatIsInsideAndOnTheBorder) {

@@ -5,6 +5,7 @@
 
 #include "base/files.h"
 #include "evaluation/score_table.h"
+#include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 
 namespace visual_localization {
@@ -23,12 +24,7 @@ class Poses : public ::testing::Test {
     return readPoses(path_);
   }
   std::string refusal(const std::string& text) const {
-    try {
-      read(text);
-    } catch (const FileError& error) {
-      return error.what();
-    }
-    return "accepted";
+    return test::refusalOf<FileError>([&] { read(text); });
   }
 
   test::TemporaryFolder folder_;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/numbers.h"
+#include "test/support/refusal.h"
 #include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {
@@ -14,16 +15,6 @@ SensorMount aside() {
   SensorMount mount;
   mount.camera = parseCameraMount("1.0 0.5 1.2 0.2617993877991494 0 0");
   return mount;
-}
-
-template <class Action>
-std::string refusal(Action action) {
-  try {
-    action();
-    return "";
-  } catch (const MountError& error) {
-    return error.what();
-  }
 }
 
 TEST(SensorMount, IsWhereTheCameraIsUnlessSaid) {
@@ -55,17 +46,17 @@ TEST(SensorMount, ReadsPitchAsTransformPublishersDo) {
 TEST(SensorMount, RefusesWhatIsNoMount) {
   for (const char* text :
        {"", "1 2 3", "1 2 3 4 5", "1 2 3 4 5 6 7", "a b c d e f", "nan 0 0 0 0 0", "200 0 0 0 0 0"}) {
-    EXPECT_NE(refusal([text] { parseCameraMount(text); }), "") << text;
+    EXPECT_NE(test::refusalOf<MountError>([text] { parseCameraMount(text); }), "accepted") << text;
   }
   for (const char* text : {"", "1 2", "1 2 3 4", "1 2 x", "0 0 101"}) {
-    EXPECT_NE(refusal([text] { parseAntennaMount(text); }), "") << text;
+    EXPECT_NE(test::refusalOf<MountError>([text] { parseAntennaMount(text); }), "accepted") << text;
   }
   SensorMount mount;
   mount.camera.rotation.coeffs() *= 2.0;
-  EXPECT_THAT(refusal([&mount] { requireMount(mount); }), testing::HasSubstr("unit length"));
+  EXPECT_THAT(test::refusalOf<MountError>([&mount] { requireMount(mount); }), testing::HasSubstr("unit length"));
   mount = {};
   mount.antenna_m.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(refusal([&mount] { requireMount(mount); }), testing::HasSubstr("antenna"));
+  EXPECT_THAT(test::refusalOf<MountError>([&mount] { requireMount(mount); }), testing::HasSubstr("antenna"));
 }
 
 TEST(SensorMount, IsDescribedInWords) {
