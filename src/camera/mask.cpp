@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <png.h>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -42,14 +42,16 @@ void requirePng(const std::string& bytes) {
 
 Mask decoded(const std::string& bytes) {
   requirePng(bytes);
-  const cv::Mat raw(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));  // only read
-  cv::Mat grey;
-  try {
-    grey = cv::imdecode(raw, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception& error) {
-    throw CameraError("cannot be decoded: " + oneLine(error.err));
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  if (::png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()) == 0) {
+    throw CameraError("cannot be decoded: " + oneLine(png.message));
   }
-  if (grey.empty()) throw CameraError("cannot be decoded");
+  png.format = PNG_FORMAT_GRAY;
+  cv::Mat grey(static_cast<int>(png.height), static_cast<int>(png.width), CV_8UC1);
+  if (::png_image_finish_read(&png, nullptr, grey.data, 0, nullptr) == 0) {
+    throw CameraError("cannot be decoded: " + oneLine(png.message));
+  }
   return Mask(grey);
 }
 

@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csetjmp>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
 #include <utility>
 
-#include <opencv2/imgcodecs.hpp>
+#include <jpeglib.h>
 
 #include "base/numbers.h"
 #include "base/parallel.h"
@@ -15,15 +19,62 @@ namespace {
 
 constexpr std::size_t kNeighbours = 2;  ///< Weiss et al., section III
 
-constexpr int kPreviewQuality = 70;
+/// libjpeg writing an image. It reports errors by a jump, so functions that call it have no objects of their own.
+class JpegWriter {
+ public:
+  JpegWriter() {
+    encoder_.err = ::jpeg_std_error(&errors_);
+    encoder_.client_data = this;
+    errors_.error_exit = [](j_common_ptr encoder) {
+      std::longjmp(static_cast<JpegWriter*>(encoder->client_data)->failed_, 1);
+    };
+    errors_.output_message = [](j_common_ptr) {};
+  }
+  ~JpegWriter() {
+    ::jpeg_destroy_compress(&encoder_);
+    std::free(bytes_);  // libjpeg takes it by malloc
+  }
+  JpegWriter(const JpegWriter&) = delete;
+  JpegWriter& operator=(const JpegWriter&) = delete;
+
+  /// `grey`: 8-bit, one channel, not empty. False when there is no memory.
+  bool write(const cv::Mat& grey, int quality) {
+    if (setjmp(failed_) != 0) return false;
+    jpeg_create_compress(&encoder_);
+    ::jpeg_mem_dest(&encoder_, &bytes_, &size_);
+    encoder_.image_width = static_cast<JDIMENSION>(grey.cols);
+    encoder_.image_height = static_cast<JDIMENSION>(grey.rows);
+    encoder_.input_components = 1;
+    encoder_.in_color_space = JCS_GRAYSCALE;
+    ::jpeg_set_defaults(&encoder_);
+    ::jpeg_set_quality(&encoder_, quality, TRUE);
+    ::jpeg_start_compress(&encoder_, TRUE);
+    while (encoder_.next_scanline < encoder_.image_height) {
+      auto* row = const_cast<JSAMPROW>(grey.ptr(static_cast<int>(encoder_.next_scanline)));  // only read
+      ::jpeg_write_scanlines(&encoder_, &row, 1);
+    }
+    ::jpeg_finish_compress(&encoder_);
+    return true;
+  }
+
+  std::vector<std::uint8_t> bytes() const { return {bytes_, bytes_ + size_}; }
+
+ private:
+  jpeg_compress_struct encoder_{};
+  jpeg_error_mgr errors_{};
+  std::jmp_buf failed_{};
+  unsigned char* bytes_ = nullptr;
+  unsigned long size_ = 0;
+};
 
 std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
+  constexpr int kPreviewQuality = 70;
   if (width_px <= 0) return {};
   const int height_px = std::max(1, static_cast<int>(std::lround(1.0 * grey.rows * width_px / grey.cols)));
   cv::Mat small;
-  std::vector<std::uint8_t> jpeg;
-  cv::imencode(".jpg", fitted(grey, {width_px, height_px}, small), jpeg, {cv::IMWRITE_JPEG_QUALITY, kPreviewQuality});
-  return jpeg;
+  JpegWriter writer;
+  if (!writer.write(fitted(grey, {width_px, height_px}, small), kPreviewQuality)) throw std::bad_alloc();
+  return writer.bytes();
 }
 
 }  // namespace

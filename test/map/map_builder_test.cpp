@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "test/map/straight_round.h"
@@ -36,6 +37,21 @@ TEST(MapBuilder, ImagesGetThePositionOfTheirStamp) {
   EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
   ASSERT_EQ(map->header().sessions.size(), 1U);
   EXPECT_EQ(map->header().sessions[0].name, "round");
+}
+
+TEST(MapBuilder, PreviewsAreSmallJpegsOfTheImages) {
+  MapBuilderConfig config;
+  config.preview_width_px = 160;
+  MapBuilder builder(config);
+  builder.beginSession("round", straightRound());
+  ASSERT_TRUE(builder.wants(0));
+  builder.addImage(0, scene(1, 0));
+  const cv::Mat preview = cv::imdecode(builder.build()->preview(0), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(preview.type(), CV_8UC1);
+  ASSERT_EQ(preview.size(), cv::Size(160, 120));
+  cv::Mat expected;
+  cv::resize(scene(1, 0), expected, preview.size(), 0.0, 0.0, cv::INTER_AREA);
+  EXPECT_LT(cv::norm(preview, expected, cv::NORM_L1) / static_cast<double>(expected.total()), 5.0);  // grey levels
 }
 
 TEST(MapBuilder, CountsWhyImagesAreDropped) {
