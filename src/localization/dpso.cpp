@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "localization/session_choice.h"
@@ -234,21 +235,22 @@ Eigen::Vector2d Dpso::positionOf_m(const CloudMoments& cloud) const {
   return config_.position == "best" ? *attractor_m_ : centreOfBest_m();
 }
 
-/// Of as many particles as are asked for, if so many have any weight.
+/// Of as many particles as are asked for, if so many match anything; where none does, the best one there was.
 Eigen::Vector2d Dpso::centreOfBest_m() const {
-  std::vector<const Particle*> order;
-  for (const Particle& particle : particles_) order.push_back(&particle);
+  std::vector<std::size_t> order(particles_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
   const auto count = std::min(order.size(), static_cast<std::size_t>(config_.best_particles));
-  std::partial_sort(
-      order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
-      [](const Particle* a, const Particle* b) { return std::make_pair(b->weight, a) < std::make_pair(a->weight, b); });
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
+                    [this](std::size_t a, std::size_t b) {
+                      return std::make_pair(-fitness_[a].value, a) < std::make_pair(-fitness_[b].value, b);
+                    });
   Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
-  double weighted = 0.0;
-  for (std::size_t i = 0; i < count && order[i]->weight > 0.0; ++i) {
-    sum_m += order[i]->position_m;
-    weighted += 1.0;
+  double matching = 0.0;
+  for (std::size_t i = 0; i < count && fitness_[order[i]].value > 0.0; ++i) {
+    sum_m += particles_[order[i]].position_m;
+    matching += 1.0;
   }
-  return weighted > 0.0 ? Eigen::Vector2d(sum_m / weighted) : *attractor_m_;
+  return matching > 0.0 ? Eigen::Vector2d(sum_m / matching) : *attractor_m_;
 }
 
 /// Of which v_sw is the speed.

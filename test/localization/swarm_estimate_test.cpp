@@ -65,6 +65,15 @@ TEST(SwarmEstimate, TheCentreOfTheBestIsThatOfThoseWithAnyWeight) {
   EXPECT_GE(few, 10);
 }
 
+TEST(SwarmEstimate, WhereNothingMatchesTheCentreOfTheBestIsTheAttractor) {
+  World world = roundWorld();
+  DpsoConfig config;
+  config.position = "k_best";
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  swarm.attract(onCircle(10.0));
+  EXPECT_EQ(swarm.update(world.inTheDark()).position_m, onCircle(10.0));
+}
+
 /// Without smoothing; `quantum_share` of the particles are quantum ones, the others standard.
 DpsoConfig withQuantumShare(double quantum_share) {
   DpsoConfig config;
