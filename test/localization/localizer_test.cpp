@@ -259,6 +259,7 @@ TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
   LiveImage image(*map(), frontEndConfigOf(LocalizerConfig(), map()->header()), SimilarityConfig());
   image.set(0, viewAt(12.0 + 1e-9));
   EXPECT_FALSE(image.sift()) << "nothing was asked for yet";
+  EXPECT_EQ(image.report().features_kept, 0U);
 
   const Score by_global = image.compare(FeatureKind::kGlobal, 20);
   EXPECT_FALSE(image.sift()) << "global features need no SIFT";

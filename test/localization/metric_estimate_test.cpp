@@ -100,6 +100,21 @@ TEST_F(MetricEstimate, AVerifiedPoseBringsTheParticles) {
   }
 }
 
+TEST_F(MetricEstimate, AVerifiedPoseBringsParticlesThatAreWideApartAroundIt) {
+  LocalizerConfig config;
+  config.state.max_step_m = 4.0;
+  config.metric.min_inliers_tracking = config.metric.min_inliers;
+  make(config);
+  const Estimate estimate = see(30);
+  ASSERT_TRUE(estimate.metric);
+  ASSERT_TRUE(estimate.metric->confirmed);
+  ASSERT_LT((estimate.tracked.position_m - positionOf(30)).norm(), config.state.max_step_m);
+  ASSERT_GT(estimate.tracked.spread_m.maxCoeff(), config.state.max_step_m);
+  for (const Particle& particle : localizer_->particles()) {
+    EXPECT_LT((particle.position_m - positionOf(30)).norm(), 6.0);
+  }
+}
+
 TEST_F(MetricEstimate, APoseThatIsNotConfirmedLeavesTheParticles) {
   LocalizerConfig config;
   config.state.max_step_m = 2.0;
