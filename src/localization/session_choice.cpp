@@ -19,6 +19,7 @@ constexpr double kMemory = 0.7;          ///< share of what was known of a sessi
 constexpr double kBetter = 1.1;          ///< another session must match so much better
 constexpr double kLeastMatch = 0.01;     ///< added to both: of what hardly matches no ratio is known
 constexpr double kLargestRatio = 10.0;   ///< of two matches: one image alone must not decide
+constexpr double kLeastKnown = 1e-3;     ///< of the chosen session: so that one can come back
 constexpr std::size_t kNeighbours = 32;  ///< looked at for those that face alike
 
 }  // namespace
@@ -105,15 +106,22 @@ void SessionChoice::learn(std::size_t training_image, double match, std::size_t 
   if (!isOn() || session == other) return;
   const double measured = (other_match + kLeastMatch) / (match + kLeastMatch);
   const double ratio = std::clamp(measured, 1.0 / kLargestRatio, kLargestRatio);
-  const double known = std::clamp(ratio * matches_[session], 1e-3, 1e3);
-  matches_[other] = kMemory * matches_[other] + (1.0 - kMemory) * known;
+  matches_[other] = kMemory * matches_[other] + (1.0 - kMemory) * ratio * matches_[session];
   if (matches_[other] > kBetter * matches_[chosen_]) chosen_ = other;
+  relateToChosen();
+}
+
+/// Each change of session multiplies what is known; only its ratio to the chosen one counts.
+void SessionChoice::relateToChosen() {
+  const double chosen = matches_[chosen_];
+  for (double& match : matches_) match = std::max(match / chosen, kLeastKnown);
 }
 
 void SessionChoice::choose(std::size_t training_image) {
   if (!isOn()) return;
   chosen_ = sessionOf(training_image);
   matches_[chosen_] = *std::max_element(matches_.begin(), matches_.end());
+  relateToChosen();
 }
 
 void SessionChoice::sawSomething(bool anything) {

@@ -62,6 +62,7 @@ class SessionChoice {
   std::size_t sessionOf(std::size_t training_image) const;
   std::size_t nextInTurn();
   std::size_t bestOr(std::size_t session) const;
+  void relateToChosen();
 
   const TrainingMap& map_;
   bool on_;
@@ -69,7 +70,7 @@ class SessionChoice {
   bool started_ = false;
   std::size_t chosen_ = 0;
   std::size_t chosen_before_ = 0;  ///< before images showed nothing
-  std::vector<double> matches_;    ///< of each session lately, on a scale of their own
+  std::vector<double> matches_;    ///< of each session lately, as a share of the chosen one's
   std::size_t images_seen_ = 0;
   std::size_t nothing_seen_ = 0;  ///< images in a row
   std::size_t trials_ = 0;

@@ -232,6 +232,17 @@ TEST(SessionChoice, AMuchBetterMatchIsBelievedSooner) {
   EXPECT_EQ(imagesUntilChosen(2.0), 1);
 }
 
+TEST_F(SessionChoiceTest, ChangesAsReadilyAfterManyChanges) {
+  sessions_.startImage(8 * kHour_ns);
+  for (int change = 0; change < 500; ++change) {  // as on a course of which each half matches one of two sessions
+    const std::size_t before = *sessions_.chosen();
+    const std::size_t image = before == 0 ? 30 : 80;
+    const std::size_t other = before == 0 ? 80 : 30;
+    for (int trial = 0; trial < 3 && sessions_.chosen() == before; ++trial) sessions_.learn(image, 0.1, other, 0.2);
+    ASSERT_NE(sessions_.chosen(), before) << change;
+  }
+}
+
 TEST_F(SessionChoiceTest, TheOrderOfTrials) {
   sessions_.startImage(8 * kHour_ns);
   const auto sessionsTried = [this](int trials) {
