@@ -92,8 +92,11 @@ TEST(FocalCheck, IgnoresWhatIsNotFinite) {
   FocalCheck check(kMaxError);
   addImage(check, std::numeric_limits<double>::quiet_NaN(), 0.004);
   addImage(check, 1.0, std::numeric_limits<double>::infinity());
+  addImage(check, 1.0, std::numeric_limits<double>::quiet_NaN());
   EXPECT_FALSE(check.confirms());
   EXPECT_DOUBLE_EQ(check.scale(), 1.0);
+  addImage(check, 1.002, 0.004);
+  EXPECT_DOUBLE_EQ(check.scale(), 1.002);
 }
 
 TEST(FocalCheck, WhatContradictsDoesNotConfirm) {

@@ -187,6 +187,18 @@ TEST_F(LocalizerRules, TheSecondWitnessIsAskedOnlyWhereTheFirstIsNotSure) {
   EXPECT_EQ(see(20.0).swept, 0U);
 }
 
+TEST_F(LocalizerRules, GlobalFeaturesAloneAreNeverSure) {
+  LocalizerConfig config;
+  config.features = "global";
+  make(config);
+  image_->best = 0.95;
+  Estimate estimate;
+  for (int i = 0; i < 40; ++i) estimate = see(20.0);
+  ASSERT_GT(estimate.tracked.best.similarity, config.state.sure_similarity);
+  ASSERT_LT(estimate.tracked.best_distance_m, config.state.max_distance_m);
+  EXPECT_GT(estimate.swept, 0U);
+}
+
 TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
   make({}, twoSessions());
   image_->best = 0.2;

@@ -97,6 +97,22 @@ void expectSpeedOf(const Point& point_m, World& world, Dpso& swarm) {
   }
 }
 
+TEST(SwarmEstimate, AResetForgetsTheSpeed) {
+  World world = roundWorld();
+  DpsoConfig config = withQuantumShare(0.0);
+  config.ema_alpha = 0.1;
+  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  for (int image = 0; image < 10; ++image) swarm.update(world.from(onCircle(2.0 * image)));
+  swarm.reset(normallyDistributed(onCircle(0.0), 9.0 * Eigen::Matrix2d::Identity()));
+  swarm.update(world.from(onCircle(0.0)));
+  TrackerInput input = world.from(onCircle(2.0));
+  input.travel.seconds = 1.0;
+  const TrackerTuning tuning = swarm.update(input).tuning;
+  const Eigen::Vector2d area_m = world.map().area().range();
+  EXPECT_GE(tuning.speed_ema * area_m.maxCoeff(), tuning.speed_mps - 1e-9);
+  EXPECT_LE(tuning.speed_ema * area_m.minCoeff(), tuning.speed_mps + 1e-9);
+}
+
 TEST(SwarmEstimate, WithoutTravellersItsSpeedIsThatOfTheWeightedCentre) {
   World world = roundWorld();
   Dpso swarm(world.map(), withQuantumShare(1.0), FitnessConfig(), 1);
