@@ -17,6 +17,7 @@ libnanoflann-dev: search for the training images near a position
 libgeographiclib-dev: GPS positions to metres
 libcli11-dev: command lines of the programs
 libboost-dev: polygons; bags
+libjpeg-dev libpng-dev: previews, masks, compressed images
 libyaml-cpp-dev: configuration files
 nlohmann-json3-dev: GeoJSON export of maps
 libhwy-dev: vectorised SIFT and comparison of descriptors
@@ -26,7 +27,6 @@ readonly ROS_BUILD='
 catkin: the build of a ROS package
 libroscpp-dev libnodelet-dev libnodeletlib-dev pluginlib-dev: the nodelet
 libcv-bridge-dev libimage-transport-dev: images from a camera
-libjpeg-dev libpng-dev: compressed images
 libcamera-calibration-parsers-dev: calibration files of cameras
 libtf2-ros-dev libtf2-geometry-msgs-dev libtf2-eigen-dev: tf
 librosbag-dev librosbag-storage-dev libroslz4-dev libbz2-dev: bags
