@@ -7,6 +7,7 @@
 #include <sensor_msgs/Image.h>
 
 #include "ros/message_readers.h"
+#include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/bag/bag_reader.h"
 
@@ -35,13 +36,7 @@ template <class Change>
 std::string refusalOf(Change change) {
   sensor_msgs::CameraInfo info = example();
   change(info);
-  try {
-    toCamera(info);
-    return "accepted";
-  } catch (const CameraError& error) {
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
-    return error.what();
-  }
+  return test::refusalOf<CameraError>([&info] { toCamera(info); });
 }
 
 TEST(CameraInfo, IsReadFieldByField) {
@@ -160,16 +155,10 @@ class CameraFile : public testing::Test {
   std::string refusal(const std::string& content, const std::string& name = "camera.yaml") const {
     const std::string path = folder_ / name;
     test::writeAll(path, content);
-    try {
-      readCameraFile(path);
-      return "accepted";
-    } catch (const CameraError& error) {
-      const std::string text = error.what();
-      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
-      EXPECT_THAT(text, StartsWith(path));
-      EXPECT_LT(text.size(), path.size() + 400) << text;
-      return text;
-    }
+    const std::string text = test::refusalOf<CameraError>([&path] { readCameraFile(path); });
+    if (text != "accepted") EXPECT_THAT(text, StartsWith(path));
+    EXPECT_LT(text.size(), path.size() + 400) << text;
+    return text;
   }
 
   test::TemporaryFolder folder_;
@@ -235,13 +224,7 @@ class BagCamera : public testing::Test {
     for (const sensor_msgs::CameraInfo& info : infos) bag.write("/left/camera_info", ros::Time(time_s++), info);
   }
   std::string refusal() const {
-    try {
-      BagReader(path_).camera("/left/image_raw");
-      return "accepted";
-    } catch (const BagError& error) {
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
-      return error.what();
-    }
+    return test::refusalOf<BagError>([this] { BagReader(path_).camera("/left/image_raw"); });
   }
 
   test::TemporaryFolder folder_;

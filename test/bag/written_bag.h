@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "bag/bag_file.h"
+#include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/ros/image_conversion.h"
@@ -73,15 +74,12 @@ class BagFileTest : public testing::Test {
 
   /// Why a bag cannot be read from its beginning to its end.
   static std::string refusal(const std::string& path) {
-    try {
+    return test::refusalOf<bag::DamagedBag>([&path] {
       bag::BagFile bag(std::make_unique<bag::FileBytes>(path));
       std::set<std::uint32_t> all;
       for (const auto& [id, connection] : bag.connections()) all.insert(id);
       for (const bag::Message& message : bag.messages(all)) bag.read(message);
-    } catch (const bag::DamagedBag& error) {
-      return error.what();
-    }
-    return "accepted";
+    });
   }
 
   /// From now on this process gets at most so many bytes of memory beyond those that it has.

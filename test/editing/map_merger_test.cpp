@@ -10,6 +10,7 @@
 
 #include "test/editing/edited_street.h"
 #include "test/support/example_map.h"
+#include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
 
@@ -40,13 +41,9 @@ class MapMerger : public testing::Test {
   }
 
   std::string refusal(const std::vector<NamedMap>& maps) {
-    try {
-      mergeMaps(maps, "", path_, 1);
-    } catch (const MergeError& error) {
-      EXPECT_FALSE(std::filesystem::exists(path_));
-      return error.what();
-    }
-    return "";
+    const std::string text = test::refusalOf<MergeError>([&] { mergeMaps(maps, "", path_, 1); });
+    EXPECT_FALSE(std::filesystem::exists(path_));
+    return text;
   }
 
   test::TemporaryFolder folder_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "test/support/refusal.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
@@ -63,12 +64,8 @@ TEST(SiftExtractor, TakesTheSmallestImageAndNoneSmaller) {
   EXPECT_FALSE(isExtractable(cv::Mat(320, kSmallestImageSide_px - 1, CV_8UC1)));
   EXPECT_FALSE(isExtractable(cv::Mat(320, 240, CV_8UC3)));
   EXPECT_NO_THROW(makeSiftExtractor(SiftConfig())->extract(cv::Mat(16, 16, CV_8UC1, cv::Scalar(0))));
-  try {
-    requireExtractable(cv::Mat(15, 320, CV_8UC1));
-    ADD_FAILURE() << "accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "image is 320x15 pixels, must be at least 16x16");
-  }
+  EXPECT_EQ(test::refusalOf<std::invalid_argument>([&] { requireExtractable(cv::Mat(15, 320, CV_8UC1)); }),
+            "image is 320x15 pixels, must be at least 16x16");
 }
 
 TEST(SiftExtractor, RefusesWhatIsNoGreyImage) {

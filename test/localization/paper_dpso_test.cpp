@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "localization/dpso.h"
+#include "test/support/refusal.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
 #include "visual_localization/localization/localizer_config.h"
@@ -186,12 +187,8 @@ TEST(PaperDpso, ThePresetIsAConfiguration) {
   EXPECT_EQ(config.dpso.recovery, "paper");
   EXPECT_EQ(config.estimate, "image");
   EXPECT_EQ(config.metric.pose_source, "place");
-  try {
-    presetValues("papers\n");
-    ADD_FAILURE();
-  } catch (const ParameterError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("'papers ' is not allowed: must be one of paper"));
-  }
+  EXPECT_THAT(test::refusalOf<ParameterError>([&] { presetValues("papers\n"); }),
+              HasSubstr("'papers ' is not allowed: must be one of paper"));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "test/map/straight_round.h"
+#include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/map/map_file.h"
@@ -136,14 +137,10 @@ TEST(MapBuilder, TheFirstImagesDoNotDecideASizeThatIsGiven) {
 TEST(MapBuilder, ASessionWhoseImagesNoMapMayHaveIsRefused) {
   MapBuilder builder({});
   builder.beginSession("round", straightRound(), {{}, {}, {}, {10000, 5000}});
-  try {
-    builder.addImage(kSecond_ns, cv::Mat(100, 200, CV_8UC1, cv::Scalar(7)));
-    ADD_FAILURE() << "accepted";
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(),
-                 "session 'round': its images are too large: 10000x5000 pixels, at most 16777216 are allowed and 16384 "
-                 "a side");
-  }
+  EXPECT_EQ(test::refusalOf<std::runtime_error>(
+                [&] { builder.addImage(kSecond_ns, cv::Mat(100, 200, CV_8UC1, cv::Scalar(7))); }),
+            "session 'round': its images are too large: 10000x5000 pixels, at most 16777216 are allowed and 16384 "
+            "a side");
 }
 
 /// Drives for 20 s, stands for 30 s, drives for 20 s: 0.7 m/s, fixes with millimetres of noise.
@@ -261,12 +258,8 @@ TEST(MapBuilder, SaysWhatIsMissing) {
   std::vector<Fix> blind = straightRound();
   for (Fix& fix : blind) fix.has_fix = false;
   for (const auto& fixes : {std::vector<Fix>{}, blind}) {
-    try {
-      builder.beginSession("dark", fixes);
-      ADD_FAILURE() << "accepted";
-    } catch (const std::runtime_error& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr("'dark'"));
-    }
+    EXPECT_THAT(test::refusalOf<std::runtime_error>([&] { builder.beginSession("dark", fixes); }),
+                testing::HasSubstr("'dark'"));
   }
   MapBuilderConfig config;
   config.min_spacing_m = std::numeric_limits<double>::quiet_NaN();

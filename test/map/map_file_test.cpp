@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "test/map/stored_map.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -130,14 +131,12 @@ TEST_F(MapStore, AMapThatCouldNotBeOpenedIsNotSaved) {
   header.image_size = {4096, 4097};
   std::vector<TrainingImage> images = test::exampleImages(6, 10);
   for (TrainingImage& image : images) image.geometry.reset();
-  try {
-    saveMap({header, images}, path_);
-    FAIL() << "saved";
-  } catch (const MapStoreError& error) {
-    EXPECT_EQ(error.what(), path_ +
-                                ": cannot be written: its images are too large: 4096x4097 pixels, at most 16777216 "
-                                "are allowed and 16384 a side");
-  }
+  EXPECT_EQ(test::refusalOf<MapStoreError>([&] {
+              saveMap({header, images}, path_);
+            }),
+            path_ +
+                ": cannot be written: its images are too large: 4096x4097 pixels, at most 16777216 "
+                "are allowed and 16384 a side");
 }
 
 TEST_F(MapStore, KilledWhileSavingLeavesTheOldMapOrTheNewOne) {

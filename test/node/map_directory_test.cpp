@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "node/node_config.h"
+#include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
@@ -35,11 +36,7 @@ class MapDirectory : public testing::Test {
   std::string real(const std::string& name) const { return fs::canonical(folder_ / name).string(); }
 
   std::string refusal(const std::string& path) const {
-    try {
-      return "opens " + mapFileBelow(directory_, path);
-    } catch (const MapStoreError& error) {
-      return error.what();
-    }
+    return test::refusalOf<MapStoreError>([&] { mapFileBelow(directory_, path); });
   }
 
   test::TemporaryFolder folder_;

@@ -1,9 +1,11 @@
 #include <cstdint>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "node/node_config.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -39,12 +41,7 @@ TEST(ParameterServer, AnEmptyNamespaceHasNoValues) { EXPECT_TRUE(flatten(XmlRpcV
 TEST(ParameterServer, AListIsRefusedByName) {
   XmlRpcValue tree;
   tree["dpso"]["inertia"][0] = 0.9;
-  try {
-    flatten(tree);
-    FAIL();
-  } catch (const ParameterError& error) {
-    EXPECT_NE(std::string(error.what()).find("'dpso/inertia'"), std::string::npos);
-  }
+  EXPECT_THAT(test::refusalOf<ParameterError>([&] { flatten(tree); }), testing::HasSubstr("'dpso/inertia'"));
 }
 
 TEST(ParameterServer, ParametersOfOthersAreKnown) {

@@ -3,10 +3,12 @@
 #include <set>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "node/node_config.h"
 #include "node/reconfigure_server.h"
+#include "test/support/refusal.h"
 
 namespace visual_localization {
 namespace {
@@ -94,12 +96,8 @@ TEST_F(ReconfigureMessages, WhatIsReadAtTheStartCannotBeSet) {
   config.strs.resize(1);
   config.strs[0].name = "map";
   config.strs[0].value = "other.map";
-  try {
-    toValues(config, declare_);
-    FAIL();
-  } catch (const ParameterError& error) {
-    EXPECT_NE(std::string(error.what()).find("'map' = other.map"), std::string::npos);
-  }
+  EXPECT_THAT(test::refusalOf<ParameterError>([&] { toValues(config, declare_); }),
+              testing::HasSubstr("'map' = other.map"));
 }
 
 }  // namespace

@@ -118,12 +118,8 @@ TEST(Parameters, BadYamlIsRefusedWithItsPath) {
   for (const char* content :
        {"[1, 2]", "a: [1, 2]", "a: {b: ", "just text", "? {x: 1}\n: 2\n", "? [1]\n: {a: 3}\n", "a: &x {b: *x}"}) {
     const TemporaryYaml yaml(content);
-    try {
-      parameters::readYaml(yaml.path());
-      ADD_FAILURE() << "accepted: " << content;
-    } catch (const ParameterError& error) {
-      EXPECT_THAT(error.what(), HasSubstr(yaml.path())) << content;
-    }
+    EXPECT_THAT(test::refusalOf<ParameterError>([&] { parameters::readYaml(yaml.path()); }), HasSubstr(yaml.path()))
+        << content;
   }
   EXPECT_THROW(parameters::readYaml("/nonexistent/file.yaml"), ParameterError);
   EXPECT_THROW(parameters::readYaml(std::filesystem::temp_directory_path().string()), ParameterError);
