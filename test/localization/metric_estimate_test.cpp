@@ -351,6 +351,16 @@ TEST_F(MetricEstimate, AProposedPoseAttractsTheTracker) {
   EXPECT_LT((blind.tracked.position_m - positionOf(40)).norm(), 0.5) << "an image of nothing moves no attractor";
 }
 
+TEST_F(MetricEstimate, AnImageThatLostItsLandmarksIsPassedOver) {
+  std::vector<TrainingImage> images;
+  for (std::size_t i = 0; i < street_.map().size(); ++i) images.push_back(street_.map().image(i));
+  images[20].geometry->landmarks.clear();
+  const auto map = std::make_shared<const TrainingMap>(street_.map().header(), images);
+  image_ = std::make_shared<GivenImage>(*map);
+  localizer_ = std::make_unique<Localizer>(map, LocalizerConfig(), image_);
+  for (std::size_t i = 15; i < 25; ++i) EXPECT_EQ(see(i).source, PoseSource::kMetric) << i;
+}
+
 TEST_F(MetricEstimate, HasNoLandmarksToDrawWithoutAPose) {
   EXPECT_TRUE(localizer_->lastLandmarks().landmarks.empty());
   for (std::size_t i = 3; i < 6; ++i) see(i);

@@ -81,6 +81,16 @@ TEST_F(PosePredictorTest, AMovedThingIsAtMostFiveMetresBesideTheWay) {
   EXPECT_FALSE(predictor_.isAside(poseAt(3.0, 4.0))) << "in the next image as well";
 }
 
+TEST_F(PosePredictorTest, AfterALongGapAPoseFollowsWithinTheWayOfTheSpeed) {
+  for (const double time_s : {0.0, 1.0, 2.0}) add(time_s, 0.1 * time_s);
+  const double gap_s = config_.max_gap_s + 1.0;
+  const double reach_m = config_.max_prediction_error_m + 1.5 * 0.1 * gap_s;
+  predictor_.startImage(ns(2.0 + gap_s));
+  EXPECT_TRUE(predictor_.follows(poseAt(0.2 + 0.99 * reach_m, 0.0)));
+  EXPECT_TRUE(predictor_.follows(poseAt(0.2, -0.99 * reach_m)));
+  EXPECT_FALSE(predictor_.follows(poseAt(0.2 + 1.01 * reach_m, 0.0)));
+}
+
 TEST_F(PosePredictorTest, OdometryLeadsAsFarAsItIsBelieved) {
   OdometryConfig config;
   config.max_distance_m = 4.0;
