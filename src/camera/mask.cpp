@@ -16,6 +16,8 @@ namespace {
 
 constexpr std::size_t kLargestFile_bytes = std::size_t{64} << 20U;
 constexpr std::uint32_t kLargestSide_px = 8192;
+constexpr std::size_t kSignature = 8;
+constexpr char kWrongKind[] = "must be grey with 8 bits a pixel, without transparency";
 
 std::uint32_t bigEndian(const std::string& bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -23,10 +25,11 @@ std::uint32_t bigEndian(const std::string& bytes, std::size_t at) {
   return value;
 }
 
-/// Looks at the header of a PNG (https://www.w3.org/TR/png, 11.2.1) before a decoder takes memory for what it says.
-void requirePng(const std::string& bytes) {
+/// The size in pixels of a PNG by its header (https://www.w3.org/TR/png, 11.2.1), before memory is taken for it.
+cv::Size sizeOfPng(const std::string& bytes) {
   constexpr std::size_t kHeader = 26;  // signature, IHDR with sides, depth and type of colour
-  if (bytes.size() < kHeader || bytes.compare(0, 8, "\x89PNG\r\n\x1A\n") != 0 || bytes.compare(12, 4, "IHDR") != 0) {
+  if (bytes.size() < kHeader || bytes.compare(0, kSignature, "\x89PNG\r\n\x1A\n") != 0 ||
+      bytes.compare(12, 4, "IHDR") != 0) {
     throw CameraError("is not a PNG image");
   }
   const std::uint32_t width = bigEndian(bytes, 16);
@@ -37,19 +40,36 @@ void requirePng(const std::string& bytes) {
   }
   const int depth = static_cast<unsigned char>(bytes[24]);
   const int colour = static_cast<unsigned char>(bytes[25]);
-  if (depth != 8 || colour != 0) throw CameraError("must be grey with 8 bits a pixel, without transparency");
+  if (depth != 8 || colour != 0) throw CameraError(kWrongKind);
+  return {static_cast<int>(width), static_cast<int>(height)};
+}
+
+/// A PNG without the chunks that would change its pixels, as gamma does, or take memory, as texts do.
+std::string barePng(const std::string& bytes) {
+  constexpr std::size_t kAround = 12;  // length, type and checksum of a chunk
+  std::string bare = bytes.substr(0, kSignature);
+  for (std::size_t at = kSignature;;) {
+    if (bytes.size() - at < kAround) throw CameraError("is cut off");
+    const std::size_t length = bigEndian(bytes, at);
+    if (length > bytes.size() - at - kAround) throw CameraError("is cut off");
+    const std::string type = bytes.substr(at + 4, 4);
+    if (type == "tRNS") throw CameraError(kWrongKind);
+    if (type == "IHDR" || type == "IDAT" || type == "IEND") bare.append(bytes, at, length + kAround);
+    if (type == "IEND") return bare;
+    at += length + kAround;
+  }
 }
 
 Mask decoded(const std::string& bytes) {
-  requirePng(bytes);
+  cv::Mat grey(sizeOfPng(bytes), CV_8UC1);
+  const std::string bare = barePng(bytes);
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
-  if (::png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()) == 0) {
+  if (::png_image_begin_read_from_memory(&png, bare.data(), bare.size()) == 0) {
     throw CameraError("cannot be decoded: " + oneLine(png.message));
   }
   png.format = PNG_FORMAT_GRAY;
-  cv::Mat grey(static_cast<int>(png.height), static_cast<int>(png.width), CV_8UC1);
-  if (::png_image_finish_read(&png, nullptr, grey.data, 0, nullptr) == 0) {
+  if (::png_image_finish_read(&png, nullptr, grey.data, static_cast<png_int_32>(grey.step), nullptr) == 0) {
     throw CameraError("cannot be decoded: " + oneLine(png.message));
   }
   return Mask(grey);
@@ -107,6 +127,8 @@ Mask readMask(const std::string& path) {
     return decoded(readFile(path, kLargestFile_bytes));
   } catch (const FileError& error) {
     throw CameraError(error.what());
+  } catch (const cv::Exception& error) {
+    throw CameraError(path + ": " + oneLine(error.err));
   } catch (const CameraError& error) {
     throw CameraError(path + ": " + error.what());
   }

@@ -70,7 +70,7 @@ class SessionChoice {
   bool started_ = false;
   std::size_t chosen_ = 0;
   std::size_t chosen_before_ = 0;  ///< before images showed nothing
-  std::vector<double> matches_;    ///< of each session lately, as a share of the chosen one's
+  std::vector<double> matches_;    ///< of each session, as a share of the one chosen when something was learned
   std::size_t images_seen_ = 0;
   std::size_t nothing_seen_ = 0;  ///< images in a row
   std::size_t trials_ = 0;

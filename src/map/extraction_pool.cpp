@@ -4,7 +4,6 @@
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
-#include <cstdlib>
 #include <new>
 #include <utility>
 
@@ -22,7 +21,9 @@ constexpr std::size_t kNeighbours = 2;  ///< Weiss et al., section III
 /// libjpeg writing an image. It reports errors by a jump, so functions that call it have no objects of their own.
 class JpegWriter {
  public:
-  JpegWriter() {
+  /// `grey`: 8-bit, one channel, 1 to JPEG_MAX_DIMENSION pixels a side.
+  explicit JpegWriter(const cv::Mat& grey)
+      : grey_(grey), bytes_(kFrame_bytes + 2 * kBlock_px * kBlock_px * blocks(grey.cols) * blocks(grey.rows)) {
     encoder_.err = ::jpeg_std_error(&errors_);
     encoder_.client_data = this;
     errors_.error_exit = [](j_common_ptr encoder) {
@@ -30,51 +31,58 @@ class JpegWriter {
     };
     errors_.output_message = [](j_common_ptr) {};
   }
-  ~JpegWriter() {
-    ::jpeg_destroy_compress(&encoder_);
-    std::free(bytes_);  // libjpeg takes it by malloc
-  }
+  ~JpegWriter() { ::jpeg_destroy_compress(&encoder_); }
   JpegWriter(const JpegWriter&) = delete;
   JpegWriter& operator=(const JpegWriter&) = delete;
 
-  /// `grey`: 8-bit, one channel, not empty. False when there is no memory.
-  bool write(const cv::Mat& grey, int quality) {
+  /// Once. Throws std::bad_alloc.
+  std::vector<std::uint8_t> write(int quality) {
+    unsigned char* begin = bytes_.data();
+    unsigned long size = bytes_.size();
+    if (!compress(quality, begin, size) || begin != bytes_.data()) throw std::bad_alloc();
+    bytes_.resize(size);
+    return std::move(bytes_);
+  }
+
+ private:
+  /// As much as libjpeg-turbo's tjBufSize reckons for the worst image, so that libjpeg takes no buffer of its own.
+  static constexpr std::size_t kFrame_bytes = 2048;
+  static constexpr std::size_t kBlock_px = 8;
+  static std::size_t blocks(int side_px) { return (static_cast<std::size_t>(side_px) + kBlock_px - 1) / kBlock_px; }
+
+  bool compress(int quality, unsigned char*& begin, unsigned long& size) {
     if (setjmp(failed_) != 0) return false;
     jpeg_create_compress(&encoder_);
-    ::jpeg_mem_dest(&encoder_, &bytes_, &size_);
-    encoder_.image_width = static_cast<JDIMENSION>(grey.cols);
-    encoder_.image_height = static_cast<JDIMENSION>(grey.rows);
+    ::jpeg_mem_dest(&encoder_, &begin, &size);
+    encoder_.image_width = static_cast<JDIMENSION>(grey_.cols);
+    encoder_.image_height = static_cast<JDIMENSION>(grey_.rows);
     encoder_.input_components = 1;
     encoder_.in_color_space = JCS_GRAYSCALE;
     ::jpeg_set_defaults(&encoder_);
     ::jpeg_set_quality(&encoder_, quality, TRUE);
     ::jpeg_start_compress(&encoder_, TRUE);
     while (encoder_.next_scanline < encoder_.image_height) {
-      auto* row = const_cast<JSAMPROW>(grey.ptr(static_cast<int>(encoder_.next_scanline)));  // only read
+      auto* row = const_cast<JSAMPROW>(grey_.ptr(static_cast<int>(encoder_.next_scanline)));  // only read
       ::jpeg_write_scanlines(&encoder_, &row, 1);
     }
     ::jpeg_finish_compress(&encoder_);
     return true;
   }
 
-  std::vector<std::uint8_t> bytes() const { return {bytes_, bytes_ + size_}; }
-
- private:
+  const cv::Mat& grey_;
+  std::vector<std::uint8_t> bytes_;
   jpeg_compress_struct encoder_{};
   jpeg_error_mgr errors_{};
   std::jmp_buf failed_{};
-  unsigned char* bytes_ = nullptr;
-  unsigned long size_ = 0;
 };
 
 std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
   constexpr int kPreviewQuality = 70;
   if (width_px <= 0) return {};
-  const int height_px = std::max(1, static_cast<int>(std::lround(1.0 * grey.rows * width_px / grey.cols)));
+  const long height_px = std::lround(1.0 * grey.rows * width_px / grey.cols);
   cv::Mat small;
-  JpegWriter writer;
-  if (!writer.write(fitted(grey, {width_px, height_px}, small), kPreviewQuality)) throw std::bad_alloc();
-  return writer.bytes();
+  const cv::Size size(width_px, static_cast<int>(std::clamp(height_px, 1L, static_cast<long>(JPEG_MAX_DIMENSION))));
+  return JpegWriter(fitted(grey, size, small)).write(kPreviewQuality);
 }
 
 }  // namespace

@@ -108,10 +108,28 @@ TEST_F(MaskFile, IsRefusedUnlessItIsAGreyPng) {
   EXPECT_THAT(refusal(write(cv::Mat(8, 8, CV_8U, cv::Scalar(0)))), HasSubstr("must use some of the image"));
 }
 
+/// Behind the header of a PNG; `chunk`: with its length and checksum.
+std::string withChunk(std::string png, const std::string& chunk) { return png.insert(33, chunk); }
+
+TEST_F(MaskFile, GammaDoesNotChangeIt) {
+  cv::Mat grey(8, 8, CV_8U, cv::Scalar(100));
+  grey.row(0).setTo(128);
+  const std::string path = write(grey);
+  const std::string linear("\0\0\0\4gAMA\0\1\x86\xA0\x31\xE8\x96\x5F", 16);
+  test::writeAll(path, withChunk(test::readAll(path), linear));
+  EXPECT_TRUE(readMask(path) == Mask(grey));
+}
+
+TEST_F(MaskFile, TransparencyIsRefused) {
+  const std::string path = write(bonnet());
+  test::writeAll(path, withChunk(test::readAll(path), std::string("\0\0\0\2tRNS\0\xFF\0\0\0\0", 14)));
+  EXPECT_THAT(refusal(path), HasSubstr("without transparency"));
+}
+
 TEST_F(MaskFile, DamageIsRefused) {
   const std::string path = write(bonnet());
   const std::string whole = test::readAll(path);
-  for (std::size_t length = 0; length < whole.size() - 20; ++length) {  // within the pixels
+  for (std::size_t length = 0; length < whole.size(); ++length) {
     test::writeAll(path, whole.substr(0, length));
     EXPECT_NE(refusal(path), "accepted") << length;
   }
