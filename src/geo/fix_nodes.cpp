@@ -1,0 +1,88 @@
+#include "geo/fix_nodes.h"
+
+#include <cmath>
+#include <utility>
+
+#include "base/numbers.h"
+#include "base/time.h"
+
+namespace visual_localization {
+namespace {
+
+/// Whether the frame shows it: the far side of the earth would lie near the datum again.
+bool isWithinReach(const GeodeticPoint& point, const GeodeticPoint& datum) {
+  constexpr double kEarth_m = 6.371e6;
+  const double latitude_rad = toRadians(point.latitude_deg);
+  const double datum_rad = toRadians(datum.latitude_deg);
+  const double cosine =
+      std::sin(latitude_rad) * std::sin(datum_rad) +
+      std::cos(latitude_rad) * std::cos(datum_rad) * std::cos(toRadians(point.longitude_deg - datum.longitude_deg));
+  return cosine >= std::cos(kLargestCoordinate_m / kEarth_m);
+}
+
+}  // namespace
+
+UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, std::vector<FixVerdict>& verdicts) {
+  UsableFixes usable;
+  std::int64_t last_ns = 0;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (!hasPosition(fixes[i])) {
+      verdicts[i] = FixVerdict::kNoFix;
+    } else if (!usable.indices.empty() && fixes[i].stamp_ns <= last_ns) {
+      verdicts[i] = FixVerdict::kDisordered;
+    } else if (!isWithinReach(fixes[i].position, frame.datum())) {
+      verdicts[i] = FixVerdict::kSpike;
+    } else {
+      last_ns = fixes[i].stamp_ns;
+      const std::int64_t start_ns = fixes[usable.indices.empty() ? i : usable.indices.front()].stamp_ns;
+      const double time_s = secondsBetween(start_ns, last_ns);
+      if (!usable.samples.empty() && time_s - usable.samples.back().time_s < kShortestInterval_s) {
+        verdicts[i] = FixVerdict::kTooFast;
+        continue;
+      }
+      usable.samples.push_back({time_s, frame.toEastNorth(fixes[i].position)});
+      usable.indices.push_back(i);
+      usable.sigmas_m.push_back(fixes[i].sigma_m);
+    }
+  }
+  return usable;
+}
+
+double typicalInterval(const std::vector<PathSample>& samples) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < samples.size(); ++i) intervals.push_back(samples[i].time_s - samples[i - 1].time_s);
+  return median(std::move(intervals));
+}
+
+std::vector<Node> nodesOf(const UsableFixes& usable, double node_s) {
+  std::vector<Node> nodes;
+  double node_end_s = 0.0;
+  for (std::size_t i = 0; i < usable.samples.size(); ++i) {
+    if (nodes.empty() || usable.samples[i].time_s >= node_end_s) {
+      nodes.emplace_back();
+      node_end_s = usable.samples[i].time_s + node_s;
+    }
+    nodes.back().members.push_back(i);
+  }
+  for (Node& node : nodes) {
+    node.sample = medianOf(usable.samples, node.members);
+    std::vector<double> sigmas_m;
+    for (const std::size_t i : node.members) sigmas_m.push_back(usable.sigmas_m[i]);
+    node.sigma_m = median(std::move(sigmas_m));
+  }
+  return nodes;
+}
+
+PathSample medianOf(const std::vector<PathSample>& samples, const std::vector<std::size_t>& members) {
+  std::vector<double> time;
+  std::vector<double> east;
+  std::vector<double> north;
+  for (const std::size_t i : members) {
+    time.push_back(samples[i].time_s);
+    east.push_back(samples[i].position_m.x());
+    north.push_back(samples[i].position_m.y());
+  }
+  return {median(std::move(time)), {median(std::move(east)), median(std::move(north))}};
+}
+
+}  // namespace visual_localization
