@@ -1,5 +1,6 @@
 #include "geo/fix_nodes.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -20,30 +21,58 @@ bool isWithinReach(const GeodeticPoint& point, const GeodeticPoint& datum) {
   return cosine >= std::cos(kLargestCoordinate_m / kEarth_m);
 }
 
+/// Of some of the fixes the most whose stamps increase: a single stamp far ahead does not cost all that follow. Gives
+/// the others their verdict.
+std::vector<std::size_t> inOrder(const std::vector<Fix>& fixes, const std::vector<std::size_t>& indices,
+                                 std::vector<FixVerdict>& verdicts) {
+  constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+  std::vector<std::size_t> ends;  // of the best sequence of each length, the fix with the earliest stamp
+  std::vector<std::size_t> previous(fixes.size(), kNone);
+  for (const std::size_t i : indices) {
+    verdicts[i] = FixVerdict::kDisordered;
+    const auto at = std::lower_bound(ends.begin(), ends.end(), i, [&](std::size_t a, std::size_t b) {
+      return fixes[a].stamp_ns < fixes[b].stamp_ns;
+    });
+    if (at != ends.begin()) previous[i] = *(at - 1);
+    if (at == ends.end()) {
+      ends.push_back(i);
+    } else if (fixes[i].stamp_ns < fixes[*at].stamp_ns) {
+      *at = i;
+    }
+  }
+  std::vector<std::size_t> ordered;
+  for (std::size_t i = ends.empty() ? kNone : ends.back(); i != kNone; i = previous[i]) {
+    verdicts[i] = FixVerdict::kKept;
+    ordered.push_back(i);
+  }
+  std::reverse(ordered.begin(), ordered.end());
+  return ordered;
+}
+
 }  // namespace
 
 UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, std::vector<FixVerdict>& verdicts) {
-  UsableFixes usable;
-  std::int64_t last_ns = 0;
+  std::vector<std::size_t> candidates;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (!hasPosition(fixes[i])) {
       verdicts[i] = FixVerdict::kNoFix;
-    } else if (!usable.indices.empty() && fixes[i].stamp_ns <= last_ns) {
-      verdicts[i] = FixVerdict::kDisordered;
     } else if (!isWithinReach(fixes[i].position, frame.datum())) {
       verdicts[i] = FixVerdict::kSpike;
     } else {
-      last_ns = fixes[i].stamp_ns;
-      const std::int64_t start_ns = fixes[usable.indices.empty() ? i : usable.indices.front()].stamp_ns;
-      const double time_s = secondsBetween(start_ns, last_ns);
-      if (!usable.samples.empty() && time_s - usable.samples.back().time_s < kShortestInterval_s) {
-        verdicts[i] = FixVerdict::kTooFast;
-        continue;
-      }
-      usable.samples.push_back({time_s, frame.toEastNorth(fixes[i].position)});
-      usable.indices.push_back(i);
-      usable.sigmas_m.push_back(fixes[i].sigma_m);
+      candidates.push_back(i);
     }
+  }
+  UsableFixes usable;
+  for (const std::size_t i : inOrder(fixes, candidates, verdicts)) {
+    const std::int64_t start_ns = fixes[usable.indices.empty() ? i : usable.indices.front()].stamp_ns;
+    const double time_s = secondsBetween(start_ns, fixes[i].stamp_ns);
+    if (!usable.samples.empty() && time_s - usable.samples.back().time_s < kShortestInterval_s) {
+      verdicts[i] = FixVerdict::kTooFast;
+      continue;
+    }
+    usable.samples.push_back({time_s, frame.toEastNorth(fixes[i].position)});
+    usable.indices.push_back(i);
+    usable.sigmas_m.push_back(fixes[i].sigma_m);
   }
   return usable;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -14,10 +15,15 @@ namespace visual_localization {
 namespace {
 
 /// For a refusal: why so few are left.
-std::string tooFastOf(const std::vector<FixVerdict>& verdicts) {
-  const auto count = std::count(verdicts.begin(), verdicts.end(), FixVerdict::kTooFast);
-  if (count == 0) return "";
-  return " (" + std::to_string(count) + " of " + std::to_string(verdicts.size()) + " are faster than 50 Hz)";
+std::string lossesOf(const std::vector<FixVerdict>& verdicts) {
+  std::string losses;
+  for (const FixVerdict verdict : {FixVerdict::kTooFast, FixVerdict::kDisordered}) {
+    const auto count = std::count(verdicts.begin(), verdicts.end(), verdict);
+    if (count == 0) continue;
+    losses +=
+        " (" + std::to_string(count) + " of " + std::to_string(verdicts.size()) + " are " + toString(verdict) + ")";
+  }
+  return losses;
 }
 
 /// The states of a path, and enough between them to go round bends by straight lines.
@@ -72,11 +78,12 @@ void countGaps(const UsableFixes& usable, const std::vector<FixVerdict>& verdict
                CleanedTrajectory& cleaned) {
   constexpr double kMissedFixes = 5.0;
   const double least_s = kMissedFixes * typicalInterval(usable.samples);
-  double last_s = usable.samples.back().time_s;
+  std::optional<double> last_s;
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i] != FixVerdict::kKept) continue;
-    const double gap_s = usable.samples[i].time_s - last_s;
-    last_s = usable.samples[i].time_s;
+    const double time_s = usable.samples[i].time_s;
+    const double gap_s = time_s - last_s.value_or(time_s);
+    last_s = time_s;
     if (gap_s <= least_s || gap_s > max_gap_s) continue;
     ++cleaned.gaps_closed;
     cleaned.longest_gap_s = std::max(cleaned.longest_gap_s, gap_s);
@@ -119,7 +126,7 @@ CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFram
   const UsableFixes usable = usableFixes(fixes, frame, cleaned.verdicts);
   if (usable.samples.size() < 2) {
     throw std::runtime_error("only " + std::to_string(usable.samples.size()) + " of " + std::to_string(fixes.size()) +
-                             " fixes are valid, a path needs at least 2" + tooFastOf(cleaned.verdicts));
+                             " fixes are valid, a path needs at least 2" + lossesOf(cleaned.verdicts));
   }
   const FixJudge judge(usable, config);
   for (std::size_t i = 0; i < usable.indices.size(); ++i) cleaned.verdicts[usable.indices[i]] = judge.verdicts()[i];
@@ -129,7 +136,7 @@ CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFram
   }
   if (points.size() < 2) {
     throw std::runtime_error("the fixes contradict each other: no two of them make a path" +
-                             tooFastOf(cleaned.verdicts));
+                             lossesOf(cleaned.verdicts));
   }
   countGaps(usable, judge.verdicts(), config.max_bridge_s, cleaned);
   cleaned.trajectory = Trajectory(std::move(points), config.max_bridge_s);

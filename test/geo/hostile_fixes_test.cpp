@@ -32,6 +32,21 @@ TEST(TrajectoryCleaner, StampsThatStandStillOrGoBackAreDropped) {
   EXPECT_EQ(countOf(cleaned, FixVerdict::kDisordered), 2u);
 }
 
+TEST(TrajectoryCleaner, AStampFarAheadDoesNotCostWhatFollows) {
+  std::vector<Fix> fixes = record(block, 60.0);
+  fixes[100].stamp_ns += 3'600'000'000'000;
+  const CleanedTrajectory cleaned = clean(fixes);
+  EXPECT_EQ(cleaned.verdicts[100], FixVerdict::kDisordered);
+  EXPECT_EQ(countOf(cleaned, FixVerdict::kKept), fixes.size() - 1);
+}
+
+TEST(TrajectoryCleaner, FixesInReverseOrderAreRefusedForThat) {
+  std::vector<Fix> fixes = record(block, 60.0);
+  std::reverse(fixes.begin(), fixes.end());
+  EXPECT_THAT(test::refusalOf<std::runtime_error>([&] { clean(fixes); }),
+              testing::HasSubstr("299 of 300 are out of order"));
+}
+
 TEST(TrajectoryCleaner, FixesFasterThanFiftyHertzAreThinned) {
   std::vector<Fix> fixes = record(block, 60.0, 100.0);
   const CleanedTrajectory cleaned = clean(fixes);

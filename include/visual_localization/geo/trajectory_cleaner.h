@@ -13,7 +13,7 @@ namespace visual_localization {
 enum class FixVerdict {
   kKept,
   kNoFix,       ///< the receiver said so, or the coordinates are not finite or out of range
-  kDisordered,  ///< stamp not after the one before
+  kDisordered,  ///< stamp not after the one before, or far ahead of those behind
   kTooFast,     ///< less than kShortestInterval_s after the one that was used before
   kSpike,       ///< single outlier, or farther from the map's datum than a tangent plane reaches
   kMultipath,   ///< deviation for a while although the receiver claims a fix: a reflected signal
