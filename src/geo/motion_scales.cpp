@@ -173,8 +173,8 @@ double speedOfMotion(std::vector<double> speeds_mps) {
   return moving[count / 2];
 }
 
-/// Which nodes move; their share and usual speed go into `scales`.
-std::vector<bool> findMotion(const std::vector<PathSample>& nodes, MotionScales& scales) {
+/// Which nodes move, and their usual speed.
+std::vector<bool> findMotion(const std::vector<PathSample>& nodes, double& usual_mps) {
   constexpr double kStanding = 0.25;  // of the speed of motion
   constexpr double kLeast_mps = 0.05;
   const std::vector<double> speeds_mps = speedsAt(nodes);
@@ -185,8 +185,7 @@ std::vector<bool> findMotion(const std::vector<PathSample>& nodes, MotionScales&
     moving.push_back(speed_mps > kStanding * fast_mps);
     if (moving.back()) moving_mps.push_back(speed_mps);
   }
-  scales.moving_share = static_cast<double>(moving_mps.size()) / static_cast<double>(nodes.size());
-  scales.usual_mps = std::max(kLeast_mps, median(std::move(moving_mps)));
+  usual_mps = std::max(kLeast_mps, median(std::move(moving_mps)));
   return moving;
 }
 
@@ -205,7 +204,7 @@ MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector
   constexpr int kMostSteps = 8;
   constexpr double kLeastStanding = 0.3;  // a robot that stands will drive again
   MotionScales scales;
-  const std::vector<bool> moving = findMotion(nodes, scales);
+  const std::vector<bool> moving = findMotion(nodes, scales.usual_mps);
   const Evidence evidence{nodes, believed, scales.usual_mps};
   Scales likely = mostLikely(evidence);
   Innovations found;

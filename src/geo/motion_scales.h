@@ -20,7 +20,6 @@ struct MotionScales {
   double acceleration_density = 0.0;  ///< m^2/s^3
   double noise_m = 0.0;               ///< white, of a node along one axis
   double usual_mps = 0.0;             ///< while it moves
-  double moving_share = 0.0;          ///< of the nodes
   double log_variance = 0.0;          ///< logarithm of the usual variance of an innovation
   std::vector<double> tolerance;      ///< of each node: factor of its innovation's variance
   std::vector<double> mean_cost;      ///< of each node: that of believing those around it, nats

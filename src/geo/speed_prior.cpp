@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "base/numbers.h"
 
@@ -54,19 +55,24 @@ std::vector<double> smoothed(const std::vector<double>& histogram, double bins) 
 
 SpeedPrior::SpeedPrior(const std::vector<PathSample>& nodes, const MotionScales& scales, double tolerance) {
   constexpr double kStanding = 0.2;  // of the usual speed
-  constexpr double kMovingShare = 0.95;
+  constexpr double kHardlyStops = 0.95;
+  constexpr double kMostWhoStops = 4.0;     // slows down and sets off
   constexpr double kSlowest = 0.2;          // share of the speeds
   constexpr double kOfMiddle = 0.9;         // of a robot of constant speed at least, that of the slowest
   constexpr double kLeastTolerance = 0.05;  // the papers' robot in its bends
-  const std::vector<double> speeds_mps = speedsOver(nodes, kSpeedLag_s);
+  standing_mps_ = kStanding * scales.usual_mps;
+  std::vector<double> speeds_mps = speedsOver(nodes, kSpeedLag_s);
+  const double all = static_cast<double>(speeds_mps.size());
+  speeds_mps.erase(speeds_mps.begin(), std::upper_bound(speeds_mps.begin(), speeds_mps.end(), standing_mps_));
   if (speeds_mps.size() < kFewest) return;
   const double middle_mps = quantile(speeds_mps, 0.5);
-  standing_mps_ = kStanding * scales.usual_mps;
   const double noise_mps = std::sqrt(2.0) * scales.noise_m / kSpeedLag_s;
+  const bool stops = static_cast<double>(speeds_mps.size()) < kHardlyStops * all;
+  most_for_slow_ = stops ? kMostWhoStops : std::numeric_limits<double>::infinity();
   if (tolerance > 0.0) {
     constant_mps_ = middle_mps;
     sigma_mps_ = std::hypot(noise_mps, tolerance * middle_mps);
-  } else if (scales.moving_share > kMovingShare && quantile(speeds_mps, kSlowest) > kOfMiddle * middle_mps) {
+  } else if (quantile(speeds_mps, kSlowest) > kOfMiddle * middle_mps) {
     constant_mps_ = middle_mps;
     sigma_mps_ = std::max(kLeastTolerance * middle_mps, spreadAround(speeds_mps, middle_mps));
   } else {
@@ -74,15 +80,13 @@ SpeedPrior::SpeedPrior(const std::vector<PathSample>& nodes, const MotionScales&
   }
 }
 
-void SpeedPrior::learnDensity(std::vector<double> speeds_mps, double noise_mps) {
+void SpeedPrior::learnDensity(const std::vector<double>& speeds_mps, double noise_mps) {
   constexpr std::size_t kBins = 400;
   constexpr double kUnusual = 0.1;  // share of the speeds that cost something
   constexpr double kMostForFast = 8.0;
   constexpr double kMostForSlow = 3.0;
   constexpr double kLeastDensity = 1e-12;
   constexpr double kSlowest_mps = 1e-3;
-  speeds_mps.erase(speeds_mps.begin(), std::upper_bound(speeds_mps.begin(), speeds_mps.end(), standing_mps_));
-  if (speeds_mps.size() < kFewest) return;
   bin_mps_ = (2.0 * quantile(speeds_mps, 0.95) + kSlowest_mps) / static_cast<double>(kBins);
   const auto binOf = [this](double speed_mps) {
     return static_cast<std::size_t>(std::min(speed_mps / bin_mps_, static_cast<double>(kBins)));
@@ -111,7 +115,7 @@ double SpeedPrior::cost(double speed_mps) const {
   if (isConstant()) {
     if (stands) return kStandingCost;
     const double sigmas = (speed_mps - constant_mps_) / sigma_mps_;
-    return 0.5 * sigmas * sigmas;
+    return sigmas > 0.0 ? 0.5 * sigmas * sigmas : std::min(most_for_slow_, 0.5 * sigmas * sigmas);
   }
   if (stands || costs_.empty()) return 0.0;
   return costs_[static_cast<std::size_t>(std::min(speed_mps / bin_mps_, static_cast<double>(costs_.size() - 1)))];

@@ -20,11 +20,12 @@ class SpeedPrior {
   double cost(double speed_mps) const;
 
  private:
-  void learnDensity(std::vector<double> speeds_mps, double noise_mps);
+  void learnDensity(const std::vector<double>& speeds_mps, double noise_mps);
 
   double standing_mps_ = 0.0;  ///< up to this it may as well stand
   double constant_mps_ = 0.0;  ///< 0: it varies
   double sigma_mps_ = 0.0;
+  double most_for_slow_ = 0.0;
   double bin_mps_ = 1.0;
   std::vector<double> costs_;  ///< by bins of speed; empty: too few to tell
 };

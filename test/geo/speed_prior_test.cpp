@@ -17,10 +17,9 @@ std::vector<PathSample> atSpeeds(const std::vector<double>& speeds_mps) {
   return nodes;
 }
 
-MotionScales scales(double usual_mps, double moving_share = 1.0) {
+MotionScales scales(double usual_mps) {
   MotionScales found;
   found.usual_mps = usual_mps;
-  found.moving_share = moving_share;
   found.noise_m = 0.05;
   return found;
 }
@@ -49,9 +48,15 @@ TEST(SpeedPrior, AFewBendsOfTheReceiverDoNotHideAConstantSpeed) {
   EXPECT_GT(prior.cost(1.2), 10.0);
 }
 
-TEST(SpeedPrior, ACarAndARobotThatStopsAreNot) {
-  EXPECT_FALSE(SpeedPrior(atSpeeds(carAt(300)), scales(8.0), 0.0).isConstant());
-  EXPECT_FALSE(SpeedPrior(atSpeeds(std::vector<double>(100, 0.65)), scales(0.65, 0.5), 0.0).isConstant());
+TEST(SpeedPrior, ACarIsNot) { EXPECT_FALSE(SpeedPrior(atSpeeds(carAt(300)), scales(8.0), 0.0).isConstant()); }
+
+TEST(SpeedPrior, WhoStopsMayDriveAtConstantSpeed) {
+  std::vector<double> speeds_mps(200, 0.65);
+  for (std::size_t i = 60; i < 140; ++i) speeds_mps[i] = 0.0;
+  const SpeedPrior prior(atSpeeds(speeds_mps), scales(0.65), 0.0);
+  ASSERT_TRUE(prior.isConstant());
+  EXPECT_GT(prior.cost(1.0), 10.0);
+  EXPECT_NEAR(prior.cost(0.3), 4.0, 1e-9) << "it slows down and sets off";
 }
 
 TEST(SpeedPrior, WhoSaysThatTheSpeedIsConstantIsBelieved) {
