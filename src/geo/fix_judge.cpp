@@ -100,7 +100,7 @@ double FixJudge::offsetOf(double sigma_m) const {
   constexpr double kLeast_m = 1e-3;
   constexpr double kMost_m = 100.0;
   const double noise_m = scales_.noise_m;
-  if (!(sigma_m > 0.0) || !std::isfinite(sigma_m)) return std::max(kUsual_m, kOfNoise * noise_m);
+  if (sigma_m == 0.0) return std::max(kUsual_m, kOfNoise * noise_m);
   return std::clamp(std::sqrt(std::max(0.0, sigma_m * sigma_m - noise_m * noise_m)), kLeast_m, kMost_m);
 }
 

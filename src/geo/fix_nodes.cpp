@@ -72,7 +72,8 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
     }
     usable.samples.push_back({time_s, frame.toEastNorth(fixes[i].position)});
     usable.indices.push_back(i);
-    usable.sigmas_m.push_back(fixes[i].sigma_m);
+    const double sigma_m = fixes[i].sigma_m;
+    usable.sigmas_m.push_back(sigma_m > 0.0 && std::isfinite(sigma_m) ? sigma_m : 0.0);
   }
   return usable;
 }
