@@ -1,251 +1,226 @@
 #include "geo/path_smoother.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
-#include <stdexcept>
 
-#include <Eigen/Sparse>
-#include <Eigen/SparseCholesky>
+#include <Eigen/Cholesky>
 
 #include "base/numbers.h"
+#include "geo/motion_scales.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-
-/// Mean speeds over the shortest spans of at least `min_span_s`.
-std::vector<double> spanSpeeds(const std::vector<PathSample>& samples, double min_span_s) {
-  std::vector<double> speeds;
-  std::size_t end = 0;
-  for (std::size_t begin = 0; begin < samples.size(); ++begin) {
-    while (end < samples.size() && samples[end].time_s - samples[begin].time_s < min_span_s) ++end;
-    if (end == samples.size()) break;
-    const double span_s = samples[end].time_s - samples[begin].time_s;
-    if (span_s > 3.0 * min_span_s) continue;  // a gap says little about the speed
-    speeds.push_back((samples[end].position_m - samples[begin].position_m).norm() / span_s);
-  }
-  return speeds;
-}
-
-/// Cost of going from one believed sample straight to another. A robot may stand still, and the straight line cuts
-/// its corners; apart from that it neither races nor crawls.
-double stepCost(const PathSample& from, const PathSample& to, const DrivingModel& motion) {
-  constexpr double kStanding = 0.2;  // of the typical speed
-  constexpr double kStandingCost = 0.5;
-  constexpr double kMostForSlow = 4.0;
-  const double duration_s = to.time_s - from.time_s;
-  const double speed_mps = (to.position_m - from.position_m).norm() / duration_s;
-  if (speed_mps < kStanding * motion.speed_mps) return kStandingCost;
-  const double noise_mps = motion.step_noise_m / duration_s;
-  const double sigmas = (speed_mps - motion.speed_mps) / std::hypot(noise_mps, motion.speed_std_mps);
-  return sigmas > 0.0 ? sigmas * sigmas : std::min(kMostForSlow, sigmas * sigmas);
-}
-
-/// That of the fastest quarter; of a robot that was parked for more than three quarters of the recording, that of what
-/// is clearly faster than its noise. `speeds_mps`: in order.
-double speedOfMotion(const std::vector<double>& speeds_mps) {
-  constexpr double kParked = 0.2;  // m/s
-  constexpr double kClearly = 3.0;
-  constexpr double kLeastShare = 0.02;  // less are spikes
-  const double fast_mps = speeds_mps[speeds_mps.size() * 3 / 4];
-  if (fast_mps >= kParked) return fast_mps;
-  const auto moving = std::lower_bound(speeds_mps.begin(), speeds_mps.end(), std::max(kParked, kClearly * fast_mps));
-  const auto count = speeds_mps.end() - moving;
-  if (static_cast<double>(count) < kLeastShare * static_cast<double>(speeds_mps.size())) return fast_mps;
-  return moving[count / 2];
-}
-
-}  // namespace
-
-SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_span_s) {
-  constexpr double kStanding = 0.25;  // of the fastest quarter's speed
-  std::vector<double> speeds = spanSpeeds(samples, min_span_s);
-  if (speeds.empty()) return {};
-  std::sort(speeds.begin(), speeds.end());
-  const double fast_mps = speedOfMotion(speeds);
-  speeds.erase(speeds.begin(), std::lower_bound(speeds.begin(), speeds.end(), kStanding * fast_mps));
-  const double median_mps = upperMedian(speeds);
-  for (double& speed : speeds) speed = std::abs(speed - median_mps);
-  return {median_mps, 1.4826 * upperMedian(speeds)};
-}
-
-std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const DrivingModel& motion) {
-  const std::size_t count = samples.size();
-  const auto costOfSkipping = [&motion](std::size_t skipped) {
-    return skipped == 0 ? 0.0 : motion.opening_cost + motion.rejection_cost * static_cast<double>(skipped);
-  };
-  std::vector<double> cost(count);
-  std::vector<std::size_t> previous(count, kNone);
-  for (std::size_t j = 0; j < count; ++j) {
-    cost[j] = costOfSkipping(j);  // everything before is left out
-    for (std::size_t i = j; i-- > 0 && samples[j].time_s - samples[i].time_s <= motion.max_bridge_s;) {
-      const double skipping = costOfSkipping(j - i - 1);
-      if (skipping >= cost[j]) break;
-      const double total = cost[i] + skipping + stepCost(samples[i], samples[j], motion);
-      if (total >= cost[j]) continue;
-      cost[j] = total;
-      previous[j] = i;
-    }
-  }
-  std::vector<bool> consistent(count, false);
-  std::size_t last = kNone;
-  double best = std::numeric_limits<double>::infinity();
-  for (std::size_t j = 0; j < count; ++j) {
-    const double total = cost[j] + costOfSkipping(count - 1 - j);
-    if (total < best) {
-      best = total;
-      last = j;
-    }
-  }
-  for (; last != kNone; last = previous[last]) consistent[last] = true;
-  return consistent;
-}
-
-namespace {
-
-using SparseMatrix = Eigen::SparseMatrix<double>;
-/// Of a symmetric matrix: its lower triangle.
-using Triplets = std::vector<Eigen::Triplet<double>>;
-
-/// Where a time lies between two points of the grid.
-struct GridPosition {
-  Eigen::Index left = 0;
-  double share = 0.0;  ///< of the way to the next point
+/// Position, velocity and lasting error: one column an axis, and the covariance that both axes share.
+struct State {
+  Eigen::Matrix<double, 3, 2> mean = Eigen::Matrix<double, 3, 2>::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
-GridPosition locate(const SmoothedPath& grid, double time_s) {
-  const double steps = (time_s - grid.start_s) / grid.step_s;
-  const double last = static_cast<double>(grid.positions_m.size()) - 2.0;
-  const double left = std::clamp(std::floor(steps), 0.0, last);
-  return {static_cast<Eigen::Index>(left), std::clamp(steps - left, 0.0, 1.0)};
+/// From one measurement to the next.
+struct Transition {
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
+};
+
+double squareOf(double value) { return value * value; }
+
+Transition transition(const Measurement& from, const Measurement& to, double density) {
+  const double elapsed_s = to.sample.time_s - from.sample.time_s;
+  Transition found;
+  found.matrix(0, 1) = elapsed_s;
+  found.noise(0, 0) = density * elapsed_s * elapsed_s * elapsed_s / 3.0;
+  found.noise(0, 1) = found.noise(1, 0) = density * elapsed_s * elapsed_s / 2.0;
+  found.noise(1, 1) = density * elapsed_s;
+  if (to.steps) {
+    found.matrix(2, 2) = 0.0;
+    found.noise(2, 2) = squareOf(to.offset_m);
+  }
+  return found;
 }
 
-SmoothedPath gridOver(const std::vector<PathSample>& samples, double smoothing_time_s) {
-  constexpr double kStepsPerSmoothingTime = 3.0;
-  constexpr double kMostPoints = 1e6;
-  constexpr double kMostPointsPerSample = 100.0;  // a path between two samples has no more details
-  const double duration_s = samples.back().time_s - samples.front().time_s;
-  SmoothedPath grid;
-  grid.start_s = samples.front().time_s;
-  const double most_points = std::min(kMostPoints, kMostPointsPerSample * static_cast<double>(samples.size()));
-  const double wanted_s = std::max(smoothing_time_s / kStepsPerSmoothingTime, duration_s / most_points);
-  const double steps = std::max(2.0, std::ceil(duration_s / wanted_s));
-  grid.step_s = duration_s / steps;
-  grid.positions_m.resize(static_cast<std::size_t>(steps) + 1);
-  return grid;
+State startAt(const Measurement& first, double usual_mps) {
+  constexpr double kAnywhere = 10.0;
+  State state;
+  state.mean.row(0) = first.sample.position_m.transpose();
+  state.covariance.diagonal() << squareOf(kAnywhere * (first.offset_m + first.white_m)), squareOf(usual_mps),
+      squareOf(first.offset_m);
+  return state;
 }
 
-double medianInterval(const std::vector<PathSample>& samples) {
-  std::vector<double> intervals;
-  for (std::size_t i = 1; i < samples.size(); ++i) intervals.push_back(samples[i].time_s - samples[i - 1].time_s);
-  return upperMedian(intervals);
+void update(const Measurement& measurement, State& state) {
+  const Eigen::RowVector3d seen(1.0, 0.0, 1.0);
+  const Eigen::Vector3d shared = state.covariance * seen.transpose();
+  const Eigen::Vector3d gain = shared / (seen * shared + squareOf(measurement.white_m));
+  state.mean += gain * (measurement.sample.position_m.transpose() - seen * state.mean);
+  const Eigen::Matrix3d rest = Eigen::Matrix3d::Identity() - gain * seen;
+  state.covariance =
+      rest * state.covariance * rest.transpose() + squareOf(measurement.white_m) * gain * gain.transpose();
 }
 
-/// Integrated squared acceleration, in units of one sample's residual: its weight is the fourth power of the
-/// smoothing time over the interval between samples.
-void addStiffness(const SmoothedPath& grid, double weight, Triplets& matrix) {
-  const double scale = weight / (grid.step_s * grid.step_s * grid.step_s);
-  const std::array<double, 3> difference{1.0, -2.0, 1.0};
-  const auto points = static_cast<Eigen::Index>(grid.positions_m.size());
-  for (Eigen::Index k = 0; k + 2 < points; ++k) {
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      for (Eigen::Index j = 0; j <= i; ++j) {
-        const double product = difference[static_cast<std::size_t>(i)] * difference[static_cast<std::size_t>(j)];
-        matrix.emplace_back(k + i, k + j, scale * product);
-      }
+PathState pathState(double time_s, const State& state) {
+  const Eigen::Matrix3d& covariance = state.covariance;
+  PathState at;
+  at.time_s = time_s;
+  at.position_m = state.mean.row(0);
+  at.velocity_mps = state.mean.row(1);
+  at.offset_m = state.mean.row(2);
+  at.position_var = std::max(0.0, covariance(0, 0));
+  at.velocity_var = std::max(0.0, covariance(1, 1));
+  at.reading_var = std::max(0.0, covariance(0, 0) + 2.0 * covariance(0, 2) + covariance(2, 2));
+  return at;
+}
+
+std::vector<PathState> smooth(const std::vector<Measurement>& measurements, const Motion& motion) {
+  const std::size_t count = measurements.size();
+  std::vector<State> predicted(count);
+  std::vector<State> filtered(count);
+  std::vector<Transition> transitions(count);  // to each from the one before
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i == 0) {
+      predicted[0] = startAt(measurements[0], motion.usual_mps);
+    } else {
+      transitions[i] = transition(measurements[i - 1], measurements[i], motion.acceleration_density);
+      const Eigen::Matrix3d& matrix = transitions[i].matrix;
+      predicted[i].mean = matrix * filtered[i - 1].mean;
+      predicted[i].covariance = matrix * filtered[i - 1].covariance * matrix.transpose() + transitions[i].noise;
     }
+    filtered[i] = predicted[i];
+    update(measurements[i], filtered[i]);
+  }
+  std::vector<PathState> path(count);
+  State smoothed = filtered.back();
+  path.back() = pathState(measurements.back().sample.time_s, smoothed);
+  for (std::size_t i = count - 1; i-- > 0;) {
+    const State& next = predicted[i + 1];
+    const Eigen::Matrix3d gain =
+        next.covariance.ldlt().solve(transitions[i + 1].matrix * filtered[i].covariance).transpose();
+    smoothed.mean = filtered[i].mean + gain * (smoothed.mean - next.mean);
+    smoothed.covariance = filtered[i].covariance + gain * (smoothed.covariance - next.covariance) * gain.transpose();
+    path[i] = pathState(measurements[i].sample.time_s, smoothed);
+  }
+  return path;
+}
+
+std::size_t endOfStretch(const std::vector<Measurement>& measurements, std::size_t begin) {
+  std::size_t end = begin + 1;
+  while (end < measurements.size() && !measurements[end].steps) ++end;
+  return end;
+}
+
+/// What a receiver promises varies a little all the time; where it changes much its error is another one.
+void splitByPromises(std::vector<Measurement>& measurements) {
+  constexpr double kMuch = 5.0;
+  double promised_m = measurements.front().offset_m;
+  for (Measurement& measurement : measurements) {
+    const double ratio = measurement.offset_m / promised_m;
+    if (ratio > kMuch || ratio < 1.0 / kMuch) measurement.steps = true;
+    if (measurement.steps) promised_m = measurement.offset_m;
+  }
+  std::size_t end = 0;
+  for (std::size_t begin = 0; begin < measurements.size(); begin = end) {
+    end = endOfStretch(measurements, begin);
+    std::vector<double> promises_m;
+    for (std::size_t i = begin; i < end; ++i) promises_m.push_back(measurements[i].offset_m);
+    const double usual_m = median(std::move(promises_m));
+    for (std::size_t i = begin; i < end; ++i) measurements[i].offset_m = usual_m;
   }
 }
 
-/// Pulls every step of the path towards the typical speed, in its present direction: the length of what was driven
-/// through a gap is known even if its path is not. Steps much slower than that belong to a robot that stood.
-void addSpeed(const SmoothedPath& path, double speed_mps, double weight, Triplets& matrix,
-              Eigen::MatrixX2d& right_side) {
-  constexpr double kMoving = 0.5;
-  const double scale = weight / path.step_s;
-  for (Eigen::Index k = 0; k + 1 < right_side.rows(); ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    const Eigen::Vector2d step = path.positions_m[i + 1] - path.positions_m[i];
-    if (step.norm() < kMoving * speed_mps * path.step_s) continue;
-    const Eigen::RowVector2d wanted = scale * speed_mps * path.step_s * step.normalized().transpose();
-    matrix.emplace_back(k, k, scale);
-    matrix.emplace_back(k + 1, k + 1, scale);
-    matrix.emplace_back(k + 1, k, -scale);
-    right_side.row(k) -= wanted;
-    right_side.row(k + 1) += wanted;
+/// A receiver that steps aside for a while is worse for that while: the shorter a stretch between two steps and the
+/// farther off it came out, the less it says about where the path is. `path`: as it came out; empty at first.
+void weighStretches(const std::vector<Measurement>& said, const std::vector<PathState>& path,
+                    std::vector<Measurement>& measurements) {
+  constexpr double kLeastWeight = 0.1;  // or else one stretch after the other could lose its say
+  const double interval_s = (said.back().sample.time_s - said.front().sample.time_s) / static_cast<double>(said.size());
+  const auto duration_s = [&](std::size_t begin) {
+    return said[endOfStretch(said, begin) - 1].sample.time_s - said[begin].sample.time_s + interval_s;
+  };
+  double longest_s = 0.0;
+  for (std::size_t begin = 0; begin < said.size(); begin = endOfStretch(said, begin)) {
+    longest_s = std::max(longest_s, duration_s(begin));
   }
-}
-
-void addSample(const GridPosition& where, const Eigen::Vector2d& position_m, double weight, Triplets& matrix,
-               Eigen::MatrixX2d& right_side) {
-  const std::array<double, 2> shares{1.0 - where.share, where.share};
-  for (Eigen::Index i = 0; i < 2; ++i) {
-    const double share_i = shares[static_cast<std::size_t>(i)];
-    right_side.row(where.left + i) += weight * share_i * position_m.transpose();
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      matrix.emplace_back(where.left + i, where.left + j, weight * share_i * shares[static_cast<std::size_t>(j)]);
+  std::size_t end = 0;
+  for (std::size_t begin = 0; begin < said.size(); begin = end) {
+    end = endOfStretch(said, begin);
+    double squared = 0.0;
+    for (std::size_t i = begin; i < end && !path.empty(); ++i) {
+      squared += path[i].offset_m.squaredNorm() / squareOf(said[i].offset_m) / static_cast<double>(end - begin);
     }
+    const double factor = std::sqrt(longest_s / duration_s(begin) / std::max(kLeastWeight, studentWeight(squared)));
+    for (std::size_t i = begin; i < end; ++i) measurements[i].offset_m = factor * said[i].offset_m;
   }
 }
 
-/// One iteration of reweighted least squares.
-void solve(const std::vector<PathSample>& samples, const std::vector<double>& weights, double stiffness,
-           double speed_mps, double speed_weight, SmoothedPath& grid) {
-  const auto points = static_cast<Eigen::Index>(grid.positions_m.size());
-  Triplets triplets;
-  triplets.reserve(grid.positions_m.size() * 9 + samples.size() * 3);
-  Eigen::MatrixX2d right_side = Eigen::MatrixX2d::Zero(points, 2);
-  addStiffness(grid, stiffness, triplets);
-  if (speed_weight > 0.0) addSpeed(grid, speed_mps, speed_weight, triplets, right_side);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    addSample(locate(grid, samples[i].time_s), samples[i].position_m, weights[i], triplets, right_side);
-  }
-  SparseMatrix matrix(points, points);
-  matrix.setFromTriplets(triplets.begin(), triplets.end());
-  const Eigen::SimplicialLDLT<SparseMatrix> solver(matrix);
-  const Eigen::MatrixX2d solution = solver.solve(right_side);
-  if (solver.info() != Eigen::Success || !solution.allFinite()) {
-    throw std::runtime_error("the fixes do not determine a path");
-  }
-  for (Eigen::Index k = 0; k < points; ++k) grid.positions_m[static_cast<std::size_t>(k)] = solution.row(k);
-}
-
-/// Geman-McClure: quadratic near zero, without influence far out.
-double weightOf(double residual_m, double outlier_distance_m) {
-  constexpr double kLeast = 1e-4;  // keeps the system solvable
-  const double ratio = residual_m / outlier_distance_m;
-  const double root = 1.0 / (1.0 + ratio * ratio);
-  return std::max(kLeast, root * root);
+/// At most what a cubic between the ends of a way may have without swinging (Fritsch and Carlson).
+Eigen::Vector2d limited(const Eigen::Vector2d& velocity_mps, double mean_mps) {
+  constexpr double kMost = 3.0;
+  const double speed_mps = velocity_mps.norm();
+  return speed_mps <= kMost * mean_mps ? velocity_mps : Eigen::Vector2d(velocity_mps * (kMost * mean_mps / speed_mps));
 }
 
 }  // namespace
 
-Eigen::Vector2d SmoothedPath::at(double time_s) const {
-  const GridPosition where = locate(*this, time_s);
-  const auto left = static_cast<std::size_t>(where.left);
-  return (1.0 - where.share) * positions_m[left] + where.share * positions_m[left + 1];
-}
-
-SmoothedPath smoothPath(const std::vector<PathSample>& samples, const PathSmootherConfig& config) {
-  constexpr int kIterations = 30;
-  if (samples.size() < 2) throw std::invalid_argument("a path needs at least two samples");
-  SmoothedPath path = gridOver(samples, config.smoothing_time_s);
-  const double stiffness = std::pow(config.smoothing_time_s, 4) / medianInterval(samples);
-  std::vector<double> weights(samples.size(), 1.0);
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const double speed_weight =
-        iteration == 0 ? 0.0 : config.speed_share * stiffness / std::pow(config.smoothing_time_s, 2);
-    solve(samples, weights, stiffness, config.speed_mps, speed_weight, path);
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      const double residual_m = (path.at(samples[i].time_s) - samples[i].position_m).norm();
-      weights[i] = weightOf(residual_m, config.outlier_distance_m);
+std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const Motion& motion) {
+  constexpr int kIterations = 4;
+  constexpr double kNoWeight = 1e3;
+  splitByPromises(measurements);
+  const std::vector<Measurement> said = measurements;
+  const bool steps = endOfStretch(said, 0) < said.size();
+  bool doubts = false;
+  for (Measurement& measurement : measurements) {
+    if (!measurement.doubtful) continue;
+    doubts = true;
+    measurement.white_m = kNoWeight * (measurement.white_m + measurement.offset_m);
+  }
+  if (steps) weighStretches(said, {}, measurements);
+  std::vector<PathState> path = smooth(measurements, motion);
+  for (int iteration = 0; (doubts || steps) && iteration < kIterations; ++iteration) {
+    if (steps) weighStretches(said, path, measurements);
+    for (std::size_t i = 0; i < said.size(); ++i) {
+      if (!said[i].doubtful) continue;
+      const double away_m = (said[i].sample.position_m - path[i].position_m).norm() / std::sqrt(2.0);
+      measurements[i].white_m = std::max(said[i].white_m, away_m);
     }
+    path = smooth(measurements, motion);
   }
   return path;
+}
+
+PathState between(const PathState& before, const PathState& after, double time_s) {
+  const double elapsed_s = after.time_s - before.time_s;
+  const double share = (time_s - before.time_s) / elapsed_s;
+  const double rest = 1.0 - share;
+  const Eigen::Vector2d way_m = after.position_m - before.position_m;
+  const Eigen::Vector2d first_mps = limited(before.velocity_mps, way_m.norm() / elapsed_s);
+  const Eigen::Vector2d last_mps = limited(after.velocity_mps, way_m.norm() / elapsed_s);
+  PathState at = share < 0.5 ? before : after;
+  at.time_s = time_s;
+  at.position_m = before.position_m + share * share * (3.0 - 2.0 * share) * way_m +
+                  share * rest * elapsed_s * (rest * first_mps - share * last_mps);
+  at.velocity_mps = 6.0 * share * rest / elapsed_s * way_m + rest * (1.0 - 3.0 * share) * first_mps +
+                    share * (3.0 * share - 2.0) * last_mps;
+  at.offset_m = rest * before.offset_m + share * after.offset_m;
+  return at;
+}
+
+Reading readingAt(const std::vector<PathState>& path, const Motion& motion, double time_s) {
+  const auto after = std::lower_bound(path.begin(), path.end(), time_s,
+                                      [](const PathState& state, double at_s) { return state.time_s < at_s; });
+  if (after == path.begin() || after == path.end()) {
+    const PathState& end = after == path.end() ? path.back() : path.front();
+    const double beyond_s = std::abs(time_s - end.time_s);
+    return {end.position_m + (time_s - end.time_s) * end.velocity_mps + end.offset_m,
+            end.reading_var + beyond_s * beyond_s * (end.velocity_var + motion.acceleration_density * beyond_s / 3.0)};
+  }
+  const PathState& before = *(after - 1);
+  const PathState at = between(before, *after, time_s);
+  const double elapsed_s = after->time_s - before.time_s;
+  const double share = (time_s - before.time_s) / elapsed_s;
+  const double turned_s = elapsed_s * share * (1.0 - share);
+  return {at.position_m + at.offset_m, (1.0 - share) * before.reading_var + share * after->reading_var +
+                                           motion.acceleration_density * turned_s * turned_s * turned_s / 3.0};
 }
 
 }  // namespace visual_localization

@@ -1,65 +1,52 @@
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
-#include <Eigen/Core>
+#include "geo/constant_velocity.h"
 
 namespace visual_localization {
 
-/// A measured position of a path.
-struct PathSample {
-  double time_s = 0.0;                                   ///< since any fixed moment
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< east, north
+/// A position as a receiver measured it.
+struct Measurement {
+  PathSample sample;
+  double white_m = 1.0;   ///< error along one axis that differs from one measurement to the next
+  double offset_m = 1.0;  ///< and one that lasts
+  bool steps = false;     ///< the lasting error has nothing to do with the one before
+  /// Nobody believes it: where the path is not known otherwise it is as good as its own distance from the path.
+  bool doubtful = false;
 };
 
-/// How a vehicle moves and how well its samples are known.
-struct DrivingModel {
-  double speed_mps = 0.0;       ///< typical speed while moving
-  double speed_std_mps = 0.0;   ///< how much that varies
-  double step_noise_m = 0.0;    ///< std of the length of a step between two samples
-  double opening_cost = 0.0;    ///< cost of starting to leave samples out, in squared sigmas
-  double rejection_cost = 0.0;  ///< cost of each sample left out, in squared sigmas
-  double max_bridge_s = 0.0;    ///< longest time between two samples that are believed
+/// How a robot moves.
+struct Motion {
+  double acceleration_density = 0.0;  ///< m^2/s^3
+  double usual_mps = 0.0;             ///< while it moves
 };
 
-/// Typical speed of a path most of whose samples are right, and its spread; robust against outliers and against
-/// standing still.
-struct SpeedStatistics {
-  double median_mps = 0.0;
-  double std_mps = 0.0;
+/// State of a path at a measurement. Variances are along one axis.
+struct PathState {
+  double time_s = 0.0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();
+  Eigen::Vector2d offset_m = Eigen::Vector2d::Zero();  ///< the receiver's error here, but for white noise
+  double position_var = 0.0;                           ///< m^2
+  double velocity_var = 0.0;                           ///< m^2/s^2
+  double reading_var = 0.0;                            ///< of position and offset together, m^2
 };
 
-/// Measures speeds over spans of at least `min_span_s`. All zero when there is no such span.
-SpeedStatistics measureSpeed(const std::vector<PathSample>& samples, double min_span_s);
+/// Fixed-interval smoother (Rauch, Tung, Striebel) over position, velocity and an error of the receiver that lasts; the
+/// acceleration is white. The lasting error is another one behind a step, and where the receiver comes to promise much
+/// more or less. `measurements`: at least one, in strictly increasing order of time.
+std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const Motion& motion);
 
-/// Which samples a vehicle that moves like this can have visited one after the other: the subset with the least
-/// cost, where a step faster than the model costs its squared excess and a sample left out costs a constant
-/// (dynamic programming, like the most probable path of a hidden Markov model). A deviation by multipath has to be
-/// driven faster than the path it leaves, going out and coming back, and so loses as a whole.
-std::vector<bool> consistentSamples(const std::vector<PathSample>& samples, const DrivingModel& motion);
+/// Between two states the path of least acceleration; where the way is much shorter than their velocities ask for, it
+/// does not swing.
+PathState between(const PathState& before, const PathState& after, double time_s);
 
-/// How a path is smoothed.
-struct PathSmootherConfig {
-  double smoothing_time_s = 1.0;    ///< details shorter than this are noise
-  double outlier_distance_m = 1.0;  ///< residuals beyond this lose their influence
-  double speed_mps = 0.0;           ///< typical speed of travel
-  double speed_share = 0.0;         ///< how stiff the speed is, relative to the stiffness against turning
+/// What a receiver without white noise would read at a time, in reach of the path or beyond its ends.
+struct Reading {
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  double variance = 0.0;  ///< along one axis, m^2
 };
-
-/// A path on an even grid of times.
-struct SmoothedPath {
-  double start_s = 0.0;
-  double step_s = 1.0;
-  std::vector<Eigen::Vector2d> positions_m;
-
-  /// Linear interpolation; `time_s` is clamped to the grid.
-  Eigen::Vector2d at(double time_s) const;
-};
-
-/// The cubic smoothing spline through `samples` (least squares residuals plus integrated squared acceleration) on
-/// an even grid, with a redescending loss (Geman-McClure) by iteratively reweighted least squares. Between samples
-/// far apart it is the path of least acceleration. `samples`: at least two, in strictly increasing order of time.
-SmoothedPath smoothPath(const std::vector<PathSample>& samples, const PathSmootherConfig& config);
+Reading readingAt(const std::vector<PathState>& path, const Motion& motion, double time_s);
 
 }  // namespace visual_localization

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -13,18 +14,13 @@
 
 #include "base/numbers.h"
 #include "base/time.h"
+#include "geo/altitudes.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/map/map_builder.h"
 
 namespace visual_localization {
 namespace {
-
-GeodeticPoint datumAt(const GeodeticPoint& position) {
-  GeodeticPoint datum = position;
-  if (!std::isfinite(datum.altitude_m)) datum.altitude_m = 0.0;
-  return datum;
-}
 
 /// The middle of all valid fixes, axis by axis: unlike the first one it cannot be an outlier far away.
 GeodeticPoint middleOf(const std::vector<Fix>& fixes) {
@@ -42,14 +38,39 @@ GeodeticPoint middleOf(const std::vector<Fix>& fixes) {
   return {upperMedian(latitudes), upperMedian(longitudes), 0.0};
 }
 
+/// Of those fixes that have a position.
+std::vector<AltitudeSample> altitudesOf(const std::vector<Fix>& fixes, const LocalFrame& frame) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<AltitudeSample> samples;
+  for (const Fix& fix : fixes) {
+    if (!hasPosition(fix)) continue;
+    samples.push_back({frame.toEastNorth(fix.position), plausibleAltitude(fix.position.altitude_m).value_or(kNone)});
+  }
+  return samples;
+}
+
+/// The middle of their altitudes: a single one may be anything.
+double datumAltitude(const std::vector<Fix>& fixes, const LocalFrame& frame) {
+  std::vector<double> altitudes_m;
+  for (const double altitude_m : steadyAltitudes(altitudesOf(fixes, frame))) {
+    if (std::isfinite(altitude_m)) altitudes_m.push_back(altitude_m);
+  }
+  return median(std::move(altitudes_m));
+}
+
 }  // namespace
 
 LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
   const LocalFrame provisional(middleOf(fixes));
   const CleanedTrajectory cleaned = cleanTrajectory(fixes, provisional, config);
-  const auto first = std::find(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
-  if (first == cleaned.verdicts.end()) throw std::runtime_error("none of its fixes is believable");
-  return LocalFrame(datumAt(fixes[static_cast<std::size_t>(first - cleaned.verdicts.begin())].position));
+  std::vector<Fix> believed;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (cleaned.verdicts[i] == FixVerdict::kKept) believed.push_back(fixes[i]);
+  }
+  if (believed.empty()) throw std::runtime_error("none of its fixes is believable");
+  GeodeticPoint datum = believed.front().position;
+  datum.altitude_m = datumAltitude(believed, provisional);
+  return LocalFrame(datum);
 }
 
 double distanceBetween_m(const GeodeticPoint& a, const GeodeticPoint& b) {
@@ -78,14 +99,16 @@ void requireMotion(const CleanedTrajectory& cleaned) {
 }
 
 std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
+  std::vector<Fix> ordered;
+  std::copy_if(fixes.begin(), fixes.end(), std::back_inserter(ordered), hasPosition);
+  std::stable_sort(ordered.begin(), ordered.end(), [](const Fix& a, const Fix& b) { return a.stamp_ns < b.stamp_ns; });
+  const std::vector<AltitudeSample> samples = altitudesOf(ordered, frame);
+  const std::vector<double> altitudes_m = steadyAltitudes(samples);
   std::vector<MapFix> found;
-  for (const Fix& fix : fixes) {
-    if (!hasPosition(fix)) continue;
-    const double up_m = fix.position.altitude_m - frame.datum().altitude_m;
-    found.push_back({fix.stamp_ns, frame.toEastNorth(fix.position), fix.sigma_m, up_m, fix.sigma_up_m});
+  for (std::size_t i = 0; i < ordered.size(); ++i) {
+    const double up_m = altitudes_m[i] - frame.datum().altitude_m;
+    found.push_back({ordered[i].stamp_ns, samples[i].position_m, ordered[i].sigma_m, up_m, ordered[i].sigma_up_m});
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const MapFix& a, const MapFix& b) { return a.stamp_ns < b.stamp_ns; });
   return found;
 }
 

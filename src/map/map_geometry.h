@@ -30,7 +30,7 @@ inline std::string unusedName(const std::string& name, const std::set<std::strin
 
 // Where the sessions of a map lie. What is refused is a std::runtime_error in one line.
 
-/// A frame around the first believable fix.
+/// A frame around the first believable fix, at the middle of their altitudes.
 LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config);
 /// On the earth, since a tangent plane shows its far side near the datum again.
 double distanceBetween_m(const GeodeticPoint& a, const GeodeticPoint& b);
@@ -38,7 +38,8 @@ double distanceBetween_m(const GeodeticPoint& a, const GeodeticPoint& b);
 void requireNear(const std::vector<Fix>& fixes, const GeodeticPoint& datum);
 /// Refuses a path that spans less than kSmallestSession_m: all images of the drive would be on one spot.
 void requireMotion(const CleanedTrajectory& cleaned);
-/// Those that have a position, in order of time.
+/// Those that have a position, in order of time. Altitudes that no robot can have or that stand out are left out, and
+/// those behind a change of what they are measured from are moved to those before.
 std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame);
 
 /// The training images of each session of a map by their positions.

@@ -32,6 +32,21 @@ TEST(TrajectoryCleaner, StampsThatStandStillOrGoBackAreDropped) {
   EXPECT_EQ(countOf(cleaned, FixVerdict::kDisordered), 2u);
 }
 
+TEST(TrajectoryCleaner, AStampFarAheadDoesNotCostWhatFollows) {
+  std::vector<Fix> fixes = record(block, 60.0);
+  fixes[100].stamp_ns += 3'600'000'000'000;
+  const CleanedTrajectory cleaned = clean(fixes);
+  EXPECT_EQ(cleaned.verdicts[100], FixVerdict::kDisordered);
+  EXPECT_EQ(countOf(cleaned, FixVerdict::kKept), fixes.size() - 1);
+}
+
+TEST(TrajectoryCleaner, FixesInReverseOrderAreRefusedForThat) {
+  std::vector<Fix> fixes = record(block, 60.0);
+  std::reverse(fixes.begin(), fixes.end());
+  EXPECT_THAT(test::refusalOf<std::runtime_error>([&] { clean(fixes); }),
+              testing::HasSubstr("299 of 300 are out of order"));
+}
+
 TEST(TrajectoryCleaner, FixesFasterThanFiftyHertzAreThinned) {
   std::vector<Fix> fixes = record(block, 60.0, 100.0);
   const CleanedTrajectory cleaned = clean(fixes);
@@ -53,7 +68,7 @@ void expectFewPoints(const std::vector<Fix>& fixes) {
 TEST(TrajectoryCleaner, ARefusalTellsThatFixesWereTooFast) {
   std::vector<Fix> burst = record(block, 600.0);
   for (std::size_t i = 0; i < burst.size(); ++i) burst[i].stamp_ns = static_cast<std::int64_t>(i) * 1000;
-  burst.back().stamp_ns += 80'000'000'000;
+  burst.back().stamp_ns += 95'000'000'000;  // no bridge is as long
   EXPECT_THAT(test::refusalOf<std::runtime_error>([&] { clean(burst); }),
               testing::HasSubstr("(2999 of 3001 are faster than 50 Hz)"));
 }

@@ -22,74 +22,44 @@ Eigen::Vector2d straight(double time_s) { return {kSpeed_mps * time_s, 0.0}; }
 
 std::vector<Fix> recorded(double duration_s = 120.0) { return test::record(straight, duration_s, kRate_hz, 0.0); }
 
-/// Times of the first and the last fix that is left out, and how many are.
-struct Stretch {
-  double from_s = 0.0;
-  double to_s = 0.0;
-  std::size_t fixes = 0;
-};
-
-Stretch leftOut(const std::vector<Fix>& fixes, const CleanedTrajectory& cleaned) {
-  Stretch stretch;
-  for (std::size_t i = 0; i < fixes.size(); ++i) {
-    if (cleaned.verdicts[i] == FixVerdict::kKept) continue;
-    if (stretch.fixes++ == 0) stretch.from_s = timeOf(fixes[i]);
-    stretch.to_s = timeOf(fixes[i]);
-  }
-  return stretch;
-}
-
-TEST(Verdicts, ARejectedStretchGrowsByTheMarginAtBothEnds) {
-  for (const double margin_m : {0.0, 4.0, 10.0}) {
-    std::vector<Fix> fixes = recorded();
-    for (Fix& fix : fixes) {
-      if (timeOf(fix) > 49.95 && timeOf(fix) < 60.0) shift(fix, {0.0, 12.0});
-    }
-    TrajectoryCleanerConfig config;
-    config.margin_m = margin_m;
-    const CleanedTrajectory cleaned = cleanTrajectory(fixes, LocalFrame(kDatum), config);
-    const Stretch out = leftOut(fixes, cleaned);
-    const double node_s = config.node_length_m / kSpeed_mps;
-    const double margin_s = margin_m / kSpeed_mps;
-    EXPECT_NEAR(out.from_s, 50.0 - margin_s, 1.5 * node_s) << margin_m;
-    EXPECT_NEAR(out.to_s, 60.0 + margin_s, 1.5 * node_s) << margin_m;
-    EXPECT_EQ(out.fixes, static_cast<std::size_t>(std::lround((out.to_s - out.from_s) * kRate_hz)) + 1) << "one piece";
-    EXPECT_GE(countOf(cleaned, FixVerdict::kMultipath), out.fixes - 10) << "a group at the border has spikes";
-    EXPECT_EQ(cleaned.gaps_closed, 1U);
-    EXPECT_NEAR(cleaned.longest_gap_s, out.to_s - out.from_s + 2.0 / kRate_hz, 1e-6);
-  }
-}
-
-TEST(Verdicts, TwoRejectedStretchesGrowEachOnItsOwn) {
+TEST(Verdicts, WhatIsWrongForAWhileDoesNotMoveThePathNorTheRestOfTheFixes) {
   std::vector<Fix> fixes = recorded();
   for (Fix& fix : fixes) {
     const double time_s = timeOf(fix);
     if ((time_s > 29.95 && time_s < 36.0) || (time_s > 79.95 && time_s < 86.0)) shift(fix, {0.0, -12.0});
   }
   const CleanedTrajectory cleaned = cleanTrajectory(fixes, LocalFrame(kDatum), {});
-  EXPECT_EQ(cleaned.gaps_closed, 2U);
+  EXPECT_LT(test::largestOf(test::errorsOf(cleaned, straight, 120.0)), 0.2);
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     const double time_s = timeOf(fixes[i]);
-    if (time_s < 45.0 || time_s > 70.0) continue;
-    EXPECT_EQ(cleaned.verdicts[i], FixVerdict::kKept) << time_s;
+    const bool is_beside = (time_s > 28.9 && time_s < 37.1) || (time_s > 78.9 && time_s < 87.1);
+    if (!is_beside) {
+      EXPECT_EQ(cleaned.verdicts[i], FixVerdict::kKept) << time_s;
+    }
   }
 }
 
 // A fix every two metres: each is a node of its own.
 TEST(Verdicts, OneFixAloneIsASpikeAndTwoAreMultipath) {
-  for (const std::size_t bad : {1U, 2U}) {
-    for (const std::size_t first : {std::size_t{0}, std::size_t{50}, std::size_t{100} - bad}) {
+  for (const std::size_t bad : {1U, 2U, 4U}) {
+    std::vector<Fix> fixes = test::record(straight, 100.0, 1.0, 0.0);
+    ASSERT_EQ(fixes.size(), 100U);
+    for (std::size_t i = 50; i < 50 + bad; ++i) shift(fixes[i], {0.0, 40.0});
+    const CleanedTrajectory cleaned = cleanTrajectory(fixes, LocalFrame(kDatum), {});
+    const FixVerdict expected = bad == 1 ? FixVerdict::kSpike : FixVerdict::kMultipath;
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      EXPECT_EQ(cleaned.verdicts[i], i >= 50 && i < 50 + bad ? expected : FixVerdict::kKept) << bad << ": " << i;
+    }
+  }
+}
+
+TEST(Verdicts, WrongFixesAtAnEndDoNotMoveThePath) {
+  for (const std::size_t bad : {1U, 2U, 4U}) {
+    for (const std::size_t first : {std::size_t{0}, std::size_t{100} - bad}) {
       std::vector<Fix> fixes = test::record(straight, 100.0, 1.0, 0.0);
-      ASSERT_EQ(fixes.size(), 100U);
       for (std::size_t i = first; i < first + bad; ++i) shift(fixes[i], {0.0, 40.0});
-      TrajectoryCleanerConfig config;
-      config.margin_m = 0.0;
-      const CleanedTrajectory cleaned = cleanTrajectory(fixes, LocalFrame(kDatum), config);
-      const FixVerdict expected = bad == 1 ? FixVerdict::kSpike : FixVerdict::kMultipath;
-      for (std::size_t i = 0; i < fixes.size(); ++i) {
-        const bool is_bad = i >= first && i < first + bad;
-        EXPECT_EQ(cleaned.verdicts[i], is_bad ? expected : FixVerdict::kKept) << bad << " from " << first << ": " << i;
-      }
+      const CleanedTrajectory cleaned = cleanTrajectory(fixes, LocalFrame(kDatum), {});
+      EXPECT_LT(test::largestOf(test::errorsOf(cleaned, straight, 100.0)), 0.3) << bad << " from " << first;
     }
   }
 }

@@ -13,10 +13,10 @@ namespace visual_localization {
 enum class FixVerdict {
   kKept,
   kNoFix,       ///< the receiver said so, or the coordinates are not finite or out of range
-  kDisordered,  ///< stamp not after the one before
+  kDisordered,  ///< stamp not after the one before, or far ahead of those behind
   kTooFast,     ///< less than kShortestInterval_s after the one that was used before
-  kSpike,       ///< single outlier
-  kMultipath,   ///< slow deviation from the smooth path although the receiver claims a fix: a reflected signal
+  kSpike,       ///< single outlier, or farther from the map's datum than a tangent plane reaches
+  kMultipath,   ///< deviation for a while although the receiver claims a fix: a reflected signal
 };
 
 std::string toString(FixVerdict verdict);
@@ -24,16 +24,9 @@ std::string toString(FixVerdict verdict);
 /// Fixes come at up to 50 Hz, and stamps waver. More say nothing more: they would be noise over hardly any time.
 constexpr double kShortestInterval_s = 0.015;
 
-/// What is known of the robot's motion and of its receiver. The speed itself is estimated from the fixes.
+/// What is known of the robot's motion beforehand. How it moves and how its receiver errs is learnt from the fixes.
 struct TrajectoryCleanerConfig {
-  double node_length_m = 1.3;
-  double speed_tolerance = 0.05;
-  double opening_cost = 8.0;
-  double rejection_cost = 1.5;
-  double margin_m = 1.5;
-  double smoothing_length_m = 1.5;
-  double speed_stiffness = 0.1;
-  double outlier_distance_m = 1.0;
+  double speed_tolerance = 0.0;
   double max_bridge_s = 90.0;
 
   void declare(ParameterVisitor& visitor);
@@ -47,10 +40,12 @@ struct CleanedTrajectory {
   double longest_gap_s = 0.0;        ///< the longest of them
 };
 
-/// Turns raw DGPS fixes into the smooth path that a robot at nearly constant speed must have driven (Kronfeld et
-/// al. (journal), section 6, where people did this by hand): drops invalid fixes, spikes and multipath,
-/// closes gaps along the smoothest path between their ends, in linear time whatever the stamps. Throws
-/// std::runtime_error, in one line, when fewer than two believable fixes remain.
+/// Turns raw fixes into the most probable path of the robot (Kronfeld et al. (journal), section 6, where people did
+/// this by hand): drops invalid fixes, spikes and what can only be multipath, sees through steps of the receiver's
+/// error, and closes gaps. How the robot moves and how the receiver errs is learnt from the recording; a robot whose
+/// speed turns out constant, as the papers', is held to it. What is uncertain is believed: the adjustment by images
+/// decides later. In nearly linear time whatever the stamps. Throws std::runtime_error, in one line, when fewer than
+/// two believable fixes remain.
 CleanedTrajectory cleanTrajectory(const std::vector<Fix>& fixes, const LocalFrame& frame,
                                   const TrajectoryCleanerConfig& config);
 

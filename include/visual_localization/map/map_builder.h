@@ -113,9 +113,10 @@ class MapBuilder {
                       const std::optional<MapBase>& base = {});
   ~MapBuilder();
 
-  /// Starts a session: cleans its fixes. The first believable fix ever given becomes the datum. Throws
-  /// std::runtime_error naming the session when the fixes are not enough for a path, when the path spans less than
-  /// kSmallestSession_m, or when it lies farther than kFarthestSession_m from the datum; the builder is as before.
+  /// Starts a session: cleans its fixes. The first believable fix ever given becomes the datum, at the middle of the
+  /// altitudes. Throws std::runtime_error naming the session when the fixes are not enough for a path, when the path
+  /// spans less than kSmallestSession_m, or when it lies farther than kFarthestSession_m from the datum; the builder is
+  /// as before.
   void beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera = {});
   /// True when the image at `stamp_ns` has a position, is far enough from the last one, and does not come from a robot
   /// that has stood there (within kStandingReach_m) for longer than kStandingTime_s: only then is it worth decoding and

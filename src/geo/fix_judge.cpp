@@ -1,0 +1,220 @@
+#include "geo/fix_judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "base/numbers.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr double kMedianOfPlane = 1.1774;  // of a distance, in sigmas along one axis
+
+std::vector<PathSample> samplesOf(const std::vector<Node>& nodes) {
+  std::vector<PathSample> samples;
+  for (const Node& node : nodes) samples.push_back(node.sample);
+  return samples;
+}
+
+/// A second, or one fix. What is a little less takes in as many fixes although their stamps waver.
+double nodeLength_s(const std::vector<PathSample>& samples) {
+  constexpr double kLeast_s = 1.0;
+  constexpr double kWavering = 0.3;
+  const double interval_s = typicalInterval(samples);
+  return std::max(kLeast_s, interval_s) - kWavering * interval_s;
+}
+
+}  // namespace
+
+FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& config)
+    : usable_(usable),
+      config_(config),
+      nodes_(nodesOf(usable, nodeLength_s(usable.samples))),
+      samples_(samplesOf(nodes_)),
+      verdicts_(usable.samples.size(), FixVerdict::kKept) {
+  select(0.0, {});
+  std::vector<bool> believed;
+  for (std::size_t n = 0; n < nodes_.size(); ++n) believed.push_back(!isLeftOut(n));
+  // To learn again from what was believed must not make the next bend improbable.
+  constexpr double kLeastShare = 0.25;
+  constant_speed_ = select(kLeastShare * scales_.acceleration_density, believed).isConstant();
+  findDoubts(constant_speed_);
+  for (const Part& part : parts()) {
+    const std::vector<PathState> path = smoothPath(measurementsOf(part, false), motion_);
+    takeBack(part, path);
+    judgeFixes(part, path);
+  }
+  judgeLeftOut();
+}
+
+SpeedPrior FixJudge::select(double least_density, const std::vector<bool>& believed) {
+  scales_ = learnScales(samples_, believed, least_density);
+  motion_ = {scales_.acceleration_density, scales_.usual_mps};
+  const SpeedPrior speeds(samples_, scales_, config_.speed_tolerance);
+  chosen_ = selectNodes(samples_, scales_, speeds, config_.max_bridge_s);
+  return speeds;
+}
+
+/// Where multipath begins and ends its fixes look like the path they leave and point the wrong way. Speeds tell where
+/// as closely as they are measured: what is nearer to a stretch that was left out does not shape the path.
+void FixJudge::findDoubts(bool constant_speed) {
+  doubted_.assign(nodes_.size(), false);
+  if (!constant_speed) return;
+  for (std::size_t begin = 0; begin < nodes_.size(); ++begin) {
+    if (!isLeftOut(begin)) continue;
+    const std::size_t end = endOfStretch(begin);
+    const double from_s = samples_[begin].time_s - kSpeedLag_s;
+    const double to_s = samples_[end - 1].time_s + kSpeedLag_s;
+    if (end > begin + 1) {
+      for (std::size_t n = begin; n-- > 0 && samples_[n].time_s >= from_s;) doubted_[n] = true;
+      for (std::size_t n = end; n < nodes_.size() && samples_[n].time_s <= to_s; ++n) doubted_[n] = true;
+    }
+    begin = end - 1;
+  }
+}
+
+std::vector<FixJudge::Part> FixJudge::parts() const {
+  std::vector<Part> found;
+  double last_s = 0.0;
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    if (isLeftOut(n)) continue;
+    if (found.empty() || samples_[n].time_s - last_s > config_.max_bridge_s) found.push_back({n, n});
+    found.back().end = n + 1;
+    last_s = samples_[n].time_s;
+  }
+  return found;
+}
+
+/// The first node behind `node` that is not left out.
+std::size_t FixJudge::endOfStretch(std::size_t node) const {
+  while (node < nodes_.size() && isLeftOut(node)) ++node;
+  return node;
+}
+
+/// What a receiver promises is its whole error; what is white of it shows.
+double FixJudge::offsetOf(double sigma_m) const {
+  constexpr double kUsual_m = 1.5;
+  constexpr double kOfNoise = 3.0;
+  constexpr double kLeast_m = 1e-3;
+  constexpr double kMost_m = 100.0;
+  const double noise_m = scales_.noise_m;
+  if (sigma_m == 0.0) return std::max(kUsual_m, kOfNoise * noise_m);
+  return std::clamp(std::sqrt(std::max(0.0, sigma_m * sigma_m - noise_m * noise_m)), kLeast_m, kMost_m);
+}
+
+void FixJudge::addNode(std::size_t node, std::vector<Measurement>& into) const {
+  into.push_back(
+      {samples_[node], scales_.noise_m, offsetOf(nodes_[node].sigma_m), chosen_[node] == NodeVerdict::kStep});
+}
+
+/// Together they say as much as their node.
+void FixJudge::addFixes(std::size_t node, std::vector<Measurement>& into) const {
+  std::vector<std::size_t> kept;
+  for (const std::size_t i : nodes_[node].members) {
+    if (verdicts_[i] == FixVerdict::kKept) kept.push_back(i);
+  }
+  const double white_m = scales_.noise_m * std::sqrt(static_cast<double>(kept.size()));
+  for (const std::size_t i : kept) {
+    const bool steps = i == kept.front() && chosen_[node] == NodeVerdict::kStep;
+    into.push_back({usable_.samples[i], white_m, offsetOf(usable_.sigmas_m[i]), steps});
+  }
+}
+
+/// One measurement for nodes [begin, end), which are left out: a bad bridge stays bounded.
+void FixJudge::addStretch(std::size_t begin, std::size_t end, std::vector<Measurement>& into) const {
+  if (constant_speed_ || into.empty()) return;  // a constant speed bounds it
+  std::vector<std::size_t> members;
+  for (std::size_t n = begin; n < end; ++n) {
+    members.insert(members.end(), nodes_[n].members.begin(), nodes_[n].members.end());
+  }
+  into.push_back({medianOf(usable_.samples, members), scales_.noise_m, into.back().offset_m, false, true});
+}
+
+std::vector<Measurement> FixJudge::measurementsOf(const Part& part, bool of_fixes) const {
+  std::vector<Measurement> measurements;
+  for (std::size_t n = part.begin; n < part.end; ++n) {
+    if (isLeftOut(n)) {
+      const std::size_t end = endOfStretch(n);
+      addStretch(n, end, measurements);
+      n = end - 1;
+    } else if (!doubted_[n] || n == part.begin || n + 1 == part.end) {
+      of_fixes ? addFixes(n, measurements) : addNode(n, measurements);
+    }
+  }
+  return measurements;
+}
+
+/// Stretches that agree with the path after all.
+void FixJudge::takeBack(const Part& part, const std::vector<PathState>& path) {
+  constexpr double kAgrees = 9.2;  // 99 % of what is normal in the plane
+  if (constant_speed_) return;     // speeds spoke against them, not distances
+  for (std::size_t begin = part.begin; begin < part.end; ++begin) {
+    if (!isLeftOut(begin)) continue;
+    const std::size_t end = endOfStretch(begin);
+    bool agrees = true;
+    for (std::size_t n = begin; n < end; ++n) {
+      const Reading reading = readingAt(path, motion_, samples_[n].time_s);
+      const double variance = scales_.tolerance[n] * (reading.variance + scales_.noise_m * scales_.noise_m);
+      agrees = agrees && (samples_[n].position_m - reading.position_m).squaredNorm() <= kAgrees * variance;
+    }
+    if (agrees)
+      std::fill(chosen_.begin() + static_cast<std::ptrdiff_t>(begin),
+                chosen_.begin() + static_cast<std::ptrdiff_t>(end), NodeVerdict::kBelieved);
+    begin = end - 1;
+  }
+}
+
+/// Spikes within believed nodes. A receiver's noise may have wide tails: a spike is beyond them.
+void FixJudge::judgeFixes(const Part& part, const std::vector<PathState>& path) {
+  constexpr double kSpike = 4.3;  // sigmas: one in ten thousand in the plane
+  constexpr double kTail = 0.8;   // of the fixes
+  constexpr double kBeyondTail = 3.0;
+  constexpr double kPromised = 3.0;  // sigmas by the receiver's own claim
+  std::vector<std::size_t> fixes;
+  std::vector<double> away_m;
+  std::vector<double> variances;
+  for (std::size_t n = part.begin; n < part.end; ++n) {
+    if (isLeftOut(n)) continue;
+    for (const std::size_t i : nodes_[n].members) {
+      const Reading reading = readingAt(path, motion_, usable_.samples[i].time_s);
+      fixes.push_back(i);
+      away_m.push_back((usable_.samples[i].position_m - reading.position_m).norm());
+      variances.push_back(reading.variance);
+    }
+  }
+  std::vector<double> sorted = away_m;
+  const double tail_m = kBeyondTail * nearestRank(sorted, kTail);
+  const double noise_m = std::max(scales_.noise_m, median(away_m) / kMedianOfPlane);
+  for (std::size_t k = 0; k < fixes.size(); ++k) {
+    const double sigma_m = std::sqrt(noise_m * noise_m + variances[k]);
+    const double promised_m = std::min(kPromised * usable_.sigmas_m[fixes[k]], kSpike * offsetOf(0.0));
+    if (away_m[k] > std::max({kSpike * sigma_m, tail_m, promised_m})) verdicts_[fixes[k]] = FixVerdict::kSpike;
+  }
+}
+
+/// Also what a believed node has in excess beside a stretch that is left out belongs to it.
+void FixJudge::judgeLeftOut() {
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    const bool alone = (n == 0 || !isLeftOut(n - 1)) && (n + 1 == nodes_.size() || !isLeftOut(n + 1));
+    for (const std::size_t i : nodes_[n].members) {
+      if (isLeftOut(n)) {
+        verdicts_[i] = alone && nodes_[n].members.size() == 1 ? FixVerdict::kSpike : FixVerdict::kMultipath;
+      } else if (doubted_[n] && verdicts_[i] == FixVerdict::kSpike) {
+        verdicts_[i] = FixVerdict::kMultipath;
+      }
+    }
+  }
+}
+
+std::vector<std::vector<PathState>> FixJudge::paths() const {
+  std::vector<std::vector<PathState>> paths;
+  for (const Part& part : parts()) {
+    std::vector<Measurement> measurements = measurementsOf(part, true);
+    if (measurements.size() >= 2) paths.push_back(smoothPath(std::move(measurements), motion_));
+  }
+  return paths;
+}
+
+}  // namespace visual_localization
