@@ -26,13 +26,37 @@ in_tree() {
       bash -euo pipefail -c "$2"' in_tree "$tree" "$1"
 }
 
+# In each tree from before anything else is until after everything else is gone.
+readonly tree_marker=.visual_localization_tree
+
 # Whether make_tree() has made the tree to its end.
-is_tree() { [[ -e $tree/root/.is_whole ]]; }
+is_tree() { is_own_tree && [[ -e $tree/root/.is_whole ]]; }
+
+# Whether the folder itself, no link to one, is a tree that make_tree() began.
+is_own_tree() { [[ -d $tree && ! -L $tree && -f $tree/$tree_marker && ! -L $tree/$tree_marker ]]; }
+
+# Fails when something else is where the tree is to be. What was not made here is never deleted.
+require_own_tree() {
+  if is_own_tree || [[ ! -e $tree && ! -L $tree ]]; then return; fi
+  if [[ -d $tree && ! -L $tree && -z $(ls -A "$tree") ]]; then return; fi
+  fail "$tree is no tree of this script (it has no $tree_marker): delete it yourself, or name another folder"
+}
+
+# Nothing, where there is no tree.
+remove_tree() {
+  require_own_tree
+  if ! is_own_tree; then return; fi
+  find "$tree" -mindepth 1 -maxdepth 1 ! -name "$tree_marker" -exec rm -rf --one-file-system {} + \
+    && rm "$tree/$tree_marker" \
+    && rmdir "$tree"
+}
 
 # Chained by &&: where the steps are called, set -e is without effect. policy-rc.d keeps services from starting.
 make_tree() {
   # shellcheck disable=SC2154
-  rm -rf --one-file-system "$tree" \
+  remove_tree \
+    && mkdir -p "$tree" \
+    && touch "$tree/$tree_marker" \
     && debootstrap --variant=minbase --include=ca-certificates "$release" "$tree" "$mirror" \
     && cp /etc/hosts /etc/resolv.conf "$tree/etc/" \
     && install -m 755 /dev/stdin "$tree/usr/sbin/policy-rc.d" <<<$'#!/bin/sh\nexit 101' \

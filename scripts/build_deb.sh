@@ -16,7 +16,8 @@ the packages of Debian that it needs. Install it with `apt-get install ./FILE.de
   --jobs N      parallel jobs (default: number of processors)
   --try DIR     makes a bare tree of this Debian release in DIR, as root with debootstrap, installs the package there
                 and uses it: builds a map, localises with the programs and with the nodelet, loads the installed
-                launch files. A tree that is there is used again
+                launch files. A tree that is there is used again; any other folder
+                that is not empty is refused
   --mirror URL  Debian mirror (default: that of this machine's apt)
 USAGE
 }
@@ -51,6 +52,9 @@ main() {
   if [[ -n $tree ]]; then
     if [[ -z $mirror ]]; then mirror=$(mirror_of_host); fi
     require_trees
+    mkdir -p "$(dirname "$tree")"
+    tree=$(cd "$(dirname "$tree")" && pwd)/$(basename "$tree")
+    require_own_tree
   fi
   "$repo/scripts/install_dependencies.sh" --with-packaging
   depends=$("$repo/scripts/install_dependencies.sh" --run-only --list)
@@ -61,8 +65,6 @@ main() {
   if [[ -z $tree ]]; then return; fi
   # shellcheck disable=SC1091
   release=$(. /etc/os-release && echo "$VERSION_CODENAME")
-  mkdir -p "$(dirname "$tree")"
-  tree=$(cd "$(dirname "$tree")" && pwd)/$(basename "$tree")
   local package
   package=$(ls "$build"/*.deb)
   local steps=(install_package try_package)

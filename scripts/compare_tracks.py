@@ -17,7 +17,6 @@ import shutil
 import sqlite3
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Dict, Iterator, List, NamedTuple, Optional, Set, Tuple, Union
@@ -110,9 +109,11 @@ class Build:
         key_file = self.folder / 'build.txt'
         if key_file.is_file() and key_file.read_text(encoding='utf-8') == self._key:
             return
-        if self.folder.exists():
+        if key_file.is_file():
             shutil.rmtree(self.folder)
-        self.folder.mkdir(parents=True)
+        if self.folder.exists() and any(self.folder.iterdir()):
+            raise Failure(f'{self.folder} was not made by compare_tracks (it has no build.txt): name another --work')
+        self.folder.mkdir(parents=True, exist_ok=True)
         key_file.write_text(self._key, encoding='utf-8')
 
     def map_file(self, session: Path) -> Path:
@@ -368,7 +369,9 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--after', type=Path, required=True, metavar='BUILD_DIR', help='build folder to judge')
     parser.add_argument('--rounds', type=Path, default=os.environ.get(PACKAGE.upper() + '_DATA') or None,
                         metavar='DIR', help='folder of further bags (default: $VISUAL_LOCALIZATION_DATA)')
-    parser.add_argument('--work', type=Path, default=Path(tempfile.gettempdir()) / f'{PACKAGE}_tracks', metavar='DIR',
+    # Not in the temporary directory: anybody could make a folder of that name there before.
+    cache = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache')
+    parser.add_argument('--work', type=Path, default=cache / f'{PACKAGE}_tracks', metavar='DIR',
                         help='keeps maps and tracks of each build (default: %(default)s)')
     parser.add_argument('--jobs', type=positive, default=2, help='runs at the same time (default: %(default)s)')
     parser.add_argument('--seeds', type=int, nargs='+', default=[1, 2, 3], help='of the trackers (default: 1 2 3)')

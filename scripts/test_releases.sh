@@ -98,7 +98,8 @@ test_release() {
   if [[ $reuse == true ]] && is_tree; then steps=(); fi
   run_steps "${steps[@]}" install_package try_package || return 1
   results+=("$release: $tested, the package works; log $log")
-  if [[ $keep == false ]]; then rm -rf --one-file-system "$built" "$tree"; fi
+  if [[ $keep == true ]]; then return; fi
+  for tree in "$tree" "$built"; do remove_tree; done
 }
 
 main() {
@@ -129,6 +130,10 @@ main() {
   mkdir -p "$directory"
   touch "$directory/CATKIN_IGNORE"
   directory=$(cd "$directory" && pwd)
+  local tree
+  for release in "${chosen[@]}"; do
+    for tree in "$directory/$release" "$directory/$release-package"; do require_own_tree; done
+  done
 
   echo "Tests $(git -C "$repo" log -1 --format='%h %s') on ${chosen[*]}. Logs: $directory/*.log"
   for release in "${chosen[@]}"; do test_release || result=1; done

@@ -18,11 +18,25 @@ TRACES = ('err_m', 'v0', 'speed_ema', 'quantum_share', 'phi2', 'recovering', 'sp
           'similarity', 'comparisons', 'swarm_mps', 'robot_mps')
 
 
+# What HTML and Markdown would take for more than text, and what stands for it in a report.
+MARKS = str.maketrans({'<': '\u2039', '>': '\u203a', '`': "'"})
+
+
+def printable(text: str) -> str:
+    """Foreign text without what a terminal obeys or what turns the order of the text around."""
+    return ''.join(letter if letter.isprintable() else '?' for letter in text)
+
+
+def plain(text: str) -> str:
+    """Foreign text that a report shows and that nobody runs."""
+    return printable(' '.join(text.split())).translate(MARKS)
+
+
 class DataError(Exception):
     """Says what is wrong with a file."""
 
     def __init__(self, path: Path, what: str):
-        super().__init__(f'{path}: {" ".join(what.split())}')
+        super().__init__(printable(f'{path}: {" ".join(what.split())}'))
 
 
 @dataclass
@@ -100,7 +114,7 @@ def read_rows(path: Path, needed: Tuple[str, ...]) -> Iterator[Tuple[int, Dict[s
                     continue
                 if len(fields) != len(header):
                     raise DataError(path, f'line {reader.line_num}: has {len(fields)} fields, the header {len(header)}')
-                yield reader.line_num, dict(zip(header, fields))
+                yield reader.line_num, dict(zip(header, map(plain, fields)))
     except OSError as error:
         raise DataError(path, error.strerror or str(error)) from error
     except (csv.Error, UnicodeDecodeError) as error:
@@ -194,7 +208,7 @@ def read_results(folder: Path) -> Results:
     description = read_description(folder / 'experiment.yaml')
     name, outcomes = read_outcomes(folder / 'summary.csv')
     return Results(
-        experiment=str(description.get('experiment') or name or folder.resolve().name),
+        experiment=plain(str(description.get('experiment') or name or folder.resolve().name)),
         description=description,
         outcomes=outcomes,
         pairs=read_pairs(folder / 'pairs.csv'),

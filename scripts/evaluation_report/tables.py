@@ -1,7 +1,7 @@
 """The report's tables, in Markdown: ours beside the papers'."""
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Set
 
-from .data import Group, Number, Outcome, Results
+from .data import Group, Number, Outcome, Results, plain
 from .experiments import (CHANGING, CONSTANT, HYBRID, GridPoint, by_illumination, grid_point, group_title,
                           speed_of, thresholds_of)
 from .papers import PaperValue, Papers
@@ -69,8 +69,8 @@ NOTHING = '–'
 
 
 def escape(text: object) -> str:
-    """Text that stays in its cell."""
-    return ' '.join(str(text).split()).replace('\\', '\\\\').replace('|', '\\|')
+    """Text that stays in its cell, and that a browser does not run."""
+    return plain(str(text)).replace('\\', '\\\\').replace('|', '\\|')
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -35,7 +35,7 @@ void printCamera(const SessionImages& session, const MapBuilderOptions& options,
     std::cout << kNoCalibration << "; by its images: camera " << describe(*session.camera.model);
   } else if (session.camera.model) {
     std::cout << "camera " << describe(*session.camera.model) << ", from "
-              << (options.camera_info.empty() ? cameraInfoTopic(options.image_topic) : options.camera_info);
+              << oneLine(options.camera_info.empty() ? cameraInfoTopic(options.image_topic) : options.camera_info);
   } else {
     std::cout << kNoCalibration << ": a map of places";
     std::cout << (geometry.self_calibration ? " (its images are not certain about one)"

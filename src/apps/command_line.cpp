@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <new>
@@ -10,6 +13,7 @@
 #include <thread>
 
 #include <CLI/CLI.hpp>
+#include <unistd.h>
 
 #include "apps/app_support.h"
 #include "base/files.h"
@@ -247,8 +251,30 @@ int runBody(const CLI::App& app, void (*body)(const Options&), const Options& op
   }
 }
 
+/// Where memory is refused, also to a thread of a library, or to what would report it.
+[[noreturn]] void endWithoutMemory() {
+  constexpr char kWords[] = "out of memory\n";
+  const bool refused = std::current_exception() != nullptr;
+  if (refused && ::write(STDERR_FILENO, kWords, sizeof kWords - 1) < 0) ::_exit(kFailedRun);
+  refused ? ::_exit(kFailedRun) : std::abort();
+}
+
+/// Ends the process at once: a thread of a library that waits for memory (OpenBLAS) would hold its end up for ever. A
+/// sanitizer has a last word.
+int ended(int code) {
+  std::cout.flush();
+  std::cerr.flush();
+  std::fflush(nullptr);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  ::_exit(code);
+#else
+  return code;
+#endif
+}
+
 template <class Options>
 int run(CLI::App& app, int argc, char** argv, void (*body)(const Options&)) {
+  std::set_terminate(endWithoutMemory);
   Options options;
   declareOptions(app, options);
   app.set_version_flag("--version", app.get_name() + " " + VISUAL_LOCALIZATION_VERSION);
@@ -261,7 +287,7 @@ int run(CLI::App& app, int argc, char** argv, void (*body)(const Options&)) {
     return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
   }
   removePartialFilesOnSignals();
-  return runBody(app, body, options);
+  return ended(runBody(app, body, options));
 }
 
 }  // namespace

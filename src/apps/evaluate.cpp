@@ -31,10 +31,13 @@ std::string bagPath(const EvaluateOptions& options, const RoundSpec& round) {
   return (folder / round.bag).string();
 }
 
+constexpr std::size_t kLargestBeside_bytes = std::size_t{64} << 20U;  ///< a calibration, or poses
+
 /// Of small files, to notice that one was edited (FNV-1a, 64 bits).
 std::string fingerprintOf(const std::string& path) {
   std::uint64_t hash = 14695981039346656037U;
-  for (const char c : readFile(path)) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  for (const char c : readFile(path, kLargestBeside_bytes))
+    hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
   return std::to_string(hash);
 }
 
@@ -48,7 +51,7 @@ std::string provenanceOf(const Experiment& experiment, const EvaluateOptions& op
     const auto size = fs::file_size(bagPath(options, round), error);
     if (error)
       throw BagError(bagPath(options, round) + ": recording " + round.name + " cannot be read: " + error.message());
-    text += "bytes of " + round.name + "," + std::to_string(size) + "\n";
+    text += csvField("bytes of " + round.name) + "," + std::to_string(size) + "\n";
     for (const std::string& file : {round.camera_info, round.poses}) {
       if (file.empty()) continue;
       text +=
@@ -92,7 +95,7 @@ void mergeFolders(const Experiment& experiment, const ResultFolder& results, con
                   const std::string& yaml, const std::string& provenance) {
   for (const std::string& folder : options.merge) {
     const std::size_t copied = mergeResults(ResultFolder::open(folder, yaml, provenance), results, experiment);
-    std::printf("%s: %zu results\n", folder.c_str(), copied);
+    std::printf("%s: %zu results\n", oneLine(folder).c_str(), copied);
   }
 }
 

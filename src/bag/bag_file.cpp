@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
+#include <new>
 #include <utility>
 
 #include <bzlib.h>
@@ -72,16 +73,17 @@ bool unpacksLz4(std::string& packed, std::size_t size, std::string& unpacked) {
   if (size / kMostOfOne > packed.size()) return false;
   unpacked.resize(size);
   auto count = static_cast<unsigned int>(size);
-  return roslz4_buffToBuffDecompress(packed.data(), static_cast<unsigned int>(packed.size()), unpacked.data(),
-                                     &count) == ROSLZ4_OK &&
-         count == size;
+  const int result =
+      roslz4_buffToBuffDecompress(packed.data(), static_cast<unsigned int>(packed.size()), unpacked.data(), &count);
+  if (result == ROSLZ4_MEMORY_ERROR) throw std::bad_alloc();
+  return result == ROSLZ4_OK && count == size;
 }
 
 /// Step by step: a few bytes may stand for any number, so memory follows what is there, not what is claimed.
 bool unpacksBz2(std::string& packed, std::size_t size, std::string& unpacked) {
   constexpr std::size_t kFirst = 1U << 20U;
   bz_stream stream{};
-  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return false;
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) throw std::bad_alloc();  // nothing else can fail there
   const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> ended(&stream, BZ2_bzDecompressEnd);
   stream.next_in = packed.data();
   stream.avail_in = static_cast<unsigned int>(packed.size());
@@ -94,6 +96,7 @@ bool unpacksBz2(std::string& packed, std::size_t size, std::string& unpacked) {
     stream.avail_out = static_cast<unsigned int>(unpacked.size() - begin);
     result = BZ2_bzDecompress(&stream);
   } while (result == BZ_OK && stream.avail_out == 0 && unpacked.size() < size);
+  if (result == BZ_MEM_ERROR) throw std::bad_alloc();
   return result == BZ_STREAM_END && stream.avail_out == 0 && unpacked.size() == size;
 }
 

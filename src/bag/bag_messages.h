@@ -37,7 +37,7 @@ auto withBag(const std::string& path, Read read) {
   } catch (const bag::DamagedBag& error) {
     throw BagError(path + ": bag is damaged or cut off: " + oneLine(error.what()));
   } catch (const std::bad_alloc&) {
-    throw BagError(path + ": bag is damaged: it asks for more memory than there is");
+    throw BagError(path + ": there is not enough memory to read it, or it is damaged and asks for too much");
   } catch (const std::exception& error) {
     throw BagError(path + ": bag is damaged: " + oneLine(error.what()));
   }

@@ -48,17 +48,17 @@ BagImage readImage(std::string bytes, const bag::Message& from) {
   }
 }
 
-/// That of all these messages. Throws std::runtime_error when they do not say the same.
-sensor_msgs::CameraInfo onlyCalibration(bag::BagFile& file, const std::vector<bag::Message>& messages) {
-  const auto first = deserialize<sensor_msgs::CameraInfo>(file.read(messages.front()));
+/// That of all these messages. Throws CameraError when they do not say the same.
+std::optional<CameraModel> singleCalibration(bag::BagFile& file, const std::vector<bag::Message>& messages,
+                                             bool rectified) {
+  SingleCalibration calibration(rectified);
   for (const bag::Message& message : messages) {
-    const auto info = deserialize<sensor_msgs::CameraInfo>(file.read(message));
-    if (sameCalibration(*info, *first)) continue;
+    if (calibration.add(*deserialize<sensor_msgs::CameraInfo>(file.read(message)))) continue;
     const double after_s = secondsBetween(messages.front().stamp_ns, message.stamp_ns);
     throw CameraError("the calibration changes " + std::to_string(std::llround(after_s)) +
                       " s after the first: cut the bag there, or name one that holds for all of it (--camera-info)");
   }
-  return *first;
+  return calibration.camera();
 }
 
 }  // namespace
@@ -137,9 +137,8 @@ std::optional<CameraModel> BagReader::camera(const std::string& image_topic) con
   return withBag(path_, [&]() -> std::optional<CameraModel> {
     if (topicsOf<sensor_msgs::CameraInfo>(*file_).count(topic) == 0) return std::nullopt;
     const std::vector<bag::Message> messages = messagesOf<sensor_msgs::CameraInfo>(*file_, topic);
-    if (messages.empty()) return std::nullopt;
     try {
-      return toCamera(onlyCalibration(*file_, messages), isRectified(image_topic));
+      return singleCalibration(*file_, messages, isRectified(image_topic));
     } catch (const CameraError& error) {
       throw BagError(path_ + ": " + oneLine(topic) + ": " + oneLine(error.what()));
     }

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <set>
 #include <string_view>
@@ -29,13 +30,15 @@
 namespace visual_localization {
 namespace {
 
-constexpr std::string_view kPartial = ".partial";
+/// No other program ends its names like this: what is abandoned under such a name is removed.
+constexpr std::string_view kPartial = ".visual_localization.partial";
 constexpr std::size_t kDigits = 16;
 /// What stands behind the name of a file while one process at a time may write it.
-constexpr std::string_view kLockSuffix = ".lock.partial";
+constexpr std::string_view kLockSuffix = ".lock.visual_localization.partial";
 /// Times that an OutputLock is tried, 10 ms apart: removeAbandoned() of another process holds the file for a moment
 /// too.
 constexpr int kLockAttempts = 100;
+constexpr int kPipeWait_ms = 10'000;
 
 bool endsWith(std::string_view text, std::string_view end) {
   return text.size() > end.size() && text.substr(text.size() - end.size()) == end;
@@ -64,8 +67,8 @@ int requireRegular(int descriptor) {
   return S_ISREG(status.st_mode) ? 0 : EINVAL;
 }
 
-/// A new name beside `target`: `<target>.<16 random hexadecimal digits>.partial`. Two processes in two containers have
-/// the same number, so it is none of theirs.
+/// A new name beside `target`: `<target>.<16 random hexadecimal digits>` and kPartial. Two processes in two containers
+/// have the same number, so it is none of theirs.
 std::string partialName(const std::string& target) {
   std::random_device random;
   std::array<char, kDigits + 1> digits{};
@@ -237,6 +240,25 @@ int flush(const std::string& path) {
   return error;
 }
 
+/// Those of the file that is replaced; nothing for a new one, which has those of the process.
+std::optional<struct stat> rightsOf(const std::string& target) {
+  struct stat status {};
+  if (::stat(target.c_str(), &status) != 0) return std::nullopt;
+  return status;
+}
+
+/// Nobody may read or write the file who may not do so with the one it takes the place of. Root's file stays its
+/// owner's; others cannot give one away. `more`: bits of the mode that it has as well.
+void giveRights(int descriptor, const struct stat& rights, mode_t more) {
+  constexpr mode_t kRights = 0777;
+  struct stat own {};
+  if (::fstat(descriptor, &own) != 0) return;
+  const bool is_given = (own.st_uid == rights.st_uid && own.st_gid == rights.st_gid) ||
+                        ::fchown(descriptor, rights.st_uid, rights.st_gid) == 0;
+  const mode_t of_others = is_given ? kRights : kRights & ~static_cast<mode_t>(S_IRWXG);  // it is of another group
+  ::fchmod(descriptor, ((rights.st_mode & of_others) | more) & kRights);
+}
+
 /// A new file of a name that nobody else has. Throws FileError.
 int createLocked(const std::string& shown, const std::string& target, std::string& path, int& slot) {
   while (true) {
@@ -258,12 +280,37 @@ int createLocked(const std::string& shown, const std::string& target, std::strin
   throw FileError((path.empty() ? "''" : path) + ": cannot be read: " + std::strerror(error));
 }
 
+/// A device has no end, as /dev/zero, or waits for somebody, as a terminal.
+void requireReadable(const std::string& path, int descriptor) {
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0) refuseToRead(path, errno);
+  if (S_ISDIR(status.st_mode)) refuseToRead(path, EISDIR);
+  if (S_ISREG(status.st_mode) || S_ISFIFO(status.st_mode)) return;
+  throw FileError(path + ": cannot be read: it is neither a file nor a pipe");
+}
+
+/// How many bytes came; 0 at the end.
+std::size_t readBlock(const std::string& path, int descriptor, std::array<char, 65536>& block) {
+  while (true) {
+    pollfd ready{descriptor, POLLIN, 0};
+    const int found = ::poll(&ready, 1, kPipeWait_ms);
+    if (found == 0) {
+      throw FileError(path + ": cannot be read: nobody wrote into this pipe for " +
+                      std::to_string(kPipeWait_ms / 1000) + " s");
+    }
+    const ssize_t count = found < 0 ? -1 : ::read(descriptor, block.data(), block.size());
+    if (count >= 0) return static_cast<std::size_t>(count);
+    if (errno != EINTR && errno != EAGAIN) refuseToRead(path, errno);
+  }
+}
+
 }  // namespace
 
 PartialFile::PartialFile(const std::string& target) : shown_(target), target_(resolved(target)) {
   requireReplaceable(shown_, target_);
   removeAbandoned(folderOf(target_));
   locked_ = createLocked(shown_, target_, partial_, slot_);
+  if (const auto rights = rightsOf(target_)) giveRights(locked_, *rights, S_IRUSR | S_IWUSR);
 }
 
 PartialFile::~PartialFile() {
@@ -274,6 +321,7 @@ PartialFile::~PartialFile() {
 }
 
 void PartialFile::commit() {
+  if (const auto rights = rightsOf(target_)) giveRights(locked_, *rights, 0);
   if (const int error = flush(partial_)) refuse(shown_, error);
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) refuse(shown_, errno);
   committed_ = true;
@@ -342,16 +390,18 @@ void removePartialFilesOnSignals() {
 }
 
 std::string readFile(const std::string& path, std::size_t most_bytes) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rbe"), std::fclose);
-  if (!file) refuseToRead(path, errno);
+  // Without waiting: a pipe into which nobody writes would hold the open itself up for ever.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  if (descriptor < 0) refuseToRead(path, errno);
+  const std::shared_ptr<void> closed(nullptr, [descriptor](void*) { ::close(descriptor); });
+  requireReadable(path, descriptor);
   std::string text;
   std::array<char, 65536> block{};
-  while (const std::size_t count = std::fread(block.data(), 1, block.size(), file.get())) {
+  while (const std::size_t count = readBlock(path, descriptor, block)) {
     text.append(block.data(), count);
     if (text.size() <= most_bytes) continue;
     throw FileError(path + ": has more than the " + std::to_string(most_bytes) + " bytes that are allowed");
   }
-  if (std::ferror(file.get()) != 0) refuseToRead(path, errno);  // a folder, for instance
   return text;
 }
 

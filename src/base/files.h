@@ -16,11 +16,13 @@ class FileError : public std::runtime_error {
 /// A file that is being written under a temporary name beside its target. commit() puts it in the target's
 /// place in one step; without it the temporary file disappears again. So the target is the old file, the new
 /// one, or absent, whatever happens in between. The temporary file is locked (flock) for as long as its process lives:
-/// the first PartialFile that another process makes in this folder removes those that nobody holds any more.
+/// the first PartialFile that another process makes in this folder removes those that nobody holds any more. The new
+/// file has the permissions of the one it replaces.
 class PartialFile {
  public:
-  /// Creates `<target>.<16 random hexadecimal digits>.partial`, empty. Throws FileError naming `target` when its
-  /// folder does not exist or cannot be written, or when the target is something else than a regular file.
+  /// Creates `<target>.<16 random hexadecimal digits>.visual_localization.partial`, empty. Throws FileError naming
+  /// `target` when its folder does not exist or cannot be written, or when the target is something else than a regular
+  /// file.
   explicit PartialFile(const std::string& target);
   ~PartialFile();
   PartialFile(const PartialFile&) = delete;
@@ -44,7 +46,8 @@ class PartialFile {
   bool committed_ = false;
 };
 
-/// Keeps other processes that ask for the same from writing a file, by the locked file `<target>.lock.partial`. It
+/// Keeps other processes that ask for the same from writing a file, by the locked file
+/// `<target>.lock.visual_localization.partial`. It
 /// disappears with this object. What a killed process leaves behind does not hold anybody up.
 class OutputLock {
  public:
@@ -71,8 +74,9 @@ void writeFile(const std::string& path, const std::string& content);
 /// SIGTERM, and lets a write beyond the file size limit fail as an error instead of ending the process.
 void removePartialFilesOnSignals();
 
-/// The whole content of a file, or of a pipe, which can be read only once. Throws FileError, also when it has more than
-/// `most_bytes`: whoever knows what a file may hold need not take memory for what it does.
+/// The whole content of a file, or of a pipe, which can be read only once and into which somebody must write within 10
+/// s. Throws FileError, also for a device, and when it has more than `most_bytes`: whoever knows what a file may hold
+/// need not take memory for what it does.
 std::string readFile(const std::string& path, std::size_t most_bytes = std::numeric_limits<std::size_t>::max());
 
 }  // namespace visual_localization

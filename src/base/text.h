@@ -20,9 +20,10 @@ std::size_t characterBorder(const std::string& text, std::size_t at);
 /// The end of `text`, not longer than `most` bytes, without half a character at its front.
 std::string lastCharacters(const std::string& text, std::size_t most);
 
-/// Foreign text for a message of one line: control characters become spaces, and only so many bytes are shown, without
-/// half a character of UTF-8 at the end.
-std::string oneLine(std::string text, std::size_t most = 300);
+/// Foreign text for a message of one line, on a terminal, in a log or in an answer: control characters become spaces,
+/// what is no UTF-8, turns the order of the text or cannot be seen becomes '?', and only so many bytes are shown,
+/// without half a character at the end.
+std::string oneLine(const std::string& text, std::size_t most = 300);
 
 /// The elements of a list of texts with `separator` between them.
 template <class Texts>
@@ -35,10 +36,11 @@ std::string joined(const Texts& texts, const std::string& separator = ", ") {
   return all;
 }
 
-/// A field of a CSV file in quotes (RFC 4180).
+/// Foreign text as a field of a CSV file, in quotes (RFC 4180): as oneLine() shows it, and with an apostrophe in front
+/// where a spreadsheet would run it as a formula.
 std::string csvQuoted(const std::string& text);
 
-/// A field of a CSV file, in quotes where it needs them.
+/// The same in quotes only where it needs them.
 std::string csvField(const std::string& text);
 
 /// The fields of a line of a CSV file that has no quotes.

@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 
 const char* const kExperiment = "/experiment.yaml";
 const char* const kProvenance = "/provenance.csv";
+constexpr std::size_t kLargestResult_bytes = std::size_t{256} << 20U;
 
 /// The part of an experiment's YAML that decides about results: no comments, no words for the report.
 std::string decisivePart(const std::string& yaml, const std::string& path) {
@@ -64,11 +65,12 @@ void ResultFolder::requireSameOrigin() const {
     throw ResultError(path_ + ": is not a folder of results (" + (name + 1) + " is missing); choose another folder");
   }
   const std::string experiment = path_ + kExperiment;
-  if (decisivePart(readFile(experiment), experiment) != decisivePart(yaml_, experiment)) {
+  if (decisivePart(readFile(experiment, parameters::kLargestYaml_bytes), experiment) !=
+      decisivePart(yaml_, experiment)) {
     throw ResultError(path_ +
                       ": holds results of another configuration (experiment.yaml differs); choose another folder");
   }
-  if (readFile(path_ + kProvenance) != provenance_) {
+  if (readFile(path_ + kProvenance, kLargestResult_bytes) != provenance_) {
     throw ResultError(
         path_ + ": holds results of other rounds or another version (provenance.csv differs); choose another folder");
   }
@@ -98,7 +100,7 @@ void ResultFolder::save(std::size_t pair, std::size_t method, const UnitResult& 
 UnitResult ResultFolder::load(std::size_t pair, std::size_t method) const {
   const std::string path = unitPath(pair, method);
   try {
-    return parseUnit(readFile(path));
+    return parseUnit(readFile(path, kLargestResult_bytes));
   } catch (const FileError& error) {
     throw ResultError(error.what());
   } catch (const std::runtime_error& error) {

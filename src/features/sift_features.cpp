@@ -108,7 +108,7 @@ void SiftConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"sift/sigma", "px", "blur of the first scale"}, sigma_px, 0.5, 10.0);
   visitor.integer({"sift/max_features", "1",
                    "keep at most this number of features, the strongest; 0: " + std::to_string(kMostFeatures)},
-                  max_features, 0, 100000);
+                  max_features, 0, kMostFeatures);
 }
 
 const std::vector<std::string>& siftBackends() {

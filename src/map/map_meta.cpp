@@ -1,7 +1,10 @@
+#include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "features/image_size.h"
 #include "map/map_schema.h"
@@ -111,7 +114,38 @@ std::optional<SensorMount> takeMount(ParameterValues& meta, const std::string& s
   return mount;
 }
 
-Mask takeMask(ParameterValues& meta, std::size_t session, const cv::Size& size, const MaskBits& masks) {
+/// Of masks that differ, in memory; packed they are small.
+void requireMasks(std::size_t count, const cv::Size& size) {
+  constexpr std::size_t kMost_bytes = std::size_t{256} << 20U;
+  const std::size_t most = kMost_bytes / static_cast<std::size_t>(size.area());
+  if (count <= most) return;
+  throw std::runtime_error("it has more than " + std::to_string(most) + " different masks of " +
+                           std::to_string(size.width) + "x" + std::to_string(size.height) +
+                           " pixels, which take 256 MiB");
+}
+
+/// The masks of a map. Sessions of one camera share theirs; what all take together is bounded.
+class DecodedMasks {
+ public:
+  explicit DecodedMasks(const cv::Size& size) : size_(size) {}
+
+  Mask of(const std::vector<std::uint8_t>& bits) {
+    const auto known = masks_.find(&bits);
+    if (known != masks_.end()) return known->second;
+    requireMasks(masks_.size() + 1, size_);
+    return masks_[&bits] = unpackMask({bits.data(), bits.size()}, size_);
+  }
+
+ private:
+  struct ByContent {
+    bool operator()(const std::vector<std::uint8_t>* a, const std::vector<std::uint8_t>* b) const { return *a < *b; }
+  };
+
+  cv::Size size_;
+  std::map<const std::vector<std::uint8_t>*, Mask, ByContent> masks_;
+};
+
+Mask takeMask(ParameterValues& meta, std::size_t session, const MaskBits& masks, DecodedMasks& decoded) {
   const std::string key = sessionKey(session);
   const auto bits = masks.find(static_cast<std::int64_t>(session));
   if ((meta.count(key + kMask) == 0) != (bits == masks.end())) {
@@ -122,19 +156,33 @@ Mask takeMask(ParameterValues& meta, std::size_t session, const cv::Size& size, 
   if (take<std::int64_t>(meta, key + kMask) != crc32Of(bytes)) {
     throw std::runtime_error("the mask of " + key + " does not agree with its checksum");
   }
-  return unpackMask(bytes, size);
+  return decoded.of(bits->second);
+}
+
+void requireName(const std::string& key, const std::string& name) {
+  if (name.size() <= kMaxNameBytes) return;
+  throw std::runtime_error("the name of " + key + " has " + std::to_string(name.size()) + " bytes, at most " +
+                           std::to_string(kMaxNameBytes) + " are allowed");
+}
+
+void requireSessions(std::size_t count) {
+  if (count <= kMaxSessions) return;
+  throw std::runtime_error("it has more than the " + std::to_string(kMaxSessions) + " sessions that are allowed");
 }
 
 std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::Size& size, const MaskBits& masks) {
   std::vector<Session> sessions;
+  DecodedMasks decoded(size);
   std::size_t used = 0;
   while (meta.count(sessionKey(sessions.size())) != 0) {
+    requireSessions(sessions.size() + 1);
     const std::string key = sessionKey(sessions.size());
     Session session{take<std::string>(meta, key)};
+    requireName(key, session.name);
     if (version >= kSinceCameras) {
       session.camera = takeCamera(meta, key);
       session.mount = takeMount(meta, key);
-      session.mask = takeMask(meta, sessions.size(), size, masks);
+      session.mask = takeMask(meta, sessions.size(), masks, decoded);
     }
     if (!session.mask.empty()) ++used;
     sessions.push_back(std::move(session));
@@ -165,9 +213,12 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
   meta["package_version"] = std::string(VISUAL_LOCALIZATION_VERSION);
   meta[kGeometryCount] = static_cast<std::int64_t>(geometry_count);
   for (std::size_t i = 0; i < header.history.size(); ++i) meta[kHistory + std::to_string(i)] = header.history[i];
+  requireSessions(header.sessions.size());
+  std::set<std::vector<std::uint8_t>> masks;
   for (std::size_t i = 0; i < header.sessions.size(); ++i) {
     const Session& session = header.sessions[i];
     const std::string key = sessionKey(i);
+    requireName(key, session.name);
     meta[key] = session.name;
     if (session.camera) {
       for (const auto& [name, value] : toValues(*session.camera)) meta[key + kCamera + name] = value;
@@ -176,7 +227,8 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
       for (const auto& [name, value] : toValues(*session.mount)) meta[key + kMount + name] = value;
     }
     if (session.mask.empty()) continue;
-    const std::vector<std::uint8_t> bits = packMask(session.mask);
+    const std::vector<std::uint8_t>& bits = *masks.insert(packMask(session.mask)).first;
+    requireMasks(masks.size(), header.image_size);
     meta[key + kMask] = crc32Of({bits.data(), bits.size()});
   }
   return meta;

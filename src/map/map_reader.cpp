@@ -39,6 +39,10 @@ ParameterValues readMeta(const sqlite::Database& database, map_rows::Budget& bud
     const std::string key = row.text(0);
     // The pages of a damaged tree may lead to the same rows without end.
     if (!meta.empty() && key <= meta.rbegin()->first) throw Refusal("is damaged: its meta values are not in order");
+    if (meta.size() == map_schema::kMaxMetaValues) {
+      throw Refusal("has more than the " + std::to_string(map_schema::kMaxMetaValues) +
+                    " meta values that are allowed");
+    }
     const ParameterValue value = metaValue(row);
     const auto* text = std::get_if<std::string>(&value);
     budget.spend(key.size() + (text == nullptr ? 0 : text->size()));

@@ -23,7 +23,11 @@ namespace visual_localization::map_schema {
 /// "vlmp" in the file's header (PRAGMA application_id): tells a map from any other SQLite file.
 constexpr std::int64_t kApplicationId = 0x766C6D70;
 constexpr std::int64_t kMaxImages = 100'000'000;
-constexpr std::int64_t kMaxFeaturesPerImage = 1'000'000;
+constexpr std::int64_t kMaxFeaturesPerImage =
+    SiftConfig::kMostFeatures;  ///< the time to match two images grows with its square
+constexpr std::size_t kMaxSessions = 10'000;
+constexpr std::size_t kMaxNameBytes = 1000;      ///< of a session; each image that is exported has one
+constexpr std::size_t kMaxMetaValues = 400'000;  ///< a session has about 30
 constexpr std::size_t kHistogramBytes = GlobalFeatures::kSize * sizeof(float);
 constexpr std::size_t kKeypointBytes = 16;
 /// Of the largest row that may be read: the features of one image. Its landmarks are smaller.

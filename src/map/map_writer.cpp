@@ -73,7 +73,7 @@ class MapWriter::Tables {
     if (const auto reason = whyTooLarge(header.image_size)) throw sqlite::Error("its images are too large: " + *reason);
     // Behind each other in the file, because they are read together when the map is opened.
     for (std::size_t i = 0; i < poses_.size(); ++i) writePose(i);
-    writeMeta(map_schema::toMeta(header, geometry_count_));
+    writeMeta(metaOf(header));
     writeMasks(header.sessions);
     looks_.reset();
     pose_row_.reset();
@@ -121,6 +121,14 @@ class MapWriter::Tables {
     if (image.sift.size() <= static_cast<std::size_t>(map_schema::kMaxFeaturesPerImage)) return;
     throw sqlite::Error("image " + std::to_string(poses_.size()) + " has " + std::to_string(image.sift.size()) +
                         " features, the limit is " + std::to_string(map_schema::kMaxFeaturesPerImage));
+  }
+
+  ParameterValues metaOf(const MapHeader& header) const {
+    try {
+      return map_schema::toMeta(header, geometry_count_);
+    } catch (const std::runtime_error& error) {
+      throw sqlite::Error(error.what());
+    }
   }
 
   void writePose(std::size_t i) {

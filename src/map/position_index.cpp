@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -18,13 +19,34 @@ constexpr double kSmallestCell_m = 0.05;
 constexpr double kMargin = 0.1;              ///< of the range, beyond the outermost positions: particles stray
 constexpr std::size_t kMostCandidates = 24;  ///< beyond, a tree is as fast
 
-/// The positions in the form that nanoflann asks for.
+/// Of more on exactly one spot nobody asks: those with the higher indices would make each search look at all of them.
+constexpr std::size_t kMostOnOneSpot = 1024;
+
+/// All positions, but for those beyond kMostOnOneSpot, in order of index.
+std::vector<std::uint32_t> soughtOf(const std::vector<Eigen::Vector2d>& positions_m) {
+  std::vector<std::uint32_t> order(positions_m.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::vector<std::uint32_t> by_spot = order;
+  const auto key = [&](std::uint32_t i) { return std::tuple(positions_m[i].x(), positions_m[i].y(), i); };
+  std::sort(by_spot.begin(), by_spot.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+  std::vector<std::uint32_t> sought;
+  for (std::size_t i = 0; i < by_spot.size(); ++i) {
+    const bool too_many = i >= kMostOnOneSpot && positions_m[by_spot[i]] == positions_m[by_spot[i - kMostOnOneSpot]];
+    if (!too_many) sought.push_back(by_spot[i]);
+  }
+  if (sought.size() == order.size()) return order;
+  std::sort(sought.begin(), sought.end());
+  return sought;
+}
+
+/// The positions that are sought in the form that nanoflann asks for.
 struct Points {
   std::vector<Eigen::Vector2d> positions_m;
+  std::vector<std::uint32_t> sought;
 
-  std::size_t kdtree_get_point_count() const { return positions_m.size(); }
+  std::size_t kdtree_get_point_count() const { return sought.size(); }
   double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return positions_m[i][static_cast<Eigen::Index>(axis)];
+    return positions_m[sought[i]][static_cast<Eigen::Index>(axis)];
   }
   template <class Box>
   bool kdtree_get_bbox(Box&) const {
@@ -38,7 +60,8 @@ class OrderedResults {
  public:
   using DistanceType = double;
 
-  OrderedResults(std::size_t capacity, std::vector<Neighbour>& found) : capacity_(capacity), found_(found) {
+  OrderedResults(const std::vector<std::uint32_t>& sought, std::size_t capacity, std::vector<Neighbour>& found)
+      : sought_(sought), capacity_(capacity), found_(found) {
     found_.clear();
     found_.reserve(capacity + 1);
   }
@@ -46,7 +69,7 @@ class OrderedResults {
   std::size_t size() const { return found_.size(); }
   bool full() const { return found_.size() == capacity_; }
   bool addPoint(double squared_m2, std::uint32_t index) {
-    const Neighbour candidate{index, squared_m2};
+    const Neighbour candidate{sought_[index], squared_m2};
     const auto nearer = [](const Neighbour& a, const Neighbour& b) {
       return std::tie(a.distance_m, a.image) < std::tie(b.distance_m, b.image);
     };
@@ -65,6 +88,7 @@ class OrderedResults {
   }
 
  private:
+  const std::vector<std::uint32_t>& sought_;
   std::size_t capacity_;
   std::vector<Neighbour>& found_;
 };
@@ -170,7 +194,7 @@ std::optional<NearestGrid::Found> NearestGrid::nearest(const Eigen::Vector2d& po
 class PositionIndex::Tree {
  public:
   explicit Tree(std::vector<Eigen::Vector2d> positions_m)
-      : points_{std::move(positions_m)}, tree_(2, points_, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
+      : points_(pointsOf(std::move(positions_m))), tree_(2, points_, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
     // Needed up to nanoflann 1.3, where the constructor leaves the tree empty.
     tree_.buildIndex();
   }
@@ -182,6 +206,7 @@ class PositionIndex::Tree {
     std::vector<std::uint32_t> indices;
     IndicesWithin results(radius_m * radius_m, most, indices);
     tree_.findNeighbors(results, centre_m.data(), {});
+    for (std::uint32_t& index : indices) index = points_.sought[index];
     std::sort(indices.begin(), indices.end());
     return indices;
   }
@@ -193,7 +218,7 @@ class PositionIndex::Tree {
   }
 
   void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
-    OrderedResults results(std::min(count, points_.positions_m.size()), found);
+    OrderedResults results(points_.sought, std::min(count, points_.sought.size()), found);
     tree_.findNeighbors(results, position_m.data(), {});
     results.finish();
   }
@@ -206,6 +231,11 @@ class PositionIndex::Tree {
 
  private:
   using Metric = nanoflann::L2_Simple_Adaptor<double, Points>;
+
+  static Points pointsOf(std::vector<Eigen::Vector2d> positions_m) {
+    std::vector<std::uint32_t> sought = soughtOf(positions_m);
+    return {std::move(positions_m), std::move(sought)};
+  }
 
   Points points_;
   nanoflann::KDTreeSingleIndexAdaptor<Metric, Points, 2, std::uint32_t> tree_;

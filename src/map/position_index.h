@@ -56,8 +56,8 @@ class PositionIndex {
 
   /// The nearest. Throws std::invalid_argument when `position_m` is not finite.
   Neighbour nearest(const Eigen::Vector2d& position_m) const;
-  /// Into `found`: the `count` nearest, closest first; fewer when there are fewer. A position that is not finite has
-  /// none.
+  /// Into `found`: the `count` nearest, closest first; fewer when there are fewer, and of exactly one spot the first
+  /// 1024 at most. A position that is not finite has none.
   void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const;
 
   /// How far a search among the nearest positions goes.

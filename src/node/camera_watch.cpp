@@ -1,5 +1,6 @@
 #include "node/camera_watch.h"
 
+#include <exception>
 #include <utility>
 
 #include "ros/message_readers.h"
@@ -73,22 +74,24 @@ void CameraWatch::findMount() {
   try {
     localizer_.setMount(mount);
     say_(false, "Camera mounting from /tf_static: " + base_frame_ + " to " + camera_frame_);
-  } catch (const MountError& error) {
+  } catch (const std::exception& error) {
     say_(true, "Mount of the camera refused: /tf_static: " + std::string(error.what()));
   }
 }
 
 void CameraWatch::onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  const bool calibrated = isCalibrated(*info, rectified_);
+  if (!calibrated && last_) return;                     // of a second publisher
   if (last_ && sameCalibration(*info, *last_)) return;  // comes with every image
-  last_ = info;
+  if (calibrated) last_ = info;
   try {
     if (const std::optional<CameraModel> camera = toCamera(*info, rectified_)) {
       use(*camera, topic_);
     } else {
       refuse(topic_ + ": the camera is not calibrated: its matrix is zero");
     }
-  } catch (const CameraError& error) {
+  } catch (const std::exception& error) {
     refuse(topic_ + ": " + error.what());
   }
   report();

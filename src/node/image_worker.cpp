@@ -12,6 +12,7 @@
 #include "base/time.h"
 #include "node/localizer_diagnostics.h"
 #include "node/message_conversions.h"
+#include "node/stamps.h"
 #include "visual_localization/parameters/parameters.h"
 #include "visual_localization/ros/image_conversion.h"
 
@@ -65,9 +66,11 @@ void ImageSource::shutdown() {
   compressed_.shutdown();
 }
 
-std::string ImageSource::description() const {
+std::string ImageSource::description() {
   const unsigned publishers = compressed_ ? compressed_.getNumPublishers() : by_plugin_.getNumPublishers();
-  return topic() + " (publishers: " + std::to_string(publishers) + ")";
+  const std::string words = topic() + " (publishers: " + std::to_string(publishers) + ")";
+  if (publishers > 0) return words;
+  return words + published_.hint(topic(), compressed_ ? "sensor_msgs/CompressedImage" : "sensor_msgs/Image");
 }
 
 StampMonitor::Verdict StampMonitor::judge(std::int64_t stamp_ns) {
@@ -117,12 +120,15 @@ void ImageWorker::count(std::uint64_t ImageCounts::*images) {
 
 void ImageWorker::work() {
   while (const auto image = queue_.pop()) {
-    if (const auto localized = localize(*image)) publish(*localized);
+    guarded(log_, "image", [&] {
+      if (const auto localized = localize(*image)) publish(*localized);
+    });
   }
 }
 
 std::optional<LocalizedImage> ImageWorker::localize(const ReceivedImage& image) {
   try {
+    requireUsableStamp(image.header.stamp);
     LocalizedImage localized{{}, image.header, !image.header.stamp.isZero(), image.decode()};
     if (!localizer_.hasMap()) {
       count(&ImageCounts::without_map);
@@ -135,6 +141,7 @@ std::optional<LocalizedImage> ImageWorker::localize(const ReceivedImage& image) 
     if (!localized.has_stamp) {
       log_.warn("no stamp", "Images without a stamp: the time of processing is used");
       localized.header.stamp = ros::Time::now();
+      requireUsableStamp(localized.header.stamp);
     }
     const auto stamp_ns = static_cast<std::int64_t>(localized.header.stamp.toNSec());
     localized.result = localizer_.process(stamp_ns, localized.grey).value();  // a map is never unloaded

@@ -16,6 +16,7 @@
 #include <ros/time.h>
 #include <std_msgs/Header.h>
 
+#include "node/published_topics.h"
 #include "node/shared_localizer.h"
 #include "node/throttled_log.h"
 
@@ -40,14 +41,15 @@ class ImageSource {
   /// Returns after a callback that is running.
   void shutdown();
   const std::string& topic() const { return topic_; }
-  /// For people: the topic and how many publish it.
-  std::string description() const;
+  /// For people: the topic and how many publish it, and what else might be meant when nobody does.
+  std::string description();
 
  private:
   image_transport::ImageTransport image_transport_;
   image_transport::Subscriber by_plugin_;
   ros::Subscriber compressed_;
   std::string topic_;  ///< kept, because a subscriber that is shut down has none
+  PublishedTopics published_;
 };
 
 /// A queue of one between threads: a newer item replaces one that nobody has taken yet, so that a slow

@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "node/message_conversions.h"
 #include "node/node_config.h"
+#include "node/stamps.h"
 #include "ros/message_readers.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
@@ -22,6 +23,7 @@ namespace visual_localization {
 namespace {
 
 constexpr std::uint32_t kOdometryQueue = 200;  ///< two seconds at 100 Hz
+constexpr std::size_t kLongestLine = 10'000;   ///< of the log: a refusal may list all parameters
 constexpr double kTimerPeriod_s = 1.0;         ///< of diagnostics, and of the status while there is no map
 
 /// On half of the cores: the other half is for the images.
@@ -65,7 +67,7 @@ void LocalizerNodelet::onInit() {
   } catch (const std::exception& error) {
     // The loader frees the callback queues of a nodelet that does not start before it frees the nodelet itself.
     stop();
-    NODELET_FATAL_STREAM(getName() << " does not start: " << error.what());
+    NODELET_FATAL_STREAM(getName() << " does not start: " << oneLine(error.what(), kLongestLine));
     throw nodelet::Exception(error.what());
   }
 }
@@ -107,16 +109,18 @@ void LocalizerNodelet::start() {
   camera_ = std::make_unique<CameraWatch>(node, parameters_.node, node.resolveName("image"), *localizer_, *diagnostics_,
                                           [this](bool warning, const std::string& text) {
                                             if (warning) {
-                                              NODELET_WARN_STREAM(text);
+                                              NODELET_WARN_STREAM(oneLine(text, kLongestLine));
                                             } else {
-                                              NODELET_INFO_STREAM(text);
+                                              NODELET_INFO_STREAM(oneLine(text, kLongestLine));
                                             }
                                           });
   images_ =
       std::make_unique<ImageSource>(node, private_node, parameters_.node.image_transport, [this](ReceivedImage image) {
-        diagnostics_->imageArrived();
-        camera_->imageFrameIs(image.header.frame_id);
-        worker_->push(std::move(image));
+        guarded(log_, "image", [&] {
+          diagnostics_->imageArrived();
+          camera_->imageFrameIs(image.header.frame_id);
+          worker_->push(std::move(image));
+        });
       });
   useFirstMap();
   initial_pose_ = node.subscribe("initialpose", 1, &LocalizerNodelet::onInitialPose, this);
@@ -154,7 +158,7 @@ void LocalizerNodelet::offerServices() {
   reconfigure_ = std::make_unique<ReconfigureServer>(
       private_node, parameters_,
       [this](const NodeParameters& parameters, const ParameterValues& changed) { configure(parameters, changed); },
-      [this](const std::string& reason) { NODELET_WARN_STREAM("Parameters: " << reason); });
+      [this](const std::string& reason) { NODELET_WARN_STREAM("Parameters: " << oneLine(reason, kLongestLine)); });
   service_spinner_ = std::make_unique<ros::AsyncSpinner>(1, &service_queue_);
   service_spinner_->start();
   sessions_->offer(getPrivateNodeHandle());
@@ -174,10 +178,11 @@ void LocalizerNodelet::onInitialPose(const geometry_msgs::PoseWithCovarianceStam
 
 void LocalizerNodelet::onOdometry(const nav_msgs::OdometryConstPtr& odometry) {
   try {
+    requireUsableStamp(odometry->header.stamp);
     const auto stamp_ns = static_cast<std::int64_t>(odometry->header.stamp.toNSec());
     localizer_->addOdometry(
         toReading(*odometry, stamp_ns, parameters_.node.base_frame_id, parameters_.node.global_frame_id));
-  } catch (const std::invalid_argument& error) {
+  } catch (const std::exception& error) {
     log_.warn("odometry", "Odometry on " + odometry_.getTopic() + " refused: " + error.what());
   }
 }
@@ -234,13 +239,15 @@ void LocalizerNodelet::configure(const NodeParameters& parameters, const Paramet
   publisher_->configure(parameters);
   std::vector<std::string> settings;
   for (const auto& [name, value] : changed) settings.push_back(name + " = " + parameters::toString(value));
-  NODELET_INFO_STREAM("Parameters changed: " << joined(settings));
+  NODELET_INFO_STREAM("Parameters changed: " << oneLine(joined(settings), kLongestLine));
 }
 
 void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {
-  if (!localizer_->hasMap()) publisher_->publishState(LocalizationState::kNoMap, worker_->counts());
-  watchCamera();
-  diagnostics_->publish();
+  guarded(log_, "state", [this] {
+    if (!localizer_->hasMap()) publisher_->publishState(LocalizationState::kNoMap, worker_->counts());
+    watchCamera();
+  });
+  guarded(log_, "diagnostics", [this] { diagnostics_->publish(); });
 }
 
 /// Without images the robot may be anywhere by now: the last state no longer holds.
@@ -260,7 +267,7 @@ void LocalizerNodelet::watchCamera() {
 std::size_t LocalizerNodelet::useMap(const std::string& path) {
   const std::string file = mapFileBelow(parameters_.node.map_directory, path);
   const auto map = loadMap(file, parameters_.node.mapLoading([name = getName()](const std::string& reason) {
-    ROS_WARN_STREAM_NAMED(name, "Map " << reason);  // the map may outlive the nodelet
+    ROS_WARN_STREAM_NAMED(name, "Map " << oneLine(reason, kLongestLine));  // the map may outlive the nodelet
   }));
   localizer_->setMap(map);
   camera_->mapIs(map->header());

@@ -11,13 +11,13 @@
 #include <cv_bridge/cv_bridge.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <sensor_msgs/image_encodings.h>
-#include <tf2/exceptions.h>
 #include <tf2/utils.h>
 #include <tf2_geometry_msgs/tf2_geometry_msgs.h>
 
 #include "base/time.h"
 #include "node/drawings.h"
 #include "node/message_conversions.h"
+#include "node/stamps.h"
 #include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
@@ -77,19 +77,23 @@ tf2::Transform SlidingCorrection::after(double elapsed_s, const tf2::Transform& 
   return *shown_;
 }
 
-TransformPublisher::TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node)
+TransformPublisher::TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node, ThrottledLog& log)
     : config_(parameters.node),
+      log_(log),
       between_images_(config_.tf_mode == "map_to_odom" && config_.tf_rate_hz > 0.0),
       tolerance_s_(config_.transform_tolerance_s),
       image_timeout_s_(config_.image_timeout_s),
+      transforms_(config_.odom_frame_id, config_.base_frame_id, log),
       odometry_(parameters.localizer.odometry),
       correction_(config_.tf_smoothing_s, odometry_) {
-  if (config_.tf_mode == "map_to_odom") listener_ = std::make_unique<tf2_ros::TransformListener>(buffer_, node);
+  if (config_.tf_mode == "map_to_odom") listener_.emplace(node, transforms_, log);
   if (!between_images_) return;
   ros::NodeHandle timer_node(node);
   timer_node.setCallbackQueue(&queue_);
-  timer_ = timer_node.createSteadyTimer(ros::WallDuration(1.0 / config_.tf_rate_hz),
-                                        [this](const ros::SteadyTimerEvent&) { broadcastBetween(ros::Time::now()); });
+  timer_ =
+      timer_node.createSteadyTimer(ros::WallDuration(1.0 / config_.tf_rate_hz), [this](const ros::SteadyTimerEvent&) {
+        guarded(log_, "transform", [this] { broadcastBetween(ros::Time::now()); });
+      });
   spinner_ = std::make_unique<ros::AsyncSpinner>(1, &queue_);
   spinner_->start();
 }
@@ -108,7 +112,7 @@ void TransformPublisher::configure(const NodeParameters& parameters) {
 }
 
 void TransformPublisher::forget() {
-  buffer_.clear();
+  transforms_.forget();
   last_stamp_ = ros::Time();
   forgetPose();
 }
@@ -172,11 +176,9 @@ void TransformPublisher::broadcastBetween(const ros::Time& now) {
 }
 
 std::optional<tf2::Transform> TransformPublisher::baseInOdom(const ros::Time& stamp, std::string& reason) const {
-  const tf2::BufferCore& transforms = buffer_;
-  const bool is_known = transforms.canTransform(config_.odom_frame_id, config_.base_frame_id, ros::Time());
+  const bool is_known = transforms_.knows(ros::Time());
   const auto deadline = std::chrono::steady_clock::now() + (is_known ? kOdometryWait : kUnknownOdometryWait);
-  while (!transforms.canTransform(config_.odom_frame_id, config_.base_frame_id, stamp) &&
-         std::chrono::steady_clock::now() < deadline) {
+  while (!transforms_.knows(stamp) && std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(kOdometryPoll);
   }
   return lookUpBaseInOdom(stamp, reason);
@@ -184,13 +186,10 @@ std::optional<tf2::Transform> TransformPublisher::baseInOdom(const ros::Time& st
 
 std::optional<tf2::Transform> TransformPublisher::lookUpBaseInOdom(const ros::Time& stamp, std::string& reason) const {
   try {
-    const tf2::BufferCore& transforms = buffer_;
-    tf2::Transform base_in_odom;
-    tf2::fromMsg(transforms.lookupTransform(config_.odom_frame_id, config_.base_frame_id, stamp).transform,
-                 base_in_odom);
+    const tf2::Transform base_in_odom = transforms_.lookUp(stamp);
     reason.clear();
     return base_in_odom;
-  } catch (const tf2::TransformException& error) {
+  } catch (const std::runtime_error& error) {  // tf2's, and those of sums of times
     reason = "no transform from " + config_.odom_frame_id + " to " + config_.base_frame_id + ": " + error.what();
     return std::nullopt;
   }
@@ -202,11 +201,8 @@ void TransformPublisher::broadcast(const tf2::Transform& child_in_map, const std
   message.header.frame_id = config_.global_frame_id;
   message.child_frame_id = child;
   message.transform = tf2::toMsg(child_in_map);
-  try {
-    message.header.stamp = stamp + ros::Duration(tolerance_s_);
-  } catch (const std::runtime_error&) {
-    message.header.stamp = stamp;  // at the end of what a stamp can hold
-  }
+  requireUsableStamp(stamp);
+  message.header.stamp = later(stamp, tolerance_s_);
   broadcaster_.sendTransform(message);
 }
 
@@ -236,7 +232,7 @@ LocalizerPublisher::LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHan
     : config_(parameters.node),
       diagnostics_(diagnostics),
       log_(log),
-      transform_(parameters, node),
+      transform_(parameters, node, log),
       image_transport_(private_node) {
   constexpr bool kLatched = true;
   pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kMessagesQueued);

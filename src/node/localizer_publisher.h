@@ -16,9 +16,7 @@
 #include <ros/steady_timer.h>
 #include <ros/time.h>
 #include <tf2/LinearMath/Transform.h>
-#include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_broadcaster.h>
-#include <tf2_ros/transform_listener.h>
 #include <visual_localization/LocalizationStatus.h>
 
 #include "node/drawings.h"
@@ -26,6 +24,7 @@
 #include "node/localizer_diagnostics.h"
 #include "node/markers.h"
 #include "node/node_config.h"
+#include "node/robot_transforms.h"
 #include "node/throttled_log.h"
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/odometry.h"
@@ -71,7 +70,8 @@ class SlidingCorrection {
 /// the last one that might.
 class TransformPublisher {
  public:
-  TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node);
+  /// `log` must outlive it.
+  TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node, ThrottledLog& log);
   ~TransformPublisher();
 
   /// What can change while it runs: tolerance, timeout and what odometry drifts. From any thread.
@@ -94,11 +94,12 @@ class TransformPublisher {
   void broadcast(const tf2::Transform& child_in_map, const std::string& child, const ros::Time& stamp);
 
   const NodeConfig config_;
+  ThrottledLog& log_;
   const bool between_images_;  ///< instead of with them
   std::atomic<double> tolerance_s_;
   std::atomic<double> image_timeout_s_;
-  tf2_ros::Buffer buffer_;
-  std::unique_ptr<tf2_ros::TransformListener> listener_;  ///< only with odometry
+  RobotTransforms transforms_;
+  std::optional<RobotTransformListener> listener_;  ///< only with odometry
   tf2_ros::TransformBroadcaster broadcaster_;
   ros::Time last_stamp_;
   std::string last_reason_;  ///< why nothing was broadcast for that stamp

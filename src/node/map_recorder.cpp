@@ -20,6 +20,7 @@
 #include "base/text.h"
 #include "base/time.h"
 #include "node/node_config.h"
+#include "node/stamps.h"
 #include "ros/message_readers.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
@@ -194,12 +195,14 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
   image_topic_ = node_.resolveName("image");
   bag_.emplace(newSessionBag(config_.folder));
 
+  calibration_ = SingleCalibration(isRectified(image_topic_));
   if (config_.image_transport == "compressed") {
     recordImages<sensor_msgs::CompressedImage>(image_topic_ + "/compressed");
   } else {
     recordImages<sensor_msgs::Image>(image_topic_);
   }
-  record<sensor_msgs::CameraInfo>(cameraInfoTopic(image_topic_), kSlowQueue);
+  record<sensor_msgs::CameraInfo>(cameraInfoTopic(image_topic_), kSlowQueue,
+                                  [this](const sensor_msgs::CameraInfoConstPtr& info) { watchCalibration(*info); });
   record<sensor_msgs::NavSatFix>("fix", kFastQueue, [this](const sensor_msgs::NavSatFixConstPtr& fix) {
     watch_->addFix(toFix(*fix, stampOf(fix->header)));
   });
@@ -214,8 +217,9 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
   updater_.add("recording", this, &MapRecorder::reportRecording);
   updater_.add("session", this, &MapRecorder::reportSession);
   timer_ = node_.createWallTimer(ros::WallDuration(kReportPeriod_s), &MapRecorder::onTimer, this);
-  sync_timer_ = node_.createWallTimer(ros::WallDuration(config_.sync_period_s),
-                                      [this](const ros::WallTimerEvent&) { sync(false); });
+  sync_timer_ = node_.createWallTimer(ros::WallDuration(config_.sync_period_s), [this](const ros::WallTimerEvent&) {
+    guarded(log_, "recording", [this] { sync(false); });
+  });
   service_spinner_.emplace(1, &services_);
   service_spinner_->start();
   looker_ = std::thread([this] { lookAtImages(); });
@@ -240,9 +244,11 @@ void MapRecorder::record(const std::string& name, std::uint32_t queue, Look<Mess
   const std::string topic = node_.resolveName(name);
   const boost::function<void(const boost::shared_ptr<const Message>&)> keep =
       [this, topic, look](const boost::shared_ptr<const Message>& message) {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        write(topic, *message);
-        if (look) look(message);
+        guarded(log_, "recording", [&] {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          write(topic, *message);
+          if (look) look(message);
+        });
       };
   subscribers_.push_back(
       node_.subscribe<Message>(topic, queue, keep, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
@@ -250,11 +256,23 @@ void MapRecorder::record(const std::string& name, std::uint32_t queue, Look<Mess
 
 template <class Message>
 void MapRecorder::recordImages(const std::string& topic) {
+  recorded_topic_ = node_.resolveName(topic);
+  image_type_ = ros::message_traits::datatype<Message>();
   record<Message>(topic, kSlowQueue, [this](const boost::shared_ptr<const Message>& message) {
     images_.add();
     watch_->addImage(stampOf(message->header));
     queue_.push({message->header, [message] { return toGrey(*message); }});
   });
+}
+
+/// What the map builder would say of it, while there is still time. The caller holds the mutex.
+void MapRecorder::watchCalibration(const sensor_msgs::CameraInfo& info) {
+  try {
+    if (!calibration_.add(info)) calibration_trouble_ = "the calibration changes while it records";
+  } catch (const CameraError& error) {
+    calibration_trouble_ = oneLine(error.what());
+  }
+  if (!calibration_trouble_.empty()) log_.warn("calibration", "Calibration of the camera: " + calibration_trouble_);
 }
 
 /// The caller holds the mutex.
@@ -343,8 +361,8 @@ bool MapRecorder::onWriteMap(WriteMap::Request& request, WriteMap::Response& res
 }
 
 void MapRecorder::onTimer(const ros::WallTimerEvent&) {
-  publishWay();
-  updater_.force_update();
+  guarded(log_, "way", [this] { publishWay(); });
+  guarded(log_, "diagnostics", [this] { updater_.force_update(); });
 }
 
 // What the recorder shows: diagnostics, and the way in rviz.
@@ -398,9 +416,12 @@ void MapRecorder::reportRecording(Wrapper& status) {
   if (!disk_trouble_.empty()) {
     status.summary(DiagnosticStatus::ERROR, "Nothing is recorded: " + disk_trouble_);
   } else if (images_.rate_hz() == 0.0) {
-    status.summary(DiagnosticStatus::ERROR, "No images on " + image_topic_);
+    status.summary(DiagnosticStatus::ERROR,
+                   "No images on " + recorded_topic_ + topics_.hint(recorded_topic_, image_type_));
   } else if (!image_trouble_.empty()) {
     status.summary(DiagnosticStatus::WARN, "Unusable image: " + image_trouble_);
+  } else if (!calibration_trouble_.empty()) {
+    status.summary(DiagnosticStatus::WARN, "No map can be made: " + calibration_trouble_);
   } else if (lost_ > 0) {
     status.summary(DiagnosticStatus::WARN,
                    std::to_string(lost_) + " messages lost so far: more came than could be kept");
@@ -414,6 +435,7 @@ void MapRecorder::reportRecording(Wrapper& status) {
   if (!none) status.addf("Free (MB)", "%.0f", static_cast<double>(space.available) * 1e-6);
   status.add("Messages", recorded_);
   status.add("Messages lost", lost_);
+  status.add("Camera", calibration_.camera() ? describe(*calibration_.camera()) : "not calibrated: a map of places");
   status.addf("Images (Hz)", "%.2f", images_.rate_hz());
 }
 

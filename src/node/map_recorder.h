@@ -22,7 +22,9 @@
 #include "bag/bag_writer.h"
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
+#include "node/published_topics.h"
 #include "node/throttled_log.h"
+#include "ros/message_readers.h"
 #include "visual_localization/WriteMap.h"
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/sift_features.h"
@@ -157,6 +159,7 @@ class MapRecorder {
   void record(const std::string& name, std::uint32_t queue, Look<Message> look = {});
   template <class Message>
   void recordImages(const std::string& topic);
+  void watchCalibration(const sensor_msgs::CameraInfo& info);
   void sync(bool at_once);
   void syncBag();
   template <class Message>
@@ -183,6 +186,9 @@ class MapRecorder {
   std::uint64_t lost_ = 0;
   std::string disk_trouble_;
   std::string image_trouble_;
+  SingleCalibration calibration_{false};
+  std::string calibration_trouble_;  ///< that no later message mends
+  PublishedTopics topics_;
   std::size_t published_ = 0;
   // What has its own lock, or does not change.
   std::unique_ptr<SiftExtractor> extractor_;
@@ -190,6 +196,8 @@ class MapRecorder {
   std::thread looker_;
   std::vector<ros::Subscriber> subscribers_;
   std::string image_topic_;
+  std::string recorded_topic_;  ///< with the suffix of its transport
+  std::string image_type_;
   std::string fix_topic_;
   ros::Publisher way_;
   ros::CallbackQueue services_;

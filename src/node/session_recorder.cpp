@@ -333,7 +333,7 @@ void SessionRecorder::record(Session& session, const LocalizedImage& image) cons
 void SessionRecorder::sync(Session& session) {
   try {
     session.bag->sync();
-  } catch (const FileError& error) {
+  } catch (const std::exception& error) {
     log_.error("session", std::string("The session is not recorded: ") + error.what());
   }
 }

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <mutex>
 #include <string>
 #include <utility>
+
+#include "base/text.h"
 
 namespace visual_localization {
 
@@ -28,7 +31,8 @@ class ThrottledLog {
   using Clock = std::chrono::steady_clock;
 
   void add(Severity severity, const std::string& kind, const std::string& text) {
-    if (isDue(kind)) write_(severity, text);
+    constexpr std::size_t kLongest = 2000;
+    if (isDue(kind)) write_(severity, oneLine(text, kLongest));
   }
 
   bool isDue(const std::string& kind) {

@@ -6,6 +6,7 @@
 #include <exception>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <camera_calibration_parsers/parse_ini.h>
@@ -16,6 +17,7 @@
 
 #include "base/files.h"
 #include "base/text.h"
+#include "camera/lens_names.h"
 #include "parameters/yaml_map.h"
 
 namespace visual_localization {
@@ -62,13 +64,6 @@ void readMatrix(const Matrix& matrix, const char* name, std::size_t columns, Int
   camera.cx = matrix[2];
   camera.fy = matrix[columns + 1];
   camera.cy = matrix[columns + 2];
-}
-
-/// A camera without a lens model has no distortion; its name may be left empty then.
-void readDistortion(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
-  if (info.distortion_model.empty() && isZero(info.D)) return;
-  camera.distortion = distortionOf(info.distortion_model);
-  camera.coefficients = info.D;
 }
 
 void requireFull(const sensor_msgs::CameraInfo& info) {
@@ -153,8 +148,12 @@ sensor_msgs::CameraInfo parse(const std::string& content, const std::string& pat
 
 }  // namespace
 
+bool isCalibrated(const sensor_msgs::CameraInfo& info, bool rectified) {
+  return rectified ? !isZero(info.P) : !isZero(info.K);
+}
+
 std::optional<CameraModel> toCamera(const sensor_msgs::CameraInfo& info, bool rectified) {
-  if (rectified ? isZero(info.P) : isZero(info.K)) return std::nullopt;
+  if (!isCalibrated(info, rectified)) return std::nullopt;
   requireFull(info);
   Intrinsics camera;
   camera.size = {static_cast<int>(info.width), static_cast<int>(info.height)};
@@ -162,7 +161,9 @@ std::optional<CameraModel> toCamera(const sensor_msgs::CameraInfo& info, bool re
     readMatrix(info.P, "P", 4, camera);
   } else {
     readMatrix(info.K, "K", 3, camera);
-    readDistortion(info, camera);
+    Lens lens = lensOf(info.distortion_model, info.D);
+    camera.distortion = lens.distortion;
+    camera.coefficients = std::move(lens.coefficients);
   }
   cutOut(info, camera);
   bin(info.binning_x, camera.size.width, camera.fx, camera.cx);
@@ -183,11 +184,32 @@ sensor_msgs::CameraInfo toMessage(const CameraModel& camera) {
   return info;
 }
 
+namespace {
+
+/// Some drivers compute a calibration anew for each image. At 10 000 pixels this is a hundredth of one.
+constexpr double kCalibrationRounding = 1e-6;
+
+template <class Numbers>
+bool almostEqual(const Numbers& a, const Numbers& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](double x, double y) {
+    return std::abs(x - y) <= kCalibrationRounding * std::max({1.0, std::abs(x), std::abs(y)});
+  });
+}
+
+}  // namespace
+
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
-  return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model && a.D == b.D &&
-         a.K == b.K && a.P == b.P && a.binning_x == b.binning_x && a.binning_y == b.binning_y &&
-         a.roi.x_offset == b.roi.x_offset && a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&
-         a.roi.height == b.roi.height;
+  return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model &&
+         almostEqual(a.D, b.D) && almostEqual(a.K, b.K) && almostEqual(a.P, b.P) && a.binning_x == b.binning_x &&
+         a.binning_y == b.binning_y && a.roi.x_offset == b.roi.x_offset && a.roi.y_offset == b.roi.y_offset &&
+         a.roi.width == b.roi.width && a.roi.height == b.roi.height;
+}
+
+bool SingleCalibration::add(const sensor_msgs::CameraInfo& info) {
+  if (first_) return !isCalibrated(info, rectified_) || sameCalibration(info, *first_);
+  camera_ = toCamera(info, rectified_);
+  if (camera_) first_ = info;
+  return true;
 }
 
 CameraModel readCameraFile(const std::string& path) {
@@ -248,14 +270,32 @@ std::string withoutSlash(const std::string& frame) {
   return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
 }
 
+bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform) {
+  constexpr std::size_t kLongestName = 255;
+  const std::string& parent = transform.header.frame_id;
+  const std::string& child = transform.child_frame_id;
+  return !parent.empty() && !child.empty() && parent != child && parent.size() <= kLongestName &&
+         child.size() <= kLongestName;
+}
+
 void StaticTransforms::add(const tf2_msgs::TFMessage& message) {
   for (geometry_msgs::TransformStamped transform : message.transforms) {
     transform.header.frame_id = withoutSlash(transform.header.frame_id);
     transform.child_frame_id = withoutSlash(transform.child_frame_id);
-    const bool named = !transform.header.frame_id.empty() && !transform.child_frame_id.empty() &&
-                       transform.header.frame_id != transform.child_frame_id;
-    if (named && isRigid(transform.transform)) buffer_.setTransform(transform, "tf_static", true);
+    if (!joinsTwoFrames(transform) || !isRigid(transform.transform)) continue;
+    if (isFull(transform)) continue;
+    buffer_.setTransform(transform, "tf_static", true);
   }
+}
+
+/// tf2 never forgets a name.
+bool StaticTransforms::isFull(const geometry_msgs::TransformStamped& transform) {
+  for (const std::string& name : {transform.header.frame_id, transform.child_frame_id}) {
+    if (names_.count(name) != 0) continue;
+    if (names_.size() >= kMostFrames) return true;
+    names_.insert(name);
+  }
+  return false;
 }
 
 std::optional<Eigen::Isometry3d> StaticTransforms::pose(const std::string& base_frame, const std::string& frame) const {

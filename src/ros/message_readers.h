@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 
 #include <Eigen/Geometry>
+#include <geometry_msgs/TransformStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/NavSatFix.h>
@@ -26,8 +29,29 @@ std::optional<CameraModel> toCamera(const sensor_msgs::CameraInfo& info, bool re
 /// Inverse of toCamera(), for images that are not rectified; its header is empty.
 sensor_msgs::CameraInfo toMessage(const CameraModel& camera);
 
-/// Whether two messages say the same, whatever their headers.
+/// Whether its matrix says anything: that of a camera that nobody has calibrated is all zeros.
+bool isCalibrated(const sensor_msgs::CameraInfo& info, bool rectified = false);
+
+/// Whether two messages say the same but for rounding, whatever their headers.
 bool sameCalibration(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b);
+
+/// What many messages of a recording say together: of the camera of all its images. Those that are not calibrated, as
+/// before a driver has read its file or of a second publisher, do not count.
+class SingleCalibration {
+ public:
+  explicit SingleCalibration(bool rectified) : rectified_(rectified) {}
+
+  /// False when it says another thing than the first one that is calibrated. Throws CameraError when that cannot be
+  /// used.
+  bool add(const sensor_msgs::CameraInfo& info);
+  /// Nothing while none is calibrated.
+  const std::optional<CameraModel>& camera() const { return camera_; }
+
+ private:
+  bool rectified_;
+  std::optional<sensor_msgs::CameraInfo> first_;
+  std::optional<CameraModel> camera_;
+};
 
 /// Reads a file of camera_calibration: YAML, or INI by its ending. Throws CameraError that begins with the path, also
 /// for a file that says the camera is not calibrated.
@@ -54,16 +78,26 @@ OdometryReading toReading(const nav_msgs::Odometry& message, std::int64_t stamp_
 /// tf2 knows frames without the slash that tf gave them.
 std::string withoutSlash(const std::string& frame);
 
+/// Of a robot; it has tens or hundreds. Frames beyond are left out: whoever publishes them may never end.
+constexpr std::size_t kMostFrames = 4096;
+
+/// Whether it names two frames, by names of a length that names have.
+bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform);
+
 /// Where the parts of a robot are that do not move, as /tf_static tells. Not thread-safe.
 class StaticTransforms {
  public:
-  /// Leaves out transforms that are not finite, whose rotation is not of unit length, or that name no two frames.
+  /// Leaves out transforms that are not finite, whose rotation is not of unit length, that name no two frames, or a
+  /// frame beyond kMostFrames.
   void add(const tf2_msgs::TFMessage& message);
   /// The pose of `frame` in `base_frame`; nothing when they are not connected.
   std::optional<Eigen::Isometry3d> pose(const std::string& base_frame, const std::string& frame) const;
 
  private:
+  bool isFull(const geometry_msgs::TransformStamped& transform);
+
   tf2::BufferCore buffer_;
+  std::set<std::string> names_;
 };
 
 }  // namespace visual_localization

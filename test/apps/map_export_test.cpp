@@ -101,8 +101,8 @@ TEST(MapExport, NamesOfSessionsAreQuotedAndRepaired) {
   EXPECT_EQ(featuresOf(collection, "Point", "session", "T\xEF\xBF\xBD\xEF\xBF\xBD").size(), 10U);
   EXPECT_EQ(static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')), collection.at("features").size() + 2)
       << "one feature a line";
-  EXPECT_THAT(toCsv(map, findingsOf(map)), HasSubstr(",\"a\"\"b\\c\n\x1b \xC3\xA4\","));
-  EXPECT_THAT(toCsv(map, findingsOf(map)), HasSubstr(",\"T\xBC\xE2\x82\","));
+  EXPECT_THAT(toCsv(map, findingsOf(map)), HasSubstr(",\"a\"\"b\\c   \xC3\xA4\","));
+  EXPECT_THAT(toCsv(map, findingsOf(map)), HasSubstr(",\"T???\","));
 }
 
 }  // namespace

@@ -23,8 +23,8 @@ from sensor_msgs.msg import CompressedImage, NavSatFix  # noqa: E402
 from program_runner import PROGRAMS, ProgramTest  # noqa: E402
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / 'support'))
-from memory_bounds import (builder_bound, editor_bound, evaluate_bound, localizer_bound, merge_bound, mib,  # noqa: E402
-                           peak_mib, with_size)
+from memory_bounds import (WITHOUT_THREADS_OF_BLAS, builder_bound, editor_bound, evaluate_bound,  # noqa: E402
+                           localizer_bound, merge_bound, mib, peak_mib, with_size)
 
 MAP, DRIVE, CORPUS = (Path(argument) for argument in sys.argv[2:5])
 MAP_IMAGES, DRIVE_IMAGES = 450, 450  # at most
@@ -39,7 +39,7 @@ class Run:
         limit = int(bound_mib * 2 ** 20)
         self.peak_mib = 0.0
         with subprocess.Popen([str(PROGRAMS / program), *map(str, arguments)], stdout=subprocess.DEVNULL,
-                              stderr=subprocess.PIPE, text=True,
+                              stderr=subprocess.PIPE, text=True, env=WITHOUT_THREADS_OF_BLAS,
                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit))) as process:
             watch = threading.Thread(target=self.watch, args=(process,))
             watch.start()
@@ -178,6 +178,17 @@ methods:
             sizes = mib(MAP.stat().st_size + path.stat().st_size)
             self.check(name, merge_bound(THREADS, sizes, MAP_IMAGES + DRIVE_IMAGES), 'map_edit', 'merge', MAP, path,
                        '--threads', THREADS, '--output', merged, codes=(0,) if path == other else (0, 1))
+
+    def test_programs_end_when_memory_is_refused(self):
+        """Also with the threads of a BLAS, which wait for memory without end. The loader's refusals count as well."""
+        small = next(path for path in sorted(CORPUS.rglob('*.map')) if path.parent.name == 'accepted')
+        for limit_mib in range(200, 440, 10):
+            limit = limit_mib * 2 ** 20
+            command = [PROGRAMS / 'map_edit', 'thin', '--map', small, '--spacing', 1, '--output', self.folder / 'o.map']
+            result = subprocess.run(list(map(str, command)), capture_output=True, timeout=60, check=False,
+                                    preexec_fn=lambda most=limit: resource.setrlimit(resource.RLIMIT_AS, (most, most)))
+            if result.returncode == 1:
+                self.assertIn(b'memory', result.stderr, limit_mib)
 
     def test_texts_without_end(self):
         texts = {'aliases of aliases': 'a: &a [1,1,1,1,1,1,1,1,1]\n' + ''.join(

@@ -135,7 +135,7 @@ class ProgramsTest(ProgramTest):
     def test_a_file_without_end_is_no_configuration(self):
         for arguments in (('map_builder', '--bag', DRIVE), ('localize', '--map', MAP, '--bag', DRIVE), ('evaluate',)):
             result = run(*arguments, '--output', self.folder / 'output', '--config', '/dev/zero')
-            self.assert_refused(result, 1, '/dev/zero', '1048576 bytes')
+            self.assert_refused(result, 1, '/dev/zero', 'neither a file nor a pipe')
 
     def test_a_path_that_sqlite_does_not_take_is_named_as_that(self):
         deep = self.folder / ('a' * 200) / ('b' * 200) / ('c' * 200)

@@ -407,6 +407,20 @@ class ReportTest(unittest.TestCase):
                 evaluation.write()
                 self.report()
 
+    def test_names_are_text_for_browsers_and_terminals(self):
+        evaluation = self.evaluation('<script>alert(1)</script>')
+        evaluation.fill(['<img src=x onerror=alert(1)>', 'a`<script>', '\x1b[31mred\x9b0m', 'back\u202eward'])
+        evaluation.write()
+        text = self.report()
+        self.assertNotIn('<script', text)
+        self.assertNotIn('<img', text)
+        self.assertEqual([letter for letter in text if letter != '\n' and not letter.isprintable()], [])
+        for path in self.folder.glob('figures/*.svg'):
+            self.assertNotIn('<script', path.read_text(encoding='utf-8'))
+        for name in ('summary.csv',):
+            (self.folder / name).write_text('\x1b[31m\n\x1b[32m\n', encoding='utf-8')
+        self.assertNotIn('\x1b', run(self.folder).stderr)
+
     def test_curves_may_be_zero_or_empty(self):
         evaluation = self.evaluation('kidnapped')
         evaluation.fill(['A', 'B, kidnapped'])

@@ -115,8 +115,12 @@ TEST(CameraInfo, WhatCannotBeIsRefusedByName) {
   EXPECT_THAT(refusalOf([](auto& info) { info.width = 0; }), HasSubstr("image size 0 x 480"));
   EXPECT_THAT(refusalOf([](auto& info) { info.height = 4000000000U; }), HasSubstr("640 x 4000000000"));
   EXPECT_THAT(refusalOf([](auto& info) { info.distortion_model = "fov"; }), HasSubstr("distortion model 'fov'"));
-  EXPECT_THAT(refusalOf([](auto& info) { info.distortion_model = ""; }), HasSubstr("distortion model ''"));
-  EXPECT_THAT(refusalOf([](auto& info) { info.D.resize(1000000); }), HasSubstr("takes 0, 4 or 5 coefficients"));
+  EXPECT_THAT(refusalOf([](auto& info) {
+                info.distortion_model = "";
+                info.D.resize(4);
+              }),
+              HasSubstr("distortion model ''"));
+  EXPECT_THAT(refusalOf([](auto& info) { info.D.resize(1000000); }), HasSubstr("at most 14 coefficients, not 1000000"));
   EXPECT_THAT(refusalOf([](auto& info) { info.binning_x = 1000; }), HasSubstr("binning 1000"));
   EXPECT_THAT(refusalOf([](auto& info) { info.roi.width = 700; }), HasSubstr("region of interest 700 x 0"));
   EXPECT_THAT(refusalOf([](auto& info) {
@@ -126,11 +130,27 @@ TEST(CameraInfo, WhatCannotBeIsRefusedByName) {
               HasSubstr("is not in the image of 640 x 480"));
 }
 
+// As of a driver that sends memory it never wrote (introlab/rtabmap_ros#297).
+TEST(CameraInfo, OfStrayMemoryIsRefusedByName) {
+  EXPECT_THAT(refusalOf([](auto& info) {
+                info.K = {772.868570835972, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.94825075394135e-310, 2.5e-323};
+              }),
+              HasSubstr("K[7] = 6.94825e-310, must be 0"));
+}
+
 TEST(CameraInfo, ChangesAreSeen) {
   sensor_msgs::CameraInfo later = example();
   later.header.seq = 7;
   later.header.stamp = ros::Time(5.0);
   EXPECT_TRUE(sameCalibration(example(), later));
+  later.K[0] += 1e-7;  // as of a driver that computes it anew for each image
+  EXPECT_TRUE(sameCalibration(example(), later));
+  later.K[0] += 0.01;
+  EXPECT_FALSE(sameCalibration(example(), later));
+  later = example();
+  later.D[3] += 1e-5;
+  EXPECT_FALSE(sameCalibration(example(), later));
+  later = example();
   later.roi.width = 1;
   EXPECT_FALSE(sameCalibration(example(), later));
 }
@@ -196,7 +216,8 @@ TEST_F(CameraFile, IsRefusedWithPathAndKey) {
   EXPECT_THAT(refusal(yaml("[500, 0, 320, 0, far, 240, 0, 0, 1]")), HasSubstr("must hold numbers only"));
   EXPECT_THAT(refusal(yaml("none")), HasSubstr("must be a list"));
   EXPECT_THAT(refusal(yaml("[500, 0, 320, 0, 501, 240, 0, 0, 1]", "fov")), HasSubstr("'fov'"));
-  EXPECT_THAT(refusal(yaml("[500, 0, 320, 0, 501, 240, 0, 0, 1]", "equidistant")), HasSubstr("takes 4"));
+  EXPECT_THAT(refusal(yaml("[500, 0, 320, 0, 501, 240, 0, 0, 1]", "equidistant", "cols: 5\n  data: [0, 0, 0, 0, 0.1]")),
+              HasSubstr("takes 4"));
 }
 
 TEST_F(CameraFile, TakesNoMemoryForWhatItClaims) {
@@ -248,6 +269,18 @@ TEST_F(BagCamera, WithoutCalibrationThereIsNone) {
   EXPECT_FALSE(BagReader(path_).camera("/left/image_raw"));
   write({sensor_msgs::CameraInfo()});
   EXPECT_FALSE(BagReader(path_).camera("/left/image_raw"));
+}
+
+TEST_F(BagCamera, MessagesThatAreNotCalibratedDoNotCount) {
+  sensor_msgs::CameraInfo jitter = example();
+  jitter.K[0] += 1e-7;
+  jitter.P[0] -= 1e-7;
+  write({sensor_msgs::CameraInfo(), example(), sensor_msgs::CameraInfo(), jitter});
+  EXPECT_EQ(BagReader(path_).camera("/left/image_raw"), toCamera(example()));
+  sensor_msgs::CameraInfo unrectified = example();
+  unrectified.P.fill(0.0);
+  write({unrectified, example()});
+  EXPECT_EQ(BagReader(path_).camera("/left/image_rect"), toCamera(example(), true));
 }
 
 TEST_F(BagCamera, ThatChangesOrCannotBeIsRefused) {

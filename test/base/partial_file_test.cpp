@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -138,6 +139,58 @@ TEST(PartialFile, FollowsALink) {
   writeFile(folder / "link", "new");
   EXPECT_EQ(test::readAll(folder / "a"), "new");
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+}
+
+mode_t modeOf(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 ? status.st_mode & 07777 : 0;
+}
+
+TEST(PartialFile, HasThePermissionsOfTheFileThatItReplaces) {
+  const test::TemporaryFolder folder;
+  const mode_t before = ::umask(022);
+  writeFile(folder / "new", "x");
+  EXPECT_EQ(modeOf(folder / "new"), 0644U);
+  for (const mode_t mode : {0600U, 0640U, 0666U, 0444U}) {
+    ASSERT_EQ(::chmod((folder / "new").c_str(), mode), 0);
+    PartialFile file(folder / "new");
+    EXPECT_EQ(modeOf(file.path()) & 077U, mode & 077U) << "nobody else reads it meanwhile either";
+    file.write("y");
+    file.commit();
+    EXPECT_EQ(modeOf(folder / "new"), mode);
+  }
+  ::umask(before);
+}
+
+TEST(PartialFile, RootsFileStaysItsOwners) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file away";
+  const test::TemporaryFolder folder;
+  writeFile(folder / "a", "x");
+  ASSERT_EQ(::chown((folder / "a").c_str(), 1234, 1235), 0);
+  writeFile(folder / "a", "y");
+  struct stat status {};
+  ASSERT_EQ(::stat((folder / "a").c_str(), &status), 0);
+  EXPECT_EQ(status.st_uid, 1234U);
+  EXPECT_EQ(status.st_gid, 1235U);
+}
+
+TEST(PartialFile, FilesOfOtherProgramsStay) {
+  const test::TemporaryFolder folder;
+  const std::vector<std::string> others{"film.0123456789abcdef.partial", "film.lock.partial",
+                                        "a.visual_localization.partial", ".visual_localization.partial"};
+  for (const std::string& name : others) test::writeAll(folder / name, "of another program");
+  writeFile(folder / "a", "x");
+  EXPECT_EQ(folder.names().size(), others.size() + 1);
+}
+
+TEST(PartialFile, ALinkThatLeadsToNoFileIsReplacedWhereItIs) {
+  const test::TemporaryFolder folder;
+  const test::TemporaryFolder outside;
+  std::filesystem::create_symlink(outside / "a", folder / "link");
+  writeFile(folder / "link", "x");
+  EXPECT_FALSE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(test::readAll(folder / "link"), "x");
+  EXPECT_TRUE(outside.names().empty());
 }
 
 TEST(PartialFile, RefusesWhatIsNoFile) {

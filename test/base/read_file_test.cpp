@@ -27,6 +27,19 @@ TEST(ReadFile, ReadsAPipeToItsEnd) {
   writer.join();
 }
 
+TEST(ReadFile, WaitsForNoOneAndReadsNoDevice) {
+  const test::TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  for (const std::string& path : {folder / "pipe", std::string("/dev/zero"), std::string("/dev/null")}) {
+    try {
+      readFile(path);
+      ADD_FAILURE() << "read: " << path;
+    } catch (const FileError& error) {
+      EXPECT_THAT(error.what(), ::testing::StartsWith(path + ": cannot be read: "));
+    }
+  }
+}
+
 TEST(ReadFile, NamesWhatCannotBeRead) {
   const test::TemporaryFolder folder;
   for (const std::string& path : {folder / "absent", folder.path()}) {

@@ -23,10 +23,20 @@ TEST(Joined, PutsTheSeparatorBetween) {
 TEST(Csv, AFieldIsQuotedWhereItNeedsToBe) {
   EXPECT_EQ(csvField("plain text"), "plain text");
   EXPECT_EQ(csvField("a,b"), "\"a,b\"");
-  EXPECT_EQ(csvField("two\nlines"), "\"two\nlines\"");
+  EXPECT_EQ(csvField("two\nlines"), "two lines");
   EXPECT_EQ(csvField("say \"a\""), "\"say \"\"a\"\"\"");
   EXPECT_EQ(csvQuoted("plain"), "\"plain\"");
   EXPECT_EQ(csvQuoted(""), "\"\"");
+}
+
+TEST(Csv, ASpreadsheetRunsNoField) {
+  for (const char* text : {"=cmd|'/C calc'!A0", "+1+cmd", "-2+3", "@SUM(A1)"}) {
+    EXPECT_EQ(csvField(text), std::string("'") + text);
+    EXPECT_EQ(csvQuoted(text), std::string("\"'") + text + '"');
+  }
+  EXPECT_EQ(csvField("\t=1+1"), " =1+1");
+  for (const char* number : {"-1.5", "+3", "-1e-9", "7"}) EXPECT_EQ(csvField(number), number);
+  EXPECT_EQ(csvField("a-b"), "a-b");
 }
 
 TEST(Csv, ALineHasAFieldMoreThanCommas) {

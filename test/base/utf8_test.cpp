@@ -47,6 +47,32 @@ TEST(Utf8, WhatIsNoUtf8IsCutAnywhere) {
   }
 }
 
+TEST(OneLine, ShowsNothingThatATerminalObeys) {
+  EXPECT_EQ(oneLine("a\x1b[31mb\x07\x7f"), "a [31mb  ");
+  EXPECT_EQ(oneLine("a\xC2\x9B"
+                    "31mb"),
+            "a 31mb")
+      << "U+009B begins a sequence as ESC [ does";
+  EXPECT_EQ(oneLine("txt.\xE2\x80\xAEnab"), "txt.?nab") << "U+202E turns the rest around";
+  EXPECT_EQ(oneLine("\xE2\x81\xA6\xE2\x80\x8B\xEF\xBB\xBF\xF3\xA0\x81\x81"), "????");
+  EXPECT_EQ(oneLine("a\xE2\x80\xA8z"), "a?z") << "U+2028 ends a line";
+}
+
+TEST(OneLine, ShowsWhatIsNoUtf8AsQuestionMarks) {
+  EXPECT_EQ(oneLine("a\x9B"
+                    "31m\xFFz\xC3"),
+            "a?31m?z?");
+  EXPECT_EQ(oneLine("\xED\xA0\x80"), "???");
+}
+
+TEST(OneLine, LeavesLettersOfAllKinds) {
+  EXPECT_EQ(oneLine(kAll), kAll);
+  const std::string words =
+      "Stra\xC3\x9F"
+      "e \xD0\x94\xD0\xB0 \xE9\x81\x93 \xD7\xA9\xD7\x9C";
+  EXPECT_EQ(oneLine(words), words);
+}
+
 TEST(OneLine, IsCutBetweenCharacters) {
   EXPECT_EQ(oneLine("a\nb\x1b", 10), "a b ");
   EXPECT_EQ(oneLine("abc", 2), "ab");

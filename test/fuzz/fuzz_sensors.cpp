@@ -9,6 +9,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "bag/bag_messages.h"
+#include "node/robot_transforms.h"
 #include "ros/message_readers.h"
 #include "test/fuzz/fuzz_support.h"
 
@@ -34,12 +35,30 @@ void readFix(const sensor_msgs::NavSatFix& message) {
   if (hasPosition(fix)) fuzz::countRead();
 }
 
+/// Those that move, whatever their stamps.
+void readRobotTransforms(const tf2_msgs::TFMessage& message) {
+  ros::Time::init();
+  ThrottledLog log([](ThrottledLog::Severity, const std::string& text) { fuzz::requireOneLine(text); });
+  RobotTransforms transforms("odom", "base_link", log);
+  fuzz::mustNotThrow([&] {
+    for (const bool is_static : {false, true, false}) transforms.add(message, is_static);
+    for (const geometry_msgs::TransformStamped& transform : message.transforms)
+      transforms.knows(transform.header.stamp);
+    if (!transforms.knows(ros::Time())) return;
+    const tf2::Vector3 origin = transforms.lookUp(ros::Time()).getOrigin();
+    if (!std::isfinite(origin.length())) fuzz::fail("a robot that is nowhere");
+    fuzz::countRead();
+  });
+  if (transforms.frames() > 2 * message.transforms.size()) fuzz::fail("frames that nobody sent");
+}
+
 void readTransforms(const tf2_msgs::TFMessage& message) {
   StaticTransforms transforms;
   transforms.add(message);
   const auto pose = transforms.pose("base_link", "camera");
   if (pose && !pose->matrix().allFinite()) fuzz::fail("a camera that is nowhere");
   if (pose) fuzz::countRead();
+  readRobotTransforms(message);
 }
 
 }  // namespace

@@ -14,6 +14,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "base/text.h"
+
 /// What the fuzz targets share.
 namespace visual_localization::fuzz {
 
@@ -27,9 +29,7 @@ namespace visual_localization::fuzz {
 inline void requireOneLine(const std::string& text) {
   if (text.empty()) fail("a refusal says nothing");
   if (text.size() > 20000) fail("a refusal of " + std::to_string(text.size()) + " characters");
-  for (const char c : text) {
-    if ((c >= 0 && c < 32) || c == 127) fail("a refusal of several lines: " + text);
-  }
+  if (oneLine(text, text.size()) != text) fail("a refusal that is no plain line: " + text);
 }
 
 /// What a target has done so far; replay.cpp compares.

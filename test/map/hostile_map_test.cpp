@@ -6,6 +6,7 @@
 #include <sqlite3.h>
 
 #include "test/support/example_map.h"
+#include "test/support/refusal.h"
 #include "test/support/tamper.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/map/map_file.h"
@@ -116,6 +117,55 @@ class HostileMap : public testing::Test {
   test::TemporaryFolder folder_;
   std::string path_ = folder_ / "a.map";
 };
+
+std::string sessionsTo(int count, const std::string& name) {
+  return "INSERT OR REPLACE INTO meta WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n WHERE i < " +
+         std::to_string(count - 1) + ") SELECT 'session/' || i, " + name + " FROM n;";
+}
+
+TEST_F(HostileMap, MoreSessionsThanARobotCanRecordAreRefused) {
+  tamper(sessionsTo(10001, "'monday'"));
+  EXPECT_THAT(refusal(), HasSubstr("more than the 10000 sessions"));
+  restore();
+  tamper(sessionsTo(400001, "'monday'"));
+  EXPECT_THAT(refusal(), HasSubstr("more than the 400000 meta values"));
+}
+
+TEST_F(HostileMap, ANameWithoutEndIsRefused) {
+  tamper(sessionsTo(1, "printf('%.*c', 1000000, 'x')"));
+  EXPECT_THAT(refusal(), HasSubstr("the name of session/0 has 1000000 bytes, at most 1000 are allowed"));
+}
+
+TEST_F(HostileMap, MasksAreSharedAndBounded) {
+  MapHeader header = test::exampleHeader();
+  header.image_size = {4096, 4096};
+  header.sessions.clear();
+  std::vector<TrainingImage> images = test::exampleImages(40, 1);
+  cv::Mat grey(header.image_size, CV_8UC1, cv::Scalar(255));
+  const auto addSession = [&](int top) {
+    grey.row(top).setTo(0);
+    Session session;
+    session.name = std::to_string(header.sessions.size());
+    session.mask = Mask(grey);
+    images[header.sessions.size()].session = static_cast<int>(header.sessions.size());
+    header.sessions.push_back(session);
+  };
+  for (TrainingImage& image : images) {
+    image.session = 0;
+    image.geometry.reset();
+  }
+  for (int i = 0; i < 40; ++i) addSession(0);
+  saveMap({header, images}, path_);
+  const auto map = loadMap(path_);
+  EXPECT_EQ(map->header().sessions[39].mask.grey().data, map->header().sessions[0].mask.grey().data);
+  header.sessions.resize(1);
+  for (TrainingImage& image : images) image.session = 0;
+  for (int i = 1; i < 17; ++i) addSession(i);
+  EXPECT_THAT(test::refusalOf<MapStoreError>([&] {
+                saveMap({header, images}, path_);
+              }),
+              HasSubstr("more than 16 different masks of 4096x4096 pixels"));
+}
 
 TEST_F(HostileMap, ASchemaThatDoesSomethingIsRefused) {
   for (const char* sql :

@@ -133,6 +133,23 @@ TEST(PositionIndex, ManyImagesOnOneSpotTakeNoLongerThanOthers) {
   }
 }
 
+TEST(PositionIndex, OfMoreImagesOnOneSpotThanAGridTakesTheFirstAreFound) {
+  const Positions positions_m = parkedOnStreet(200'000, 0.0);
+  const PositionIndex index(positions_m);
+  constexpr std::size_t kFirstParked = 100;
+  const CpuStopwatch watch;
+  std::vector<Neighbour> found;
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector2d place_m(50.0, 0.3 + 1e-4 * i);
+    EXPECT_EQ(index.nearest(place_m).image,
+              nearestOf(Positions(positions_m.begin(), positions_m.begin() + 200), place_m));
+    index.nearest(place_m, 32, found);
+    ASSERT_EQ(found.size(), 32U);
+    EXPECT_EQ(found.back().image, kFirstParked + 30) << "one of the street is on the same spot";
+  }
+  EXPECT_LT(watch.elapsed_ms(), 1000.0) << "to look at all of them each time takes seconds";
+}
+
 TEST(NearestGrid, AnswersBetweenPositionsThatAreFarApart) {
   const Positions apart{{-1e6, -1e6}, {1e6, 1e6}, {1e6, -1e6}};
   EXPECT_EQ(shareAnsweredRightly(apart, 1e6), 1.0);

@@ -2,7 +2,12 @@
 
 #include <algorithm>
 #include <random>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
+#include <cv_bridge/cv_bridge.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -34,12 +39,122 @@ sensor_msgs::CompressedImage compressed(const std::string& extension) {
   return message;
 }
 
+/// Bytes of a number, the highest first.
+std::vector<std::uint8_t> bigEndian(std::size_t value, int count) {
+  std::vector<std::uint8_t> bytes;
+  for (int i = count - 1; i >= 0; --i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+  return bytes;
+}
+
+void insert(std::vector<std::uint8_t>& data, std::size_t at, const std::vector<std::uint8_t>& what) {
+  data.insert(data.begin() + static_cast<std::ptrdiff_t>(at), what.begin(), what.end());
+}
+
 TEST(ImageConversion, EveryEncodingBecomesGrey) {
   for (const char* name : {"mono8", "bayer_rggb8", "bayer_bggr8", "bayer_gbrg8", "bayer_grbg8"}) {
     EXPECT_NEAR(toGrey(image(name, 1, 77)).at<std::uint8_t>(5, 5), 77, 1) << name;
   }
   for (const char* name : {"bgr8", "rgb8"}) EXPECT_EQ(toGrey(image(name, 3, 77)).at<std::uint8_t>(5, 5), 77) << name;
   for (const char* name : {"bgra8", "rgba8"}) EXPECT_EQ(toGrey(image(name, 4, 77)).at<std::uint8_t>(5, 5), 77) << name;
+}
+
+sensor_msgs::Image noiseOf(const std::string& encoding, int bytes_per_pixel, std::uint64_t seed) {
+  sensor_msgs::Image message = image(encoding, static_cast<std::uint32_t>(bytes_per_pixel), 0);
+  cv::RNG random(seed);
+  for (std::uint8_t& byte : message.data) byte = static_cast<std::uint8_t>(random.uniform(0, 256));
+  return message;
+}
+
+TEST(ImageConversion, EveryEncodingIsConvertedAsByCvBridge) {
+  for (const auto& [name, bytes] : std::vector<std::pair<const char*, int>>{{"mono8", 1},
+                                                                            {"bgr8", 3},
+                                                                            {"rgb8", 3},
+                                                                            {"bgra8", 4},
+                                                                            {"rgba8", 4},
+                                                                            {"bayer_rggb8", 1},
+                                                                            {"bayer_bggr8", 1},
+                                                                            {"bayer_gbrg8", 1},
+                                                                            {"bayer_grbg8", 1},
+                                                                            {"yuv422", 2},
+                                                                            {"mono16", 2},
+                                                                            {"bgr16", 6},
+                                                                            {"rgb16", 6},
+                                                                            {"bgra16", 8},
+                                                                            {"rgba16", 8}}) {
+    const sensor_msgs::Image message = noiseOf(name, bytes, 3);  // it uses the full range
+    const cv::Mat expected = cv_bridge::toCvCopy(message, "mono8")->image;
+    EXPECT_EQ(cv::norm(toGrey(message), expected, cv::NORM_INF), 0.0) << name;
+  }
+}
+
+TEST(ImageConversion, OtherNamesOfTheSamePixelsGiveTheSame) {
+  for (const auto& [name, known, bytes] :
+       std::vector<std::tuple<const char*, const char*, int>>{{"8UC1", "mono8", 1},
+                                                              {"8UC3", "bgr8", 3},
+                                                              {"8UC4", "bgra8", 4},
+                                                              {"16UC1", "mono16", 2},
+                                                              {"16UC3", "bgr16", 6},
+                                                              {"uyvy", "yuv422", 2},
+                                                              {"yuyv", "yuv422_yuy2", 2}}) {
+    const sensor_msgs::Image message = noiseOf(name, bytes, 4);
+    sensor_msgs::Image same = message;
+    same.encoding = known;
+    EXPECT_EQ(cv::norm(toGrey(message), toGrey(same), cv::NORM_INF), 0.0) << name;
+  }
+}
+
+TEST(ImageConversion, TheLuminanceOfYuvIsTheGreyImage) {
+  for (const char* name : {"yuv422", "yuv422_yuy2"}) {
+    sensor_msgs::Image message = image(name, 2, 128);
+    const std::size_t first = name == std::string("yuv422") ? 1 : 0;
+    for (std::size_t at = first; at < message.data.size(); at += 2) message.data[at] = 200;
+    EXPECT_EQ(cv::countNonZero(toGrey(message) != 200), 0) << name;
+  }
+}
+
+TEST(ImageConversion, BayerOfSixteenBitsIsTheOneOfEight) {
+  for (const char* pattern : {"rggb", "bggr", "gbrg", "grbg"}) {
+    const std::string name = std::string("bayer_") + pattern;
+    const sensor_msgs::Image eight = noiseOf(name + "8", 1, 5);
+    sensor_msgs::Image sixteen = image(name + "16", 2, 0);
+    for (std::size_t row = 0; row < eight.height; ++row) {
+      for (std::size_t column = 0; column < eight.width; ++column) {
+        const std::uint8_t value = eight.data[row * eight.step + column];
+        sixteen.data[row * sixteen.step + 2 * column] = value;
+        sixteen.data[row * sixteen.step + 2 * column + 1] = value;
+      }
+    }
+    EXPECT_LE(cv::norm(toGrey(sixteen), toGrey(eight), cv::NORM_INF), 1.0) << pattern;
+  }
+}
+
+/// A ramp of a camera of so many bits.
+cv::Mat rampOf(int bits) {
+  cv::Mat ramp(48, 64, CV_16UC1);
+  const int full = (1 << bits) - 1;
+  for (int x = 0; x < ramp.cols; ++x) ramp.col(x).setTo(full * x / (ramp.cols - 1));
+  return ramp;
+}
+
+TEST(ImageConversion, SixteenBitsOfACameraOfLessAreScaledByItsOwn) {
+  for (const char* kind : {"mono16", "16UC1", "png"}) {
+    const auto grey = [kind](const cv::Mat& pixels) {
+      if (std::string(kind) != "png") {
+        return toGrey(*cv_bridge::CvImage({}, kind, pixels).toImageMsg());
+      }
+      sensor_msgs::CompressedImage message;
+      cv::imencode(".png", pixels, message.data);
+      return toGrey(message);
+    };
+    const cv::Mat expected = grey(rampOf(16));
+    EXPECT_EQ(expected.at<std::uint8_t>(0, 63), 255);
+    for (const int bits : {10, 12, 14}) {
+      EXPECT_LE(cv::norm(grey(rampOf(bits)), expected, cv::NORM_INF), 1.0) << kind << " " << bits;
+    }
+    const cv::Mat dark = rampOf(12) / 8;  // up to 512: ten bits would hold it
+    EXPECT_EQ(grey(dark).at<std::uint8_t>(0, 63), 128) << kind;
+    EXPECT_EQ(cv::countNonZero(grey(cv::Mat::zeros(10, 10, CV_16UC1))), 0) << kind;
+  }
 }
 
 TEST(ImageConversion, SixteenBitsAreScaledByTheFullRange) {
@@ -64,6 +179,22 @@ TEST(ImageConversion, ResultIsGreyAndOwnsItsPixels) {
   { grey = toGrey(image("rgb8", 3, 9)); }
   EXPECT_EQ(grey.type(), CV_8UC1);
   EXPECT_EQ(grey.size(), cv::Size(20, 10));
+}
+
+TEST(ImageConversion, AStepOfZeroMeansNothingBetweenTheRows) {
+  for (const char* name : {"mono8", "mono16"}) {
+    sensor_msgs::Image message = image(name, name == std::string("mono8") ? 1 : 2, 77);
+    for (const bool bigendian : {false, true}) {
+      message.step = 0;
+      message.is_bigendian = bigendian ? 1 : 0;
+      EXPECT_NE(test::refusalOf<ImageError>([&] { toGrey(message); }), "accepted") << "more bytes than pixels";
+    }
+    message.data.resize(std::size_t{message.width} * message.height * (name == std::string("mono8") ? 1 : 2));
+    for (const bool bigendian : {false, true}) {
+      message.is_bigendian = bigendian ? 1 : 0;
+      EXPECT_EQ(toGrey(message).at<std::uint8_t>(9, 19), 77) << name;
+    }
+  }
 }
 
 TEST(ImageConversion, RefusesImagesThatContradictThemselves) {
@@ -113,22 +244,53 @@ TEST(ImageConversion, EveryTruncatedJpegIsRefused) {
   }
 }
 
+TEST(ImageConversion, WhatStandsBehindTheEndOfAnImageDoesNotMatter) {
+  const std::vector<std::uint8_t> line_ends{'\r', '\n', '-', '-', 'b', '\r', '\n'};
+  for (const char* extension : {".jpg", ".png"}) {
+    const auto whole = compressed(extension);
+    for (const std::vector<std::uint8_t>& behind :
+         {line_ends, std::vector<std::uint8_t>(5000, 0), std::vector<std::uint8_t>(5000, 0xFF), whole.data}) {
+      auto message = whole;
+      insert(message.data, message.data.size(), behind);
+      EXPECT_EQ(cv::norm(toGrey(message), toGrey(whole), cv::NORM_INF), 0.0) << extension << " " << behind.size();
+    }
+  }
+}
+
+TEST(ImageConversion, EveryKindOfJpegIsDecodedAsByOpenCv) {
+  cv::Mat colour(61, 83, CV_8UC3);
+  cv::randu(colour, 0, 256);
+  cv::Mat grey;
+  cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
+  for (const cv::Mat& pixels : {colour, grey}) {
+    for (const int progressive : {0, 1}) {
+      for (const int quality : {20, 95}) {
+        sensor_msgs::CompressedImage message;
+        cv::imencode(".jpg", pixels, message.data,
+                     {cv::IMWRITE_JPEG_PROGRESSIVE, progressive, cv::IMWRITE_JPEG_QUALITY, quality});
+        const cv::Mat expected = cv::imdecode(message.data, cv::IMREAD_GRAYSCALE);
+        EXPECT_EQ(cv::norm(toGrey(message), expected, cv::NORM_INF), 0.0) << pixels.channels() << progressive;
+      }
+    }
+  }
+}
+
+TEST(ImageConversion, EveryTruncatedProgressiveJpegIsRefused) {
+  sensor_msgs::CompressedImage whole;
+  cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC1, cv::Scalar(9)), whole.data, {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  EXPECT_EQ(toGrey(whole).size(), cv::Size(64, 48));
+  for (std::size_t length = 0; length < whole.data.size(); ++length) {
+    auto message = whole;
+    message.data.resize(length);
+    EXPECT_THROW(toGrey(message), ImageError) << length;
+  }
+}
+
 TEST(ImageConversion, OtherFormatsAndHugeSizesAreRefused) {
   EXPECT_THROW(toGrey(compressed(".bmp")), ImageError);
   auto message = compressed(".png");
   message.data[16] = 0x7F;
   EXPECT_THROW(toGrey(message), ImageError);
-}
-
-/// Bytes of a number, the highest first.
-std::vector<std::uint8_t> bigEndian(std::size_t value, int count) {
-  std::vector<std::uint8_t> bytes;
-  for (int i = count - 1; i >= 0; --i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-  return bytes;
-}
-
-void insert(std::vector<std::uint8_t>& data, std::size_t at, const std::vector<std::uint8_t>& what) {
-  data.insert(data.begin() + static_cast<std::ptrdiff_t>(at), what.begin(), what.end());
 }
 
 std::size_t find(const std::vector<std::uint8_t>& data, const std::vector<std::uint8_t>& what) {

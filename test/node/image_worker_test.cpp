@@ -130,6 +130,20 @@ TEST_F(ImageWorkerTest, AnUnusableImageIsRefusedWithTheReason) {
   EXPECT_THAT(lines_, testing::Contains("Image refused: JPEG is cut off"));
 }
 
+TEST_F(ImageWorkerTest, AStampInTheFutureIsRefusedAndMakesNoOtherImageLate) {
+  start();
+  const double now_s = ros::Time::now().toSec();
+  show(imageAt(4294967295.0));
+  show(imageAt(now_s + 100000.0));
+  show(imageAt(now_s));
+  show(imageAt(now_s + 1.0));
+  const ImageCounts counts = finish();
+  EXPECT_EQ(counts.refused, 2U);
+  EXPECT_EQ(counts.processed, 2U);
+  EXPECT_EQ(counts.late, 0U);
+  EXPECT_THAT(output_.refusals.front(), HasSubstr("its stamp 4294967295.000000000 s is more than a day after"));
+}
+
 TEST_F(ImageWorkerTest, WithoutAMapImagesAreCountedAsSuch) {
   worker_.start("/camera");
   show(imageAt(1.0));

@@ -19,7 +19,7 @@ import localizer_fixture as fixture
 from visual_localization.srv import LoadMap
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / 'support'))
-from memory_bounds import localizer_bound, mib, peak_mib, with_size  # noqa: E402
+from memory_bounds import WITHOUT_THREADS_OF_BLAS, localizer_bound, mib, peak_mib, with_size  # noqa: E402
 
 LOCALIZER = roslib.packages.find_node('visual_localization', 'localizer_node')[0]
 DEADLINE_S = 60.0
@@ -40,7 +40,7 @@ class MemoryTest(unittest.TestCase):
         limit = int(self.bound_mib * 2 ** 20)
         process = subprocess.Popen(
             [LOCALIZER, '__name:=localizer', '_map:=' + map_file, '_image_transport:=compressed',
-             'image:=/stereo/left/image_raw'],
+             'image:=/stereo/left/image_raw'], env=WITHOUT_THREADS_OF_BLAS,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)

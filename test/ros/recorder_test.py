@@ -10,6 +10,7 @@ import rosbag
 import roslib.packages
 import rospy
 import rostest
+from sensor_msgs.msg import CameraInfo
 from visualization_msgs.msg import Marker
 
 import localizer_fixture as fixture
@@ -68,6 +69,26 @@ class RecorderTest(unittest.TestCase):
         self.assertGreater(topics['/stereo/left/image_raw/compressed'].message_count, 20)
         self.assertGreater(topics['/gps/fix'].message_count, 100)
         self.assertGreater(topics['/stereo/left/camera_info'].message_count, 20)
+
+    def test_a_calibration_that_makes_no_map_is_said_at_once(self):
+        log = fixture.LogRecorder()
+        self.start()
+        publisher = rospy.Publisher('/stereo/left/camera_info', CameraInfo, queue_size=10)
+        fixture.wait_for(publisher.get_num_connections, DEADLINE_S, 'a subscriber of the calibration')
+
+        def show(k, words):
+            info = CameraInfo(width=320, height=240, distortion_model='plumb_bob', D=5 * [0.0])
+            info.K = [k, 0.0, 160.0, 0.0, k, 120.0, 0.0, 0.0, 1.0] if k else 9 * [0.0]
+            publisher.publish(info)
+            fixture.wait_for(lambda: any(item.key == 'Camera' and words in item.value
+                                         for status in [self.diagnostics.last_of('recording')] if status
+                                         for item in status.values), DEADLINE_S, words)
+        show(0.0, 'not calibrated')
+        for k in (266.0, 0.0, 266.0 + 1e-7):
+            show(k, '320 x 240 px, focal length 266 x 266 px')
+        self.assertFalse([line for line in log.messages() if 'Calibration' in line.msg])
+        show(270.0, '266 px')
+        log.wait_for('Calibration of the camera: the calibration changes', DEADLINE_S)
 
     def test_a_map_is_written_while_it_records(self):
         recorder = self.start()

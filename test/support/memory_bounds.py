@@ -1,4 +1,5 @@
 """The formulas of doc/faults.md, "Memory": address space in MiB; and images that claim more than they are."""
+import os
 
 BASE, PER_THREAD = 260, 72
 LARGEST_PIXELS = 4096 * 4096
@@ -6,6 +7,10 @@ SIFT_BYTES, DECODED_BYTES = 140, 8
 IMAGE_BYTES, FIX_BYTES = 2 ** 19, 2000
 MERGE_CACHE_MIB, MERGED_IMAGE_BYTES = 512, 4000
 PAIR_BYTES, STEP_BYTES = 24, 200
+
+
+# A BLAS with threads of its own (OpenBLAS) adds a stack, a heap and buffers for each core, which are not ours to count.
+WITHOUT_THREADS_OF_BLAS = dict(os.environ, OPENBLAS_NUM_THREADS='1')
 
 
 def mib(count: float) -> float:

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "features/image_size.h"
+#include "visual_localization/ros/image_conversion.h"
+
+namespace visual_localization {
+
+/// The size itself. Throws ImageError when an image of this size, pixels, is empty or too large to be taken.
+inline cv::Size requireImageSize(std::uint64_t width, std::uint64_t height) {
+  if (width == 0 || height == 0) {
+    throw ImageError("image is empty (" + std::to_string(width) + "x" + std::to_string(height) + ")");
+  }
+  if (const auto reason = whyTooLarge(width, height)) throw ImageError("image is too large: " + *reason);
+  return {static_cast<int>(width), static_cast<int>(height)};
+}
+
+/// A grey image of 8 or 16 bits in 8. Cameras of 10, 12 or 14 bits send them in 16 and do not say which: the fewest of
+/// these that hold the brightest pixel become the range. An image of 8 bits stays as it is. `cut`: the lower bits, as
+/// OpenCV does with a PNG, instead of rounded as cv_bridge does.
+inline cv::Mat inEightBits(const cv::Mat& grey, bool cut = false) {
+  if (grey.depth() == CV_8U) return grey;
+  double brightest = 0.0;
+  cv::minMaxIdx(grey, nullptr, &brightest);
+  double full = 1023.0;
+  while (full < brightest) full = 4.0 * full + 3.0;
+  cv::Mat eight;
+  constexpr double kDown = -0.498;  // to the next whole number below, of any that has a fraction of 1/256
+  cut ? grey.convertTo(eight, CV_8U, 256.0 / (full + 1.0), kDown) : grey.convertTo(eight, CV_8U, 255.0 / full);
+  return eight;
+}
+
+}  // namespace visual_localization
