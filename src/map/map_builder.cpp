@@ -8,6 +8,7 @@
 #include "base/files.h"
 #include "base/time.h"
 #include "features/image_size.h"
+#include "geo/trajectory_parts.h"
 #include "map/extraction_pool.h"
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
@@ -71,7 +72,7 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   try {
     const LocalFrame frame = frame_ ? *frame_ : frameFor(fixes, config_.trajectory);
     requireNear(fixes, frame.datum());
-    CleanedTrajectory cleaned = cleanTrajectory(fixes, frame, config_.trajectory);
+    CleanedTrajectory cleaned = cleanInParts(fixes, frame, config_.trajectory);
     requireMotion(cleaned);
     report_.sessions.push_back(std::move(cleaned));
     frame_ = frame;

@@ -13,6 +13,7 @@
 
 #include "base/numbers.h"
 #include "base/time.h"
+#include "geo/trajectory_parts.h"
 #include "geometry/session_geometry.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/map/map_builder.h"
@@ -46,7 +47,7 @@ GeodeticPoint middleOf(const std::vector<Fix>& fixes) {
 
 LocalFrame frameFor(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
   const LocalFrame provisional(middleOf(fixes));
-  const CleanedTrajectory cleaned = cleanTrajectory(fixes, provisional, config);
+  const CleanedTrajectory cleaned = cleanInParts(fixes, provisional, config);
   const auto first = std::find(cleaned.verdicts.begin(), cleaned.verdicts.end(), FixVerdict::kKept);
   if (first == cleaned.verdicts.end()) throw std::runtime_error("none of its fixes is believable");
   return LocalFrame(datumAt(fixes[static_cast<std::size_t>(first - cleaned.verdicts.begin())].position));
