@@ -23,10 +23,12 @@
 #include "node/image_worker.h"
 #include "node/localizer_diagnostics.h"
 #include "node/throttled_log.h"
+#include "ros/static_transforms.h"
 #include "visual_localization/WriteMap.h"
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geo/trajectory.h"
+#include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -162,6 +164,7 @@ class MapRecorder {
   template <class Message>
   void write(const std::string& topic, const Message& message);
   void lookAtImages();
+  std::string mountTrouble() const;
   std::size_t featuresOf(const cv::Mat& grey);
   bool onWriteMap(WriteMap::Request& request, WriteMap::Response& response);
   RecordedSession sessionFor(const std::string& path) const;
@@ -183,6 +186,9 @@ class MapRecorder {
   std::uint64_t lost_ = 0;
   std::string disk_trouble_;
   std::string image_trouble_;
+  StaticTransforms transforms_;
+  std::optional<std::string> image_frame_;
+  std::optional<std::string> fix_frame_;
   std::size_t published_ = 0;
   // What has its own lock, or does not change.
   std::unique_ptr<SiftExtractor> extractor_;
@@ -191,6 +197,7 @@ class MapRecorder {
   std::vector<ros::Subscriber> subscribers_;
   std::string image_topic_;
   std::string fix_topic_;
+  MapBuilderConfig builder_;
   ros::Publisher way_;
   ros::CallbackQueue services_;
   ros::ServiceServer write_map_;
