@@ -14,6 +14,8 @@
 #include <unistd.h>
 
 #include "apps/app_support.h"
+#include "apps/session_clock.h"
+#include "bag/recorded_mount.h"
 #include "base/files.h"
 #include "base/text.h"
 #include "editing/map_selection.h"
@@ -69,22 +71,67 @@ void addImages(MapBuilder& builder, const BagReader& bag, const std::string& top
   }
 }
 
-/// That of the parameters, or of the bag.
+/// The receiver that the parameter names, or the one with the most usable fixes. What is worth a line goes to
+/// `remarks`.
+Receiver receiverOf(const BagReader& bag, const MapBuilderOptions& options, const MapBuilderConfig& config,
+                    std::vector<Remark>& remarks) {
+  std::vector<Receiver> receivers = bag.receivers(options.fix_topic);
+  if (receivers.empty()) return {};
+  auto chosen = receivers.begin();
+  std::vector<std::string> names;
+  for (const Receiver& one : receivers) names.push_back("'" + oneLine(one.frame) + "'");
+  if (!config.fix_frame.empty()) {
+    chosen = std::find_if(receivers.begin(), receivers.end(),
+                          [&](const Receiver& one) { return one.frame == withoutSlash(config.fix_frame); });
+    if (chosen == receivers.end()) {
+      throw BagError(bag.path() + ": " + options.fix_topic + ": robot/fix_frame '" + config.fix_frame +
+                     "' is none of the frames of its fixes: " + joined(names));
+    }
+  }
+  if (receivers.size() > 1) {
+    remarks.push_back({"fixes of " + std::to_string(receivers.size()) + " receivers on one topic, frames " +
+                       joined(names) + ": those of '" + oneLine(chosen->frame) +
+                       "' count (robot/fix_frame chooses another)"});
+  }
+  if (!chosen->said.empty()) remarks.push_back({chosen->said});
+  return std::move(*chosen);
+}
+
+[[noreturn]] void refuseHalf(const BagReader& bag, const char* given, const char* missing) {
+  throw BagError(bag.path() + ": " + given + " is given without " + missing +
+                 ", and no frames in the bag tell it: half a mounting would bend every turn; give both");
+}
+
+/// That of the parameters, or of the frames in the bag. How it was found goes to `remarks`.
 std::optional<SensorMount> mountOf(const BagReader& bag, const MapBuilderOptions& options,
-                                   const MapBuilderConfig& config) {
-  std::optional<SensorMount> mount = bag.mount(options.image_topic, options.fix_topic, config.base_frame);
-  if (config.camera_mount.empty() && config.antenna_mount.empty()) return mount;
-  SensorMount given = mount.value_or(SensorMount());
-  if (!config.camera_mount.empty()) given.camera = parseCameraMount(config.camera_mount);
-  if (!mount) given.antenna_m = given.camera.position_m;
-  if (!config.antenna_mount.empty()) given.antenna_m = parseAntennaMount(config.antenna_mount);
-  return given;
+                                   const MapBuilderConfig& config, const std::string& antenna_frame,
+                                   std::vector<Remark>& remarks) {
+  const bool has_camera = !config.camera_mount.empty();
+  const bool has_antenna = !config.antenna_mount.empty();
+  SensorMount given;
+  if (has_camera) given.camera = parseCameraMount(config.camera_mount);
+  if (has_antenna) given.antenna_m = parseAntennaMount(config.antenna_mount);
+  if (has_camera && has_antenna) return given;
+  if (has_camera) {
+    const auto antenna = bag.transforms(true)->pose(config.base_frame, antenna_frame);
+    if (!antenna) refuseHalf(bag, "robot/camera", "robot/antenna");
+    given.antenna_m = antenna->translation();
+    return given;
+  }
+  const auto antenna = has_antenna ? std::nullopt : std::optional<std::string>(antenna_frame);
+  std::optional<RobotMount> found = recordedMount(bag, {config.base_frame, options.image_topic, antenna}, options.bags);
+  if (!found && has_antenna) refuseHalf(bag, "robot/antenna", "robot/camera");
+  if (!found) return std::nullopt;
+  if (has_antenna) found->mount.antenna_m = given.antenna_m;
+  remarks.push_back({found->said});
+  return found->mount;
 }
 
 /// That of the option, or of the bag.
-SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options, const MapBuilderConfig& config) {
+SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options,
+                       const std::optional<SensorMount>& mount) {
   SessionCamera camera;
-  camera.mount = mountOf(bag, options, config);
+  camera.mount = mount;
   camera.model = options.camera_info.empty() ? bag.camera(options.image_topic) : readCameraFile(options.camera_info);
   if (!options.mask.empty()) camera.mask = readMask(options.mask);
   camera.image_size = bag.images(options.image_topic).usualSize();
@@ -140,9 +187,15 @@ void requireDifferent(const std::string& what, const std::vector<std::string>& f
 void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOptions& options,
                 const MapBuilderConfig& config, std::vector<PlottedSession>& sessions) {
   const BagReader bag(path);
-  PlottedSession session{sessionName(path, sessions), bag.fixes(options.fix_topic), {}};
-  addTo(builder, bag, options, std::move(session), cameraOf(bag, options, config), sessions,
-        [](std::int64_t) { return true; });
+  PlottedSession session{sessionName(path, sessions), {}, {}};
+  Receiver receiver = receiverOf(bag, options, config, session.remarks);
+  const SessionCamera camera = cameraOf(bag, options, mountOf(bag, options, config, receiver.frame, session.remarks));
+  for (const Remark& pause : breaksOf(receiver.fixes, config.trajectory)) session.remarks.push_back(pause);
+  const ClockCheck clock =
+      checkClock(bag, bag.images(options.image_topic), receiver.fixes, config, camera.mount, options.threads);
+  session.remarks.push_back(clock.remark);
+  session.fixes = putRight(std::move(receiver.fixes), clock);
+  addTo(builder, bag, options, std::move(session), camera, sessions, [](std::int64_t) { return true; });
 }
 
 void addVerifiedSession(MapBuilder& builder, const std::string& path, const VerifiedDrive& drive,
@@ -276,8 +329,12 @@ void addSessions(const NamedMap& map, const MapBuilderOptions& options, const Ma
   const PartialFile added(output);
   saveSessions(builder, options, config, sessions, added);
   const std::string name = joined(options.bags);
-  if (usage != nullptr) return mergeAndCull(map, name, added, *usage, output, edit, options.threads);
-  mergeAndPrint(output, {map, {name, openMap(added.path(), 2)}}, edit, options.threads);
+  if (usage != nullptr) {
+    mergeAndCull(map, name, added, *usage, output, edit, options.threads);
+  } else {
+    mergeAndPrint(output, {map, {name, openMap(added.path(), 2)}}, edit, options.threads);
+  }
+  printDisagreements(builder.report(), sessions);
 }
 
 void addDrive(const NamedMap& map, const VerifiedDrive& drive, const MapBuilderOptions& options, const MapUsage& usage,

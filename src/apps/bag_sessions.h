@@ -22,6 +22,10 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
 /// In one line. The map must be written.
 void printSummary(const MapBuilderOptions& options, const MapBuildReport& report, double seconds);
 
+/// Last, and yellow in a terminal: what of the recordings contradicts itself. A map is written all the same, and the
+/// exit code is 0. Nothing when all agrees.
+void printDisagreements(const MapBuildReport& report, const std::vector<PlottedSession>& sessions);
+
 /// The parameters of a file, if there is one, and what the options say otherwise. Throws ParameterError or UsageError.
 MapBuilderConfig readConfig(const MapBuilderOptions& options);
 

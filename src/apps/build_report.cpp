@@ -4,6 +4,10 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
+#include <string>
+#include <vector>
+
+#include <unistd.h>
 
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
@@ -27,6 +31,10 @@ void printFixes(const PlottedSession& session) {
   }
   std::cout << "; " << session.cleaned.gaps_closed << " gaps closed, the longest " << session.cleaned.longest_gap_s
             << " s; path " << session.cleaned.trajectory.length() << " m\n";
+}
+
+void printRemarks(const PlottedSession& session) {
+  for (const Remark& remark : session.remarks) std::cout << session.name << ": " << remark.text << '\n';
 }
 
 void printCamera(const SessionImages& session, const MapBuilderOptions& options, const GeometryConfig& geometry) {
@@ -136,6 +144,7 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
   std::cout << std::fixed << std::setprecision(1);
   for (const SessionImages& session : report.session_images) printCamera(session, options, geometry);
   for (const SessionImages& session : report.session_images) printMount(session);
+  for (const PlottedSession& session : sessions) printRemarks(session);
   for (const PlottedSession& session : sessions) printFixes(session);
   for (const SessionImages& session : report.session_images) {
     if (geometry.enabled) printGeometry(session);
@@ -169,6 +178,34 @@ void printSummary(const MapBuilderOptions& options, const MapBuildReport& report
             << fixesKept(report) << " of " << fixes << " fixes, " << gaps << " gaps closed, features "
             << report.features_extracted << " -> " << report.features_kept << ", "
             << humanSize(static_cast<double>(std::filesystem::file_size(options.output))) << ", " << seconds << " s\n";
+}
+
+namespace {
+
+/// What each session disagrees about, in one line.
+std::vector<std::string> disagreementsOf(const MapBuildReport& report, const std::vector<PlottedSession>& sessions) {
+  std::vector<std::string> found;
+  for (const PlottedSession& session : sessions) {
+    for (const Remark& remark : session.remarks) {
+      if (remark.disagrees) found.push_back(session.name + ": " + remark.text);
+    }
+  }
+  for (const SessionImages& session : report.session_images) {
+    if (!session.geometry.contradicts_calibration) continue;
+    found.push_back(session.name + ": images, fixes and calibration disagree, so it has places only");
+  }
+  return found;
+}
+
+}  // namespace
+
+void printDisagreements(const MapBuildReport& report, const std::vector<PlottedSession>& sessions) {
+  const std::vector<std::string> found = disagreementsOf(report, sessions);
+  if (found.empty()) return;
+  const bool terminal = ::isatty(STDOUT_FILENO) != 0;
+  std::cout << (terminal ? "\033[33m" : "")
+            << "check before use (\"What disagrees\" in doc/faults.md): " << joined(found, "; ")
+            << (terminal ? "\033[0m" : "") << '\n';
 }
 
 }  // namespace visual_localization::apps

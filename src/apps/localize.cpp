@@ -12,6 +12,7 @@
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/command_line.h"
+#include "bag/recorded_mount.h"
 #include "base/files.h"
 #include "editing/map_selection.h"
 #include "evaluation/evaluator.h"
@@ -177,12 +178,18 @@ std::optional<cv::Size> recordedSize(const BagImages& images) {
 
 /// Where the drive's robot carries its camera: as the parameter says, the bag, or the map.
 void setMount(const LocalizeOptions& options, const NodeConfig& config, const BagReader& bag, Localizer& localizer) {
-  std::optional<SensorMount> mount = bag.mount(options.image_topic, "", config.base_frame_id);
-  if (!config.camera_mount.empty()) mount.emplace().camera = parseCameraMount(config.camera_mount);
-  if (!mount) return;
-  localizer.setMount(*mount);
-  std::printf("robot: camera at %.2f %.2f %.2f m in %s\n", mount->camera.position_m.x(), mount->camera.position_m.y(),
-              mount->camera.position_m.z(), config.base_frame_id.c_str());
+  std::optional<RobotMount> found;
+  if (!config.camera_mount.empty()) {
+    found.emplace().mount.camera = parseCameraMount(config.camera_mount);
+    found->said = "by the parameter";
+  } else {
+    found = recordedMount(bag, {config.base_frame_id, options.image_topic});
+  }
+  if (!found) return;
+  localizer.setMount(found->mount);
+  const Eigen::Vector3d& camera_m = found->mount.camera.position_m;
+  std::printf("robot: camera at %.2f %.2f %.2f m in %s (%s)\n", camera_m.x(), camera_m.y(), camera_m.z(),
+              config.base_frame_id.c_str(), found->said.c_str());
 }
 
 /// Gives the localizer the camera and the mask that belong to the drive: those of the options, the calibration in the

@@ -57,6 +57,7 @@ void buildMap(const MapBuilderOptions& options) {
   printSummary(options, builder.report(),
                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   if (!options.plot.empty()) draw(options, sessions, builder.frame());
+  printDisagreements(builder.report(), sessions);
 }
 
 }  // namespace

@@ -78,6 +78,12 @@ std::string toGeoJson(const TrainingMap& map, const MapFindings& findings);
 /// one line, when something is in the folder, the map has no landmarks or cannot be read; then it leaves nothing.
 ColmapSummary writeColmap(const TrainingMap& map, const std::string& folder);
 
+/// What the builder has to say of a recording, in one line.
+struct Remark {
+  std::string text;
+  bool disagrees = false;  ///< parts of the recording contradict each other, and the map may be wrong
+};
+
 /// One session: its fixes beside what was made of them.
 struct PlottedSession {
   std::string name;
@@ -85,6 +91,7 @@ struct PlottedSession {
   CleanedTrajectory cleaned;
   std::vector<Eigen::Vector2d> images_m = {};     ///< positions of its training images, adjusted if it has landmarks
   std::vector<Eigen::Vector2d> landmarks_m = {};  ///< none: it has places only
+  std::vector<Remark> remarks = {};
 };
 
 /// Gives the sessions, which are those of `map` in its order, their images and landmarks: at most 20000 of these.

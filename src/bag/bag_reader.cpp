@@ -9,8 +9,6 @@
 #include <utility>
 
 #include <sys/stat.h>
-#include <tf2/buffer_core.h>
-#include <tf2_eigen/tf2_eigen.h>
 
 #include "bag/bag_messages.h"
 #include "base/text.h"
@@ -187,7 +185,7 @@ std::vector<Fix> BagReader::fixes(const std::string& topic) const {
 
 namespace {
 
-/// Both kinds of images and fixes begin with their header. Empty without messages.
+/// Images and calibrations begin with their header. Empty without messages.
 std::string frameOf(bag::BagFile& file, const std::set<std::uint32_t>& connections) {
   const std::vector<bag::Message> messages = file.messages(connections);
   if (messages.empty()) return {};
@@ -207,36 +205,31 @@ std::string frameOf(bag::BagFile& file, const std::string& topic) {
   return found == topics.end() ? std::string() : frameOf(file, found->second);
 }
 
-std::string imageFrame(bag::BagFile& file, const std::string& topic) {
-  const std::string raw = frameOf<sensor_msgs::Image>(file, topic);
-  if (!raw.empty()) return raw;
-  const std::string compressed = frameOf<sensor_msgs::CompressedImage>(file, topic);
-  return compressed.empty() ? frameOf<sensor_msgs::CompressedImage>(file, topic + "/compressed") : compressed;
-}
-
 }  // namespace
 
-std::optional<SensorMount> BagReader::mount(const std::string& image_topic, const std::string& fix_topic,
-                                            const std::string& base_frame) const {
-  return withBag(path_, [&]() -> std::optional<SensorMount> {
-    const std::string topic = "/tf_static";
-    if (topicsOf<tf2_msgs::TFMessage>(*file_).count(topic) == 0) return std::nullopt;
-    StaticTransforms transforms;
-    for (const bag::Message& message : messagesOf<tf2_msgs::TFMessage>(*file_, topic)) {
-      transforms.add(*deserialize<tf2_msgs::TFMessage>(file_->read(message)));
+std::string BagReader::imageFrame(const std::string& topic) const {
+  return withBag(path_, [&] {
+    std::string frame = frameOf<sensor_msgs::Image>(*file_, topic);
+    if (frame.empty()) frame = frameOf<sensor_msgs::CompressedImage>(*file_, topic);
+    if (frame.empty()) frame = frameOf<sensor_msgs::CompressedImage>(*file_, topic + "/compressed");
+    return frame.empty() ? frameOf<sensor_msgs::CameraInfo>(*file_, cameraInfoTopic(topic)) : frame;
+  });
+}
+
+std::shared_ptr<const StaticTransforms> BagReader::transforms(bool published) const {
+  return withBag(path_, [&]() -> std::shared_ptr<const StaticTransforms> {
+    auto transforms = std::make_shared<StaticTransforms>();
+    const auto messages = [&](const std::string& topic) {
+      const bool has = topicsOf<tf2_msgs::TFMessage>(*file_).count(topic) != 0;
+      return has ? messagesOf<tf2_msgs::TFMessage>(*file_, topic) : std::vector<bag::Message>();
+    };
+    for (const bag::Message& message : messages("/tf_static")) {
+      transforms->add(*deserialize<tf2_msgs::TFMessage>(file_->read(message)));
     }
-    const auto camera = transforms.pose(base_frame, imageFrame(*file_, image_topic));
-    const auto antenna = transforms.pose(base_frame, frameOf<sensor_msgs::NavSatFix>(*file_, fix_topic));
-    if (!camera && !antenna) return std::nullopt;
-    SensorMount mount;
-    if (camera) mount.camera = {Eigen::Quaterniond(camera->linear()).normalized(), camera->translation()};
-    mount.antenna_m = antenna ? Eigen::Vector3d(antenna->translation()) : mount.camera.position_m;
-    try {
-      requireMount(mount);
-    } catch (const MountError& error) {
-      throw BagError(path_ + ": " + topic + ": " + error.what());
+    for (const bag::Message& message : published ? messages("/tf") : std::vector<bag::Message>()) {
+      transforms->addPublished(*deserialize<tf2_msgs::TFMessage>(file_->read(message)));
     }
-    return mount;
+    return transforms;
   });
 }
 

@@ -55,6 +55,10 @@ void requireMount(const SensorMount& mount) {
 CameraPose parseCameraMount(const std::string& text) {
   const std::vector<double> n =
       numbersOf(text, 6, "x y z yaw pitch roll of the camera on the robot, metres and radians");
+  for (const double angle : {n[3], n[4], n[5]}) {
+    if (std::abs(angle) <= 2.0 * kPi) continue;
+    throw MountError("'" + text + "': an angle is beyond 2 pi: yaw, pitch and roll are radians, not degrees");
+  }
   const Eigen::Quaterniond body(Eigen::AngleAxisd(n[3], Eigen::Vector3d::UnitZ()) *
                                 Eigen::AngleAxisd(n[4], Eigen::Vector3d::UnitY()) *
                                 Eigen::AngleAxisd(n[5], Eigen::Vector3d::UnitX()));

@@ -8,6 +8,7 @@
 #include "base/files.h"
 #include "base/time.h"
 #include "features/image_size.h"
+#include "geo/trajectory_parts.h"
 #include "map/extraction_pool.h"
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
@@ -71,7 +72,7 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   try {
     const LocalFrame frame = frame_ ? *frame_ : frameFor(fixes, config_.trajectory);
     requireNear(fixes, frame.datum());
-    CleanedTrajectory cleaned = cleanTrajectory(fixes, frame, config_.trajectory);
+    CleanedTrajectory cleaned = cleanInParts(fixes, frame, config_.trajectory);
     requireMotion(cleaned);
     report_.sessions.push_back(std::move(cleaned));
     frame_ = frame;
@@ -264,7 +265,7 @@ bool canParse(const std::string& text, Parse parse) {
 
 void requireMountTexts(ParameterVisitor& visitor, const std::string& camera, const std::string& antenna) {
   visitor.require(canParse(camera, parseCameraMount), "robot/camera", "'" + camera + "'",
-                  "six numbers: x y z yaw pitch roll, metres (at most 100) and radians");
+                  "six numbers: x y z yaw pitch roll, metres (at most 100) and radians (at most 2 pi; no degrees)");
   visitor.require(canParse(antenna, parseAntennaMount), "robot/antenna", "'" + antenna + "'",
                   "three numbers: x y z, metres, at most 100");
 }
@@ -292,6 +293,9 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
                 "where the camera is"},
                camera_mount);
   visitor.text({"robot/antenna", "m", "x y z of the antenna on the robot; empty: likewise"}, antenna_mount);
+  visitor.text({"robot/fix_frame", "",
+                "frame of the receiver whose fixes count, where several share a topic; empty: the one with most fixes"},
+               fix_frame);
   requireMountTexts(visitor, camera_mount, antenna_mount);
   sift.declare(visitor);
   match.declare(visitor);

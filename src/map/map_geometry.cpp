@@ -98,16 +98,23 @@ void requireMotion(const CleanedTrajectory& cleaned) {
                            "stuck, or the robot stood; a session spans at least 0.1 m");
 }
 
-std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame) {
+std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const std::vector<FixVerdict>& verdicts,
+                            const LocalFrame& frame) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (hasPosition(fixes[i])) order.push_back(i);
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return fixes[a].stamp_ns < fixes[b].stamp_ns; });
   std::vector<Fix> ordered;
-  std::copy_if(fixes.begin(), fixes.end(), std::back_inserter(ordered), hasPosition);
-  std::stable_sort(ordered.begin(), ordered.end(), [](const Fix& a, const Fix& b) { return a.stamp_ns < b.stamp_ns; });
+  for (const std::size_t i : order) ordered.push_back(fixes[i]);
   const std::vector<AltitudeSample> samples = altitudesOf(ordered, frame);
   const std::vector<double> altitudes_m = steadyAltitudes(samples);
   std::vector<MapFix> found;
   for (std::size_t i = 0; i < ordered.size(); ++i) {
     const double up_m = altitudes_m[i] - frame.datum().altitude_m;
-    found.push_back({ordered[i].stamp_ns, samples[i].position_m, ordered[i].sigma_m, up_m, ordered[i].sigma_up_m});
+    found.push_back({ordered[i].stamp_ns, samples[i].position_m, ordered[i].sigma_m, up_m, ordered[i].sigma_up_m,
+                     verdicts[order[i]] == FixVerdict::kKept});
   }
   return found;
 }

@@ -45,6 +45,7 @@ CameraWatch::CameraWatch(ros::NodeHandle node, const NodeConfig& config, const s
   if (file.empty()) subscriber_ = node.subscribe(topic_, 1, &CameraWatch::onCameraInfo, this);
   if (config.camera_mount.empty()) {
     static_transforms_ = node.subscribe("/tf_static", 100, &CameraWatch::onStaticTransforms, this);
+    transforms_subscriber_ = node.subscribe("/tf", 100, &CameraWatch::onTransforms, this);
   }
 }
 
@@ -54,29 +55,48 @@ void CameraWatch::onStaticTransforms(const tf2_msgs::TFMessageConstPtr& message)
   findMount();
 }
 
+void CameraWatch::onTransforms(const tf2_msgs::TFMessageConstPtr& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  transforms_.addPublished(*message);
+  if (!mount_) findMount();
+}
+
 void CameraWatch::imageFrameIs(const std::string& frame) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (frame == camera_frame_) return;
-  camera_frame_ = frame;
-  findMount();
+  if (frame != camera_frame_) {
+    camera_frame_ = frame;
+    findMount();
+  }
+  sayMountTrouble();
 }
 
 /// Once the frame of the camera is known, and the way to it from that of the robot.
 void CameraWatch::findMount() {
-  const auto pose = transforms_.pose(base_frame_, camera_frame_);
-  if (!pose) return;
-  SensorMount mount;
-  mount.camera = {Eigen::Quaterniond(pose->linear()).normalized(), pose->translation()};
-  const bool known = mount_ && mount_->camera.position_m == mount.camera.position_m &&
-                     mount_->camera.rotation.coeffs() == mount.camera.rotation.coeffs();
-  if (known) return;
-  mount_ = mount;
+  if (!camera_frame_) return;
   try {
-    localizer_.setMount(mount);
-    say_(false, "Camera mounting from /tf_static: " + base_frame_ + " to " + camera_frame_);
-  } catch (const std::exception& error) {
-    say_(true, "Mount of the camera refused: /tf_static: " + std::string(error.what()));
+    const std::optional<RobotMount> found = robotMount(transforms_, base_frame_, *camera_frame_, std::nullopt);
+    mount_trouble_.clear();
+    if (!found) return;
+    const CameraPose& camera = found->mount.camera;
+    const bool known = mount_ && mount_->camera.position_m == camera.position_m &&
+                       mount_->camera.rotation.coeffs() == camera.rotation.coeffs();
+    if (known) return;
+    mount_.emplace().camera = camera;
+    localizer_.setMount(*mount_);
+    say_(false, "Camera mounting from /tf_static: " + base_frame_ + " to " + *camera_frame_ + " (" + found->said + ")");
+  } catch (const MountError& error) {
+    if (mount_trouble_.empty()) trouble_since_ = ros::WallTime::now();
+    mount_trouble_ = error.what();
   }
+}
+
+/// Not at once: frames come from several publishers, one after the other.
+void CameraWatch::sayMountTrouble() {
+  constexpr double kPatience_s = 3.0;
+  if (mount_trouble_.empty() || mount_trouble_ == mount_said_) return;
+  if ((ros::WallTime::now() - trouble_since_).toSec() < kPatience_s) return;
+  mount_said_ = mount_trouble_;
+  say_(true, "Camera mounting not known, the map's is used: " + mount_trouble_);
 }
 
 void CameraWatch::onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info) {
@@ -120,7 +140,8 @@ void CameraWatch::refuse(const std::string& reason) {
 
 void CameraWatch::mapIs(const MapHeader& map) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  of_map_ = map.sessions.front().camera;
+  const Session& first = map.sessions.front();
+  of_map_ = first.published ? first.published : first.camera;  // what a camera says of itself
   map_size_ = map.image_size;
   if (!of_map_) say_(false, "The map has no calibration: places only");
   compareWithMap();

@@ -20,7 +20,8 @@
 namespace visual_localization {
 
 /// Keeps the localizer informed about the camera: its calibration, from a file or from the topic beside the images, and
-/// its mask, and where the robot carries it: from a parameter or from /tf_static. Says once each what it uses and how
+/// its mask, and where the robot carries it: from a parameter or from /tf_static and
+/// what never changes in /tf. Says once each what it uses and how
 /// that differs from the map's camera. A calibration or a mount that cannot be used changes nothing.
 class CameraWatch {
  public:
@@ -34,6 +35,7 @@ class CameraWatch {
   ~CameraWatch() {
     subscriber_.shutdown();
     static_transforms_.shutdown();
+    transforms_subscriber_.shutdown();
   }
   CameraWatch(const CameraWatch&) = delete;
   CameraWatch& operator=(const CameraWatch&) = delete;
@@ -46,7 +48,9 @@ class CameraWatch {
  private:
   void onCameraInfo(const sensor_msgs::CameraInfoConstPtr& info);
   void onStaticTransforms(const tf2_msgs::TFMessageConstPtr& message);
+  void onTransforms(const tf2_msgs::TFMessageConstPtr& message);
   void findMount();
+  void sayMountTrouble();
   void use(const CameraModel& camera, const std::string& source);
   void refuse(const std::string& reason);
   void compareWithMap();
@@ -66,11 +70,15 @@ class CameraWatch {
   std::string trouble_;
   std::string said_;  ///< about the difference from the map's camera
   std::string base_frame_;
-  std::string camera_frame_;
+  std::optional<std::string> camera_frame_;  ///< once an image has come
   StaticTransforms transforms_;
   std::optional<SensorMount> mount_;
+  std::string mount_trouble_;  ///< why there is none, or why it is not believed
+  std::string mount_said_;     ///< what was said of that
+  ros::WallTime trouble_since_;
   ros::Subscriber subscriber_;
   ros::Subscriber static_transforms_;
+  ros::Subscriber transforms_subscriber_;
 };
 
 }  // namespace visual_localization

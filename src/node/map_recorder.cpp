@@ -186,8 +186,7 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
       updater_(node, private_node, ros::this_node::getName()) {
   assignParameters(config_, privateParameters(private_node_));
   if (!config_.builder_config.empty()) {  // a wrong one would be found after the round
-    MapBuilderConfig attempt;
-    assignParameters(attempt, parameters::readYaml(config_.builder_config));
+    assignParameters(builder_, parameters::readYaml(config_.builder_config));
   }
   const auto map = config_.map.empty() ? nullptr : loadMap(config_.map);
   watch_.emplace(config_.watch, map);
@@ -204,10 +203,14 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
   record<sensor_msgs::CameraInfo>(cameraInfoTopic(image_topic_), kSlowQueue,
                                   [this](const sensor_msgs::CameraInfoConstPtr& info) { watchCalibration(*info); });
   record<sensor_msgs::NavSatFix>("fix", kFastQueue, [this](const sensor_msgs::NavSatFixConstPtr& fix) {
+    fix_frame_ = withoutSlash(fix->header.frame_id);
     watch_->addFix(toFix(*fix, stampOf(fix->header)));
   });
   record<nav_msgs::Odometry>("odom", kFastQueue);
-  record<tf2_msgs::TFMessage>(kStaticTransforms, kFastQueue);
+  record<tf2_msgs::TFMessage>(kStaticTransforms, kFastQueue,
+                              [this](const tf2_msgs::TFMessageConstPtr& message) { transforms_.add(*message); });
+  record<tf2_msgs::TFMessage>(
+      "/tf", kFastQueue, [this](const tf2_msgs::TFMessageConstPtr& message) { transforms_.addPublished(*message); });
 
   way_ = private_node_.advertise<visualization_msgs::Marker>("way", 1, true);
   ros::NodeHandle services(private_node_);
@@ -260,6 +263,7 @@ void MapRecorder::recordImages(const std::string& topic) {
   image_type_ = ros::message_traits::datatype<Message>();
   record<Message>(topic, kSlowQueue, [this](const boost::shared_ptr<const Message>& message) {
     images_.add();
+    image_frame_ = withoutSlash(message->header.frame_id);
     watch_->addImage(stampOf(message->header));
     queue_.push({message->header, [message] { return toGrey(*message); }});
   });
@@ -439,6 +443,19 @@ void MapRecorder::reportRecording(Wrapper& status) {
   status.addf("Images (Hz)", "%.2f", images_.rate_hz());
 }
 
+/// Why the map will not know where the robot carries camera and antenna; empty when it will, or nobody says anything of
+/// frames. The caller holds the mutex.
+std::string MapRecorder::mountTrouble() const {
+  if (!image_frame_ || !fix_frame_ || !builder_.camera_mount.empty()) return "";
+  const auto antenna = builder_.antenna_mount.empty() ? fix_frame_ : std::nullopt;
+  try {
+    robotMount(transforms_, builder_.base_frame, *image_frame_, antenna);
+    return "";
+  } catch (const MountError& error) {
+    return oneLine(error.what(), 1000);
+  }
+}
+
 void MapRecorder::reportSession(Wrapper& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const RecordingWatch::Summary seen = watch_->summary();
@@ -462,6 +479,8 @@ void MapRecorder::reportSession(Wrapper& status) {
   status.addf("Spacing (m)", "%.2f", seen.spacing_m);
   status.add("Features", seen.features);
   if (!config_.map.empty()) status.addf("Way that the map has (%)", "%.0f", 100.0 * seen.known_way_share);
+  const std::string trouble = mountTrouble();
+  if (!trouble.empty()) status.mergeSummary(DiagnosticStatus::WARN, "Mounting not known: " + trouble);
 }
 
 }  // namespace visual_localization

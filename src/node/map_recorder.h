@@ -25,10 +25,12 @@
 #include "node/published_topics.h"
 #include "node/throttled_log.h"
 #include "ros/message_readers.h"
+#include "ros/static_transforms.h"
 #include "visual_localization/WriteMap.h"
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/geo/trajectory.h"
+#include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -165,6 +167,7 @@ class MapRecorder {
   template <class Message>
   void write(const std::string& topic, const Message& message);
   void lookAtImages();
+  std::string mountTrouble() const;
   std::size_t featuresOf(const cv::Mat& grey);
   bool onWriteMap(WriteMap::Request& request, WriteMap::Response& response);
   RecordedSession sessionFor(const std::string& path) const;
@@ -189,6 +192,9 @@ class MapRecorder {
   SingleCalibration calibration_{false};
   std::string calibration_trouble_;  ///< that no later message mends
   PublishedTopics topics_;
+  StaticTransforms transforms_;
+  std::optional<std::string> image_frame_;
+  std::optional<std::string> fix_frame_;
   std::size_t published_ = 0;
   // What has its own lock, or does not change.
   std::unique_ptr<SiftExtractor> extractor_;
@@ -199,6 +205,7 @@ class MapRecorder {
   std::string recorded_topic_;  ///< with the suffix of its transport
   std::string image_type_;
   std::string fix_topic_;
+  MapBuilderConfig builder_;
   ros::Publisher way_;
   ros::CallbackQueue services_;
   ros::ServiceServer write_map_;

@@ -12,8 +12,6 @@
 #include <camera_calibration_parsers/parse_ini.h>
 #include <camera_calibration_parsers/parse_yml.h>
 #include <image_transport/camera_common.h>
-#include <tf2/exceptions.h>
-#include <tf2_eigen/tf2_eigen.h>
 
 #include "base/files.h"
 #include "base/text.h"
@@ -248,14 +246,6 @@ double sigmaOf(const sensor_msgs::NavSatFix& message, double variance_m2) {
   return std::isfinite(variance_m2) && variance_m2 > 0.0 ? std::sqrt(variance_m2) : 0.0;
 }
 
-bool isRigid(const geometry_msgs::Transform& transform) {
-  constexpr double kUnitTolerance = 1e-3;
-  const Eigen::Quaterniond rotation(transform.rotation.w, transform.rotation.x, transform.rotation.y,
-                                    transform.rotation.z);
-  const Eigen::Vector3d translation(transform.translation.x, transform.translation.y, transform.translation.z);
-  return translation.allFinite() && std::abs(rotation.norm() - 1.0) <= kUnitTolerance;
-}
-
 }  // namespace
 
 Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
@@ -264,50 +254,6 @@ Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
           message.status.status >= sensor_msgs::NavSatStatus::STATUS_FIX,
           sigmaOf(message, 0.5 * (message.position_covariance[0] + message.position_covariance[4])),
           sigmaOf(message, message.position_covariance[8])};
-}
-
-std::string withoutSlash(const std::string& frame) {
-  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-}
-
-bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform) {
-  constexpr std::size_t kLongestName = 255;
-  const std::string& parent = transform.header.frame_id;
-  const std::string& child = transform.child_frame_id;
-  return !parent.empty() && !child.empty() && parent != child && parent.size() <= kLongestName &&
-         child.size() <= kLongestName;
-}
-
-void StaticTransforms::add(const tf2_msgs::TFMessage& message) {
-  for (geometry_msgs::TransformStamped transform : message.transforms) {
-    transform.header.frame_id = withoutSlash(transform.header.frame_id);
-    transform.child_frame_id = withoutSlash(transform.child_frame_id);
-    if (!joinsTwoFrames(transform) || !isRigid(transform.transform)) continue;
-    if (isFull(transform)) continue;
-    buffer_.setTransform(transform, "tf_static", true);
-  }
-}
-
-/// tf2 never forgets a name.
-bool StaticTransforms::isFull(const geometry_msgs::TransformStamped& transform) {
-  for (const std::string& name : {transform.header.frame_id, transform.child_frame_id}) {
-    if (names_.count(name) != 0) continue;
-    if (names_.size() >= kMostFrames) return true;
-    names_.insert(name);
-  }
-  return false;
-}
-
-std::optional<Eigen::Isometry3d> StaticTransforms::pose(const std::string& base_frame, const std::string& frame) const {
-  const std::string base = withoutSlash(base_frame);
-  const std::string child = withoutSlash(frame);
-  if (base.empty() || child.empty()) return std::nullopt;
-  try {
-    const Eigen::Isometry3d pose = tf2::transformToEigen(buffer_.lookupTransform(base, child, ros::Time()));
-    return pose.matrix().allFinite() ? std::optional<Eigen::Isometry3d>(pose) : std::nullopt;
-  } catch (const tf2::TransformException&) {
-    return std::nullopt;
-  }
 }
 
 OdometryReading toReading(const nav_msgs::Odometry& message, std::int64_t stamp_ns, const std::string& base_frame,

@@ -6,14 +6,11 @@
 #include <set>
 #include <string>
 
-#include <Eigen/Geometry>
-#include <geometry_msgs/TransformStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/NavSatFix.h>
-#include <tf2/buffer_core.h>
-#include <tf2_msgs/TFMessage.h>
 
+#include "ros/static_transforms.h"
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/localization/odometry.h"
@@ -74,30 +71,5 @@ Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns);
 /// frame is `map_frame`: then it is no odometry, but what somebody has localised.
 OdometryReading toReading(const nav_msgs::Odometry& message, std::int64_t stamp_ns, const std::string& base_frame,
                           const std::string& map_frame);
-
-/// tf2 knows frames without the slash that tf gave them.
-std::string withoutSlash(const std::string& frame);
-
-/// Of a robot; it has tens or hundreds. Frames beyond are left out: whoever publishes them may never end.
-constexpr std::size_t kMostFrames = 4096;
-
-/// Whether it names two frames, by names of a length that names have.
-bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform);
-
-/// Where the parts of a robot are that do not move, as /tf_static tells. Not thread-safe.
-class StaticTransforms {
- public:
-  /// Leaves out transforms that are not finite, whose rotation is not of unit length, that name no two frames, or a
-  /// frame beyond kMostFrames.
-  void add(const tf2_msgs::TFMessage& message);
-  /// The pose of `frame` in `base_frame`; nothing when they are not connected.
-  std::optional<Eigen::Isometry3d> pose(const std::string& base_frame, const std::string& frame) const;
-
- private:
-  bool isFull(const geometry_msgs::TransformStamped& transform);
-
-  tf2::BufferCore buffer_;
-  std::set<std::string> names_;
-};
 
 }  // namespace visual_localization

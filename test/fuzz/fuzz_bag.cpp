@@ -5,6 +5,7 @@
 #include <string>
 
 #include "bag/bag_file.h"
+#include "bag/recorded_mount.h"
 #include "test/fuzz/fuzz_support.h"
 #include "visual_localization/bag/bag_reader.h"
 #include "visual_localization/geometry/camera_pose.h"
@@ -28,9 +29,9 @@ void readCamera(const BagReader& bag, const std::string& topic) {
 }
 
 void readMount(const BagReader& bag, const std::string& topic) {
-  const std::optional<SensorMount> mount = bag.mount(topic, "/fix", "base_link");
-  if (!mount) return;
-  requireMount(*mount);
+  const std::optional<RobotMount> found = recordedMount(bag, {"base_link", topic, "gps"});
+  if (!found) return;
+  requireMount(found->mount);
   fuzz::countRead();
 }
 
@@ -53,6 +54,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::expect<BagError>([&] {
     const BagReader bag("fuzz.bag", std::make_unique<bag::MemoryBytes>(fuzz::Input(data, size).rest()));
     fuzz::expect<BagError>([&] { countUnlessEmpty(bag.fixes("/fix")); });
+    for (const char* topic : {"/fix", "/odom"}) {
+      fuzz::expect<BagError>([&] { countUnlessEmpty(bag.receivers(topic)); });
+    }
     fuzz::expect<BagError>([&] { countUnlessEmpty(bag.odometry("/odom", "base_link", "map")); });
     for (const char* topic : {"/raw", "/jpeg"}) readTopic(bag, topic);
   });

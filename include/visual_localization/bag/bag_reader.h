@@ -20,6 +20,8 @@
 
 namespace visual_localization {
 
+class StaticTransforms;
+
 namespace bag {
 class BagFile;
 class Bytes;
@@ -59,6 +61,13 @@ class BagImages {
   std::shared_ptr<const Content> content_;
 };
 
+/// One source of positions.
+struct Receiver {
+  std::string frame;       ///< of its antenna, or whatever its positions are about; may be empty
+  std::vector<Fix> fixes;  ///< in the order of recording, believable or not
+  std::string said = {};   ///< how they became fixes, if that is worth a line
+};
+
 /// Reads images and fixes from a bag that may come from anyone: a damaged one gives a BagError. Damage within a
 /// compressed chunk shows when its first message is read, all other on opening.
 class BagReader {
@@ -71,6 +80,11 @@ class BagReader {
   /// Finds `topic` as sensor_msgs/Image, or `topic` or `<topic>/compressed` as sensor_msgs/CompressedImage, in
   /// this order. Throws BagError naming the image topics that the bag does have.
   BagImages images(const std::string& topic) const;
+
+  /// What is on a topic of positions, sensor_msgs/NavSatFix or nav_msgs/Odometry, by the frames that its messages are
+  /// about: those with the most usable fixes first. Throws BagError that names the topics that the bag does have, or
+  /// the topic's own type.
+  std::vector<Receiver> receivers(const std::string& topic) const;
 
   /// All fixes of a sensor_msgs/NavSatFix topic in the order of recording, believable or not. Throws BagError
   /// naming the fix topics that the bag does have.
@@ -89,11 +103,11 @@ class BagReader {
   /// when the calibration cannot be used, or when it changes within the bag: then it holds for a part of the images.
   std::optional<CameraModel> camera(const std::string& image_topic) const;
 
-  /// Where the robot carries camera and antenna, as /tf_static in the bag tells: the frames of the first image and of
-  /// the first fix in `base_frame`. An antenna whose frame is not there is taken to be at the camera. Nothing without
-  /// either frame. Throws BagError when they cannot be used.
-  std::optional<SensorMount> mount(const std::string& image_topic, const std::string& fix_topic,
-                                   const std::string& base_frame) const;
+  /// What does not move on the robot, as /tf_static tells; `published`: and what never changes in /tf.
+  std::shared_ptr<const StaticTransforms> transforms(bool published) const;
+  /// Frame of the first image of a topic, raw or compressed, or of the calibration beside it; empty when neither names
+  /// one.
+  std::string imageFrame(const std::string& image_topic) const;
 
   const std::string& path() const { return path_; }
 

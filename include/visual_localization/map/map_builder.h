@@ -39,6 +39,7 @@ struct MapBuilderConfig {
   std::string base_frame = "base_link";
   std::string camera_mount;
   std::string antenna_mount;
+  std::string fix_frame;
   SiftConfig sift;
   MatchConfig match;
   TrajectoryCleanerConfig trajectory;

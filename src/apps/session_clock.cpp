@@ -1,0 +1,250 @@
+#include "apps/session_clock.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <utility>
+
+#include "apps/app_support.h"
+#include "base/numbers.h"
+#include "base/text.h"
+#include "base/time.h"
+#include "features/picture_motion.h"
+#include "geo/clock_offset.h"
+#include "geo/trajectory_parts.h"
+
+namespace visual_localization::apps {
+namespace {
+
+/// Below this an antenna ahead of or behind the wheels looks the same: 2 m at the 5 m/s of a car that turns. An
+/// adjustment of a calibrated session finds the rest.
+constexpr double kSmallestOffset_s = 0.4;
+using Paths = std::vector<std::vector<StampedPosition>>;
+
+constexpr double kSignificant = 4.0;  ///< sigmas
+
+struct TimeRange {
+  std::int64_t from_ns = std::numeric_limits<std::int64_t>::max();
+  std::int64_t to_ns = std::numeric_limits<std::int64_t>::min();
+
+  void extend(std::int64_t stamp_ns) {
+    from_ns = std::min(from_ns, stamp_ns);
+    to_ns = std::max(to_ns, stamp_ns);
+  }
+  bool empty() const { return to_ns < from_ns; }
+};
+
+std::string seconds(double value_s, int decimals = 2) {
+  std::ostringstream out = numberStream(6);
+  out << std::fixed << std::setprecision(decimals) << value_s << " s";
+  return out.str();
+}
+
+std::string described(const TimeRange& range) {
+  return secondsText(range.from_ns) + " to " + secondsText(range.to_ns) + " s";
+}
+
+void requireCommonTime(const BagReader& bag, const BagImages& images, const TimeRange& of_images,
+                       const TimeRange& of_fixes) {
+  const auto reach_ns = static_cast<std::int64_t>(kClockReach_s * 1e9);
+  if (of_images.empty() || of_fixes.empty()) return;  // refused elsewhere, by what is missing
+  if (of_images.from_ns <= of_fixes.to_ns + reach_ns && of_fixes.from_ns <= of_images.to_ns + reach_ns) return;
+  throw BagError(bag.path() + ": fixes and images have no time in common: images of " + oneLine(images.topic()) +
+                 " are stamped " + described(of_images) + ", fixes " + described(of_fixes) + ": " +
+                 seconds(secondsBetween(of_images.from_ns, of_fixes.from_ns), 1) +
+                 " between their first stamps: two clocks, or two recordings");
+}
+
+/// What the fixes say where the robot was: all of them, and those alone that cleaning believes. It may take turns for
+/// errors, and errors hide turns.
+Paths pathsOf(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
+  std::vector<double> latitudes_deg;
+  std::vector<double> longitudes_deg;
+  for (const Fix& fix : fixes) {
+    if (!hasPosition(fix)) continue;
+    latitudes_deg.push_back(fix.position.latitude_deg);
+    longitudes_deg.push_back(fix.position.longitude_deg);
+  }
+  if (latitudes_deg.size() < 2) return {};
+  const LocalFrame frame({upperMedian(latitudes_deg), upperMedian(longitudes_deg), 0.0});
+  std::vector<StampedPosition> all;
+  for (const Fix& fix : fixes) {
+    const bool later = all.empty() || fix.stamp_ns > all.back().stamp_ns;
+    if (hasPosition(fix) && later) all.push_back({fix.stamp_ns, frame.toEastNorth(fix.position)});
+  }
+  std::vector<StampedPosition> believed;
+  try {
+    const CleanedTrajectory cleaned = cleanInParts(fixes, frame, config);
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      if (cleaned.verdicts[i] != FixVerdict::kKept) continue;
+      believed.push_back({fixes[i].stamp_ns, frame.toEastNorth(fixes[i].position)});
+    }
+  } catch (const std::runtime_error&) {  // refused, with its reason, when the session begins
+  }
+  return {all, believed};
+}
+
+double medianSpeed_mps(const std::vector<StampedPosition>& path) {
+  std::vector<double> speeds;
+  constexpr double kSpan_s = 2.0;
+  for (std::size_t i = 0, k = 0; i < path.size(); ++i) {
+    while (secondsBetween(path[k].stamp_ns, path[i].stamp_ns) > kSpan_s) ++k;
+    const double span_s = secondsBetween(path[k].stamp_ns, path[i].stamp_ns);
+    if (span_s > 0.5 * kSpan_s) speeds.push_back((path[i].position_m - path[k].position_m).norm() / span_s);
+  }
+  return median(std::move(speeds));
+}
+
+std::string inWords(const ClockOffset& found) {
+  std::ostringstream out = numberStream(6);
+  out << std::fixed << std::setprecision(2) << std::abs(found.offset_s) << " s (sigma " << found.sigma_s << ") "
+      << (found.offset_s < 0.0 ? "before" : "after") << " images of the same turn";
+  return out.str();
+}
+
+bool isOffset(const ClockOffset& found) {
+  return std::abs(found.offset_s) > std::max(kSmallestOffset_s, kSignificant * found.sigma_s) &&
+         found.at_zero_sigmas > kSignificant;
+}
+
+ClockCheck judged(const std::optional<ClockOffset>& found) {
+  ClockCheck check;
+  if (!found) {
+    check.remark = {"clocks: not checked, since fixes and images show no turns together; a constant offset would stay"};
+  } else if (found->along_rows && found->width_rad < 0.0) {
+    check.remark = {"clocks: not checked: pictures turn against the path: images are mirrored or upside down", true};
+  } else if (isOffset(*found)) {
+    check.offset_s = found->offset_s;
+    check.remark = {"clocks: by the turns, fixes are stamped " + inWords(*found) + ": corrected"};
+  } else {
+    const double within_s = std::max(std::abs(found->offset_s), 2.0 * found->sigma_s);
+    check.remark = {"clocks: by the turns, fixes and images agree within " + seconds(within_s)};
+  }
+  return check;
+}
+
+/// By the path that knows the turns best.
+std::optional<ClockOffset> offsetOf(const std::vector<PictureShift>& pictures, const Paths& paths) {
+  std::optional<ClockOffset> best;
+  for (const std::vector<StampedPosition>& path : paths) {
+    const std::optional<ClockOffset> found = clockOffset(pictures, path);
+    if (found && (!best || found->sigmas > best->sigmas)) best = found;
+  }
+  return best;
+}
+
+/// The same for the pictures of some time.
+std::optional<ClockOffset> offsetWithin(const std::vector<PictureShift>& pictures, const Paths& paths,
+                                        std::int64_t from_ns, std::int64_t to_ns) {
+  std::vector<PictureShift> part;
+  for (const PictureShift& picture : pictures) {
+    if (picture.from_ns >= from_ns && picture.to_ns <= to_ns) part.push_back(picture);
+  }
+  return offsetOf(part, paths);
+}
+
+/// Where a clock has stepped, if it has: within the longest pause of the images, or in their middle.
+std::int64_t likelyStep_ns(const std::vector<PictureShift>& pictures) {
+  constexpr double kPause_s = 10.0;
+  const auto longest = std::max_element(pictures.begin(), pictures.end(), [](const auto& a, const auto& b) {
+    return a.to_ns - a.from_ns < b.to_ns - b.from_ns;
+  });
+  if (secondsBetween(longest->from_ns, longest->to_ns) > kPause_s) return longest->from_ns;
+  return pictures.front().from_ns + (pictures.back().to_ns - pictures.front().from_ns) / 2;
+}
+
+/// Nothing unless both parts know their offset and it is not the same.
+std::optional<Remark> stepOf(const std::vector<PictureShift>& pictures, const Paths& paths) {
+  if (pictures.empty()) return std::nullopt;
+  const std::int64_t step_ns = likelyStep_ns(pictures);
+  const auto first = offsetWithin(pictures, paths, pictures.front().from_ns, step_ns);
+  const auto second = offsetWithin(pictures, paths, step_ns, pictures.back().to_ns);
+  if (!first || !second) return std::nullopt;
+  const double apart_s = std::abs(first->offset_s - second->offset_s);
+  if (apart_s < kSmallestOffset_s + kSignificant * std::hypot(first->sigma_s, second->sigma_s)) return std::nullopt;
+  return Remark{"clocks: by the turns, a clock steps: before " + secondsText(step_ns) + " s fixes are stamped " +
+                    inWords(*first) + ", behind it " + inWords(*second) + "; not corrected: cut the bag there",
+                true};
+}
+
+/// Pictures turn with the path.
+bool agrees(const std::optional<ClockOffset>& found) { return found && (!found->along_rows || found->width_rad > 0.0); }
+
+/// Exchanged coordinates make the mirror image of a path, stretched.
+std::vector<Fix> exchangedIn(std::vector<Fix> fixes) {
+  for (Fix& fix : fixes) std::swap(fix.position.latitude_deg, fix.position.longitude_deg);
+  return fixes;
+}
+
+}  // namespace
+
+ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::vector<Fix>& fixes,
+                      const MapBuilderConfig& config, const std::optional<SensorMount>& mount, std::size_t threads) {
+  TimeRange of_images;
+  TimeRange of_fixes;
+  for (const Fix& fix : fixes) {
+    if (hasPosition(fix)) of_fixes.extend(fix.stamp_ns);
+  }
+  PictureMotion motion(threads);
+  {
+    ProgressBar bar("comparing clocks");
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const BagImage image = images.read(i);
+      of_images.extend(image.stamp_ns);
+      if (motion.wants(image.stamp_ns)) {
+        try {
+          motion.add(image.stamp_ns, image.decode());
+        } catch (const ImageError&) {  // counted and named when features are extracted
+        }
+      }
+      bar.show(i + 1, images.size());
+    }
+  }
+  requireCommonTime(bag, images, of_images, of_fixes);
+  const std::vector<PictureShift> pictures = motion.finish();
+  const Paths paths = pathsOf(fixes, config.trajectory);
+  if (const auto step = stepOf(pictures, paths)) return {0.0, false, *step};
+  std::optional<ClockOffset> found = offsetOf(pictures, paths);
+  const auto exchanged =
+      agrees(found) ? std::nullopt : offsetOf(pictures, pathsOf(exchangedIn(fixes), config.trajectory));
+  const bool is_exchanged = agrees(exchanged) && (!found || exchanged->sigmas > found->sigmas);
+  if (is_exchanged) found = exchanged;
+  // The course of an antenna ahead of the robot's origin turns before the robot does.
+  if (found && mount) found->offset_s += mount->antenna_m.x() / std::max(0.1, medianSpeed_mps(paths.front()));
+  ClockCheck check = judged(found);
+  check.exchanged = is_exchanged;
+  if (is_exchanged)
+    check.remark.text = "fixes: latitude and longitude are exchanged, by the turns: put right; " + check.remark.text;
+  return check;
+}
+
+std::vector<Remark> breaksOf(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
+  constexpr double kGoesBack_s = 1.0;  // less is jitter
+  constexpr std::size_t kMostSaid = 5;
+  std::vector<Remark> breaks;
+  std::int64_t latest_ns = fixes.empty() ? 0 : fixes.front().stamp_ns;
+  for (const Fix& fix : fixes) {
+    const double step_s = secondsBetween(latest_ns, fix.stamp_ns);
+    const std::string at = " after " + secondsText(latest_ns) + " s";
+    if (step_s > config.max_bridge_s) {
+      breaks.push_back({"fixes pause for " + seconds(step_s, 1) + at + ": nothing in between has a position"});
+    } else if (step_s < -kGoesBack_s && (breaks.empty() || !breaks.back().disagrees)) {
+      breaks.push_back({"the stamps of fixes go back by " + seconds(-step_s, 1) + at +
+                            ": a clock was set, or two recordings are one; what is not later than before is left out",
+                        true});
+    }
+    latest_ns = std::max(latest_ns, fix.stamp_ns);
+    if (breaks.size() == kMostSaid) break;
+  }
+  return breaks;
+}
+
+std::vector<Fix> putRight(std::vector<Fix> fixes, const ClockCheck& check) {
+  const auto later_ns = static_cast<std::int64_t>(std::llround(check.offset_s * 1e9));
+  for (Fix& fix : fixes) fix.stamp_ns -= later_ns;
+  return check.exchanged ? exchangedIn(std::move(fixes)) : fixes;
+}
+
+}  // namespace visual_localization::apps

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include <Eigen/Geometry>
+#include <tf2_msgs/TFMessage.h>
+
+#include "visual_localization/geometry/camera_pose.h"
+
+namespace visual_localization {
+
+/// tf2 knows frames without the slash that tf gave them.
+std::string withoutSlash(const std::string& frame);
+
+/// Where the parts of a robot are that do not move, as /tf_static tells, and /tf by what never changes. Unlike a buffer
+/// of tf2 it knows why a frame has no place: nothing that contradicts itself is believed. Not thread-safe.
+class StaticTransforms {
+ public:
+  /// Of /tf_static.
+  void add(const tf2_msgs::TFMessage& message);
+  /// Of /tf: counts as fixed until it changes, and only where /tf_static says nothing.
+  void addPublished(const tf2_msgs::TFMessage& message);
+
+  /// Of `frame` in `base_frame`; nothing when they are not connected by fixed transforms.
+  std::optional<Eigen::Isometry3d> pose(const std::string& base_frame, const std::string& frame) const;
+  /// Why there is no pose, in words that name both frames and those that there are.
+  std::string whyNone(const std::string& base_frame, const std::string& frame) const;
+  /// Whether it is a part of a fixed transform.
+  bool knows(const std::string& frame) const;
+  /// Whether /tf_static had any transform.
+  bool hasStatic() const { return has_static_; }
+
+ private:
+  struct Link {
+    std::string parent;
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< child_in_parent
+    bool is_static = false;
+    std::string trouble = {};  ///< why it is not believed; empty: it is
+  };
+  void add(const tf2_msgs::TFMessage& message, bool is_static);
+  std::optional<Eigen::Isometry3d> toRoot(std::string frame, std::string& root) const;
+  std::string troubleAbove(const std::string& frame) const;
+
+  std::map<std::string, Link> links_;  ///< by child
+  bool has_static_ = false;
+};
+
+/// Where a robot carries camera and antenna by its frames, and how that was found, for people.
+struct RobotMount {
+  SensorMount mount;
+  std::string said;
+};
+
+/// Nothing when there is nothing that could tell. `antenna_frame`: none when only the camera is asked for. What the
+/// frames cannot tell is refused: MountError in words that name the frames.
+std::optional<RobotMount> robotMount(const StaticTransforms& transforms, const std::string& base_frame,
+                                     const std::string& image_frame, const std::optional<std::string>& antenna_frame);
+
+}  // namespace visual_localization
