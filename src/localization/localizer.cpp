@@ -4,7 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "base/numbers.h"
 #include "base/time.h"
+#include "localization/place_filter.h"
 #include "localization/pose_verifier.h"
 #include "localization/session_choice.h"
 #include "visual_localization/localization/estimate.h"
@@ -34,6 +36,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       scores_(map_->size()),
       sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept()),
       tracker_(makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed))),
+      witness_(std::make_unique<PlaceFilter>(*map_, config_.bayes, config_.odometry)),
       choice_(config_.features, config_.hybrid),
       assessor_(config_.state),
       odometry_(config_.odometry),
@@ -148,9 +151,10 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
   if (isMetric() && !verifier_->focal().contradicts()) evidence.verified = metric && metric->confirmed;
   evidence.features = scores_.kind();
   const bool sift = evidence.features == FeatureKind::kSift;
+  evidence.probability = probabilityOf(tracked);
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
-  if (state.place_check && !sure && !evidence.verified.value_or(false)) {
+  if (state.place_check && !sure && !evidence.probability && !evidence.verified.value_or(false)) {
     evidence.place_ratio = sweep_.ratio(scores_, tracked.position_m, state.max_distance_m);
   }
   evidence.blind =
@@ -195,6 +199,12 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
   Travel travel;
   if (tracked_ns_) travel = {odometry_.between(*tracked_ns_, stamp_ns), secondsBetween(*tracked_ns_, stamp_ns)};
   tracked_ns_ = stamp_ns;
+  const TrackerEstimate tracked = trackFrom(travel, metric);
+  witness(travel, metric);
+  return tracked;
+}
+
+TrackerEstimate Localizer::trackFrom(const Travel& travel, const std::optional<MetricPose>& metric) {
   if (!metric) return tracker_->update({scores_, sweep_, *sessions_, travel});
   const Eigen::Vector2d position_m = metric->base.translation().head<2>();
   TrackerEstimate tracked = tracker_->update({scores_, sweep_, *sessions_, travel, position_m});
@@ -203,6 +213,33 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
   tracked.best = scores_[tracked.best_image];
   tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
   return tracked;
+}
+
+/// A filter beside the tracker learns from what that one compares, and costs no comparison.
+void Localizer::witness(const Travel& travel, const std::optional<MetricPose>& metric) {
+  if (tracker_->belief() != nullptr || config_.state.witness != "probability") return;
+  witness_->predict(travel);
+  if (metric) return witness_->update(witness_->around(metric->base.translation().head<2>()));
+  if (scores_.kind() != FeatureKind::kSift) return;
+  PlaceLikelihood likelihood;
+  std::vector<double> values;
+  for (const Scores::Compared& compared : scores_.compared()) {
+    likelihood.compared.push_back({compared.training_image, witness_->likelihoodOf(compared.score)});
+    values.push_back(likelihood.compared.back().likelihood);
+  }
+  if (values.empty()) return;
+  // Most of what a tracker compares is near its estimate: the lower half tells what chance is like.
+  constexpr double kChance = 0.25;
+  likelihood.elsewhere = nearestRank(values, kChance);
+  witness_->update(likelihood);
+}
+
+/// Around the estimate; by global features thresholds decide, as by choice.
+std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) const {
+  constexpr double kPlaces = 3.0;  // where training images are far apart
+  if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kSift) return std::nullopt;
+  const PlaceFilter& filter = tracker_->belief() != nullptr ? *tracker_->belief() : *witness_;
+  return filter.within(tracked.position_m, std::max(config_.state.max_distance_m, kPlaces * filter.spacing_m()));
 }
 
 /// Without landmarks the most similar training image is compared with one of another session beside it.
@@ -230,7 +267,8 @@ void Localizer::choosePose(Estimate& estimate) {
     return;
   }
   estimate.pose = poseOf(estimate.tracked, estimate.state);
-  estimate.source = estimate.tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
+  const bool placed = estimate.tracked.best.recognised || estimate.state == LocalizationState::kTracking;
+  estimate.source = placed ? PoseSource::kPlace : PoseSource::kNone;
   const auto predicted = isMetric() ? verifier_->predicted() : std::nullopt;
   if (!predicted) return;
   const double apart_m = (predicted->position_m - estimate.pose.position_m).norm();
@@ -297,6 +335,7 @@ void Localizer::configure(const LocalizerConfig& config) {
   assessor_.configure(config_.state);
   verifier_->configure(config_.metric);
   odometry_.configure(config_.odometry);
+  witness_->configure(config_.bayes, config_.odometry);
   verifier_->useOdometry(odometry_, config_.odometry);
   configureTracker(before.tracker);
   last_.reset();
@@ -349,6 +388,7 @@ void Localizer::relocalize(const Prior& prior) {
 
 void Localizer::forgetEvidence() {
   choice_.reset();
+  witness_->reset();
   assessor_.reset();
   verifier_->reset();
   last_.reset();
