@@ -8,13 +8,13 @@
 
 #include <gtest/gtest.h>
 
-#include "test/support/synthetic.h"
+#include "test/support/stamps.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+using test::kSecond_ns;
 
 /// A session on the east axis: an image a metre and a second.
 std::vector<TrainingImage> streetSession(std::size_t count, int session = 0) {
