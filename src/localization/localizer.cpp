@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "base/numbers.h"
 #include "base/time.h"
 #include "localization/place_filter.h"
 #include "localization/pose_verifier.h"
@@ -92,6 +91,7 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.metric = metric;
   estimate.images_since_metric = isMetric() ? verifier_->imagesSince() : 0;
   estimate.tracked = tracked;
+  estimate.evidence = evidence;
   if (const auto session = sessions_->chosen()) estimate.session = map_->header().sessions[*session].name;
   choosePose(estimate);
   if (isMetric()) {
@@ -99,7 +99,6 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
     estimate.focal_scale = verifier_->focal().scale();
     estimate.camera_contradicted = verifier_->focal().contradicts();
   }
-  estimate.evidence = evidence;
   estimate.motion_residual_m = assessor_.motionResidual_m();
   estimate.comparisons = scores_.comparisons();
   estimate.swept = scores_.swept();
@@ -221,17 +220,7 @@ void Localizer::witness(const Travel& travel, const std::optional<MetricPose>& m
   witness_->predict(travel);
   if (metric) return witness_->update(witness_->around(metric->base.translation().head<2>()));
   if (scores_.kind() != FeatureKind::kSift) return;
-  PlaceLikelihood likelihood;
-  std::vector<double> values;
-  for (const Scores::Compared& compared : scores_.compared()) {
-    likelihood.compared.push_back({compared.training_image, witness_->likelihoodOf(compared.score)});
-    values.push_back(likelihood.compared.back().likelihood);
-  }
-  if (values.empty()) return;
-  // Most of what a tracker compares is near its estimate: the lower half tells what chance is like.
-  constexpr double kChance = 0.25;
-  likelihood.elsewhere = nearestRank(values, kChance);
-  witness_->update(likelihood);
+  witness_->update(witness_->likelihoodBeside(scores_.compared()));
 }
 
 /// Around the estimate; by global features thresholds decide, as by choice.
@@ -267,7 +256,8 @@ void Localizer::choosePose(Estimate& estimate) {
     return;
   }
   estimate.pose = poseOf(estimate.tracked, estimate.state);
-  const bool placed = estimate.tracked.best.recognised || estimate.state == LocalizationState::kTracking;
+  const bool probable = estimate.evidence.probability && estimate.state == LocalizationState::kTracking;
+  const bool placed = estimate.tracked.best.recognised || probable;
   estimate.source = placed ? PoseSource::kPlace : PoseSource::kNone;
   const auto predicted = isMetric() ? verifier_->predicted() : std::nullopt;
   if (!predicted) return;

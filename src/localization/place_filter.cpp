@@ -110,6 +110,7 @@ void PlaceFilter::reset() {
   std::fill(probabilities_.begin(), probabilities_.end(), 1.0 / static_cast<double>(map_.size()));
   speeds_ = usualSpeeds();
   independence_ = 1.0;
+  log_best_.reset();
   arrivals_.clear();
 }
 
@@ -134,6 +135,22 @@ double PlaceFilter::likelihoodOf(const Score& score) const {
   constexpr double kLeast = 1e-9;
   if (score.matches == 0 && score.weight > 0.0) return std::pow(std::max(kLeast, score.weight), independence_);
   return std::pow(static_cast<double>(score.matches) + 1.0, independence_ * config_.exponent);
+}
+
+PlaceLikelihood PlaceFilter::likelihoodBeside(const std::vector<Scores::Compared>& compared) {
+  constexpr double kMemory = 0.95;
+  constexpr double kChance = 0.25;  // most of what a tracker compares is near its estimate: the lowest tell of chance
+  PlaceLikelihood likelihood;
+  std::vector<double> values;
+  for (const Scores::Compared& one : compared) {
+    values.push_back(likelihoodOf(one.score));
+    likelihood.compared.push_back({one.training_image, values.back()});
+  }
+  if (values.empty()) return likelihood;
+  const double log_best = std::log(*std::max_element(values.begin(), values.end()));
+  log_best_ = log_best_ ? std::max(log_best, kMemory * *log_best_ + (1.0 - kMemory) * log_best) : log_best;
+  likelihood.elsewhere = std::exp(0.5 * (std::log(nearestRank(values, kChance)) + *log_best_));
+  return likelihood;
 }
 
 void PlaceFilter::predict(const Travel& travel) {

@@ -45,6 +45,9 @@ class PlaceFilter {
   /// score counts for a particle where there are none. Images that follow each other more closely than the training
   /// images do are not independent: the nearer they are the less each says.
   double likelihoodOf(const Score& score) const;
+  /// What the comparisons that another tracker chose say. It may not have looked at the right place: elsewhere is half
+  /// way, on a logarithmic scale, between chance and what matched best lately.
+  PlaceLikelihood likelihoodBeside(const std::vector<Scores::Compared>& compared);
   /// What the image says.
   void update(const PlaceLikelihood& likelihood);
 
@@ -98,6 +101,7 @@ class PlaceFilter {
   std::vector<Arrival> arrivals_;
   std::vector<std::uint32_t> arrival_of_;  ///< of each training image; holds if the arrival says so too
   double odometry_share_ = 0.0;            ///< of the last motion
+  std::optional<double> log_best_;         ///< of the likelihoods of late, smoothed
   double independence_ = 1.0;              ///< of the image from the one before, (0, 1]
   mutable std::vector<Neighbour> neighbours_;
   std::vector<double> ahead_m_;

@@ -201,7 +201,7 @@ TEST_F(LocalizerRules, GlobalFeaturesAloneAreNeverSure) {
 }
 
 TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   image_->best = 0.2;
   image_->best_of_others = 0.2;
   Estimate estimate = see(20.0);
@@ -219,7 +219,7 @@ TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
 
 TEST_F(LocalizerRules, AnImageThatIsNotRecognisedTeachesNothingAboutSessions) {
   constexpr int kTrialEvery = 4;
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   image_->best_of_others = 0.2;
   for (int i = 1; i <= 80; ++i) {
     image_->best = i % kTrialEvery == 0 ? 0.02 : 0.2;
@@ -230,7 +230,7 @@ TEST_F(LocalizerRules, AnImageThatIsNotRecognisedTeachesNothingAboutSessions) {
 }
 
 TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   for (int i = 0; i < 30; ++i) see(20.0);
   EXPECT_EQ(see(20.0).session, "first") << "something is seen";
   image_->best = image_->best_of_others = 0.0;
@@ -331,7 +331,7 @@ TEST_F(LocalizerRules, APlaceIsOnTheEarthWhereItIsInTheMap) {
 }
 
 TEST_F(LocalizerRules, BeginsWithTheSessionOfTheHour) {
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   EXPECT_EQ(see(20.0, 1010.0).session, "second");
 }
 
