@@ -14,7 +14,7 @@ Usage: demo.sh [--output DIR] [--rate FACTOR] [--map-bag BAG] [--bag BAG] [--tra
   --rate FACTOR    speed of playing over speed of recording (default: 6)
   --map-bag BAG    session to build the map from (default: the sunny sample)
   --bag BAG        drive to localise (default: the cloudy sample)
-  --tracker NAME   dpso (default), dpso_multi, pf_gaussian, pf_linear
+  --tracker NAME   dpso (default), dpso_multi, pf_gaussian, pf_linear, bayes
   --features NAME  sift (default), global, hybrid
 Exit code 0 when the drive was localised and every image of its bag is accounted for.
 USAGE

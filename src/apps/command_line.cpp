@@ -175,6 +175,7 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
       "'paper': parameters to the letter of the papers, in place of the configuration's (config/paper.yaml)");
   app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
   app.add_option("--features", options.features, "Features (parameter 'features')");
+  app.add_option("--match", options.match, "How local features are matched (parameter 'match/mode')");
   app.add_option("--pose-source", options.pose_source, "'metric' or 'place' (parameter 'pose_source')");
   app.add_option("--particles", options.particles, "Number of particles of the tracker");
   app.add_option("--seed", options.seed, "Seed of the random generator (parameter 'seed')");

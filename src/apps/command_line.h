@@ -62,6 +62,7 @@ struct LocalizeOptions {
   std::string preset;
   std::string tracker;
   std::string features;
+  std::string match;
   std::string pose_source;
   std::string image_topic = "/stereo/left/image_raw";
   std::string truth_topic;

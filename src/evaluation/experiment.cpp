@@ -281,6 +281,8 @@ std::vector<PairSpec> readPairs(YamlMap& yaml, const std::vector<RoundSpec>& rou
 MapBuilderConfig placesOnly() {
   MapBuilderConfig config;
   config.geometry.enabled = false;
+  config.sift = SiftConfig();
+  config.prune = true;
   return config;
 }
 
@@ -294,9 +296,12 @@ Config configured(YamlMap& yaml, const std::string& key, Config config = {}) {
   return config;
 }
 
-/// Defaults, then the preset, then what the experiment says.
+/// Defaults with the papers' similarity, then the preset, then what the experiment says.
 LocalizerConfig localizerConfig(YamlMap& yaml) {
   LocalizerConfig config;
+  config.match = MatchConfig();
+  config.prune = true;
+  config.state.witness = "similarity";
   const std::string preset = yaml.text("preset", "");
   try {
     if (!preset.empty()) assignParameters(config, presetValues(preset));

@@ -193,7 +193,7 @@ class TrackerContestant final : public Contestant {
   /// `camera`: of the drive; none: that of the map.
   TrackerContestant(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config,
                     std::shared_ptr<RecordedImage> image, const std::optional<CameraModel>& camera)
-      : similarity_(config.similarity), localizer_(std::move(map), config, std::move(image)) {
+      : similarity_(config.similarity), match_(config.match), localizer_(std::move(map), config, std::move(image)) {
     if (camera) localizer_.setCamera(*camera);
   }
 
@@ -222,12 +222,12 @@ class TrackerContestant final : public Contestant {
   double evidenceOf(const Estimate& estimate) const {
     const TrackerEstimate& tracked = estimate.tracked;
     if (tracked.best_distance_m > kRight_m) return 0.0;
-    const double recognised =
-        estimate.evidence.features == FeatureKind::kSift ? similarity_.sift_recognised : similarity_.global_recognised;
+    const double recognised = similarity_.recognised(estimate.evidence.features, match_);
     return recognised > 0.0 ? tracked.best.similarity / recognised : tracked.best.similarity;
   }
 
   SimilarityConfig similarity_;
+  MatchConfig match_;
   Localizer localizer_;
   double confidence_ = 0.0;
 };

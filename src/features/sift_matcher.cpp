@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "base/numbers.h"
+#include "features/displacement_votes.h"
 #include "features/nearest_descriptors.h"
 
 namespace visual_localization {
@@ -68,8 +69,10 @@ void offer(TwoNearest& nearest, float cosine, std::size_t candidate) {
 void MatchConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"match/max_angle_ratio", "1", "largest ratio of the angles to the nearest and second nearest (delta)"},
                max_angle_ratio, 0.1, 1.0);
-  visitor.choice({"match/mode", "", "symmetric: both directions must agree (journal); one_way: test in training only"},
-                 mode, {"symmetric", "one_way"});
+  visitor.choice({"match/mode", "",
+                  "votes: nearest neighbours in both directions that moved alike across the picture; symmetric: both "
+                  "directions must pass the ratio test (journal); one_way: test in training only"},
+                 mode, {"votes", "symmetric", "one_way"});
 }
 
 std::vector<FeatureMatch> matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
@@ -96,12 +99,25 @@ void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_ang
   forEachSymmetric(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
 }
 
-void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b,
+void matchMutual(const SiftFeatures& a, const SiftFeatures& b, std::vector<FeatureMatch>& matches) {
+  matches.clear();
+  if (a.size() < 2 || b.size() < 2) return;
+  const NearestDescriptors& nearest = neighboursOf(a, b);
+  for (std::uint32_t i = 0; i < a.size(); ++i) {
+    const std::uint32_t partner = nearest.of_a[i].index;
+    if (nearest.of_b[partner].index == i) matches.push_back({i, partner});
+  }
+}
+
+void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b, double image_width_px,
              std::vector<FeatureMatch>& matches) {
-  if (config.isSymmetric()) {
-    matchSymmetric(a, b, config.max_angle_ratio, matches);
-  } else {
+  if (config.isByVotes()) {
+    matchMutual(a, b, matches);
+    keepLargestVote(a, b, image_width_px, matches);
+  } else if (config.isOneWay()) {
     matchOneWay(a, b, config.max_angle_ratio, matches);
+  } else {
+    matchSymmetric(a, b, config.max_angle_ratio, matches);
   }
 }
 

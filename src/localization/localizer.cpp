@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/time.h"
+#include "localization/place_filter.h"
 #include "localization/pose_verifier.h"
 #include "localization/session_choice.h"
 #include "visual_localization/localization/estimate.h"
@@ -34,6 +35,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       scores_(map_->size()),
       sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept()),
       tracker_(makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed))),
+      witness_(std::make_unique<PlaceFilter>(*map_, config_.bayes, config_.odometry)),
       choice_(config_.features, config_.hybrid),
       assessor_(config_.state),
       odometry_(config_.odometry),
@@ -89,6 +91,7 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.metric = metric;
   estimate.images_since_metric = isMetric() ? verifier_->imagesSince() : 0;
   estimate.tracked = tracked;
+  estimate.evidence = evidence;
   if (const auto session = sessions_->chosen()) estimate.session = map_->header().sessions[*session].name;
   choosePose(estimate);
   if (isMetric()) {
@@ -96,7 +99,6 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
     estimate.focal_scale = verifier_->focal().scale();
     estimate.camera_contradicted = verifier_->focal().contradicts();
   }
-  estimate.evidence = evidence;
   estimate.motion_residual_m = assessor_.motionResidual_m();
   estimate.comparisons = scores_.comparisons();
   estimate.swept = scores_.swept();
@@ -148,9 +150,10 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
   if (isMetric() && !verifier_->focal().contradicts()) evidence.verified = metric && metric->confirmed;
   evidence.features = scores_.kind();
   const bool sift = evidence.features == FeatureKind::kSift;
+  evidence.probability = probabilityOf(tracked);
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
-  if (state.place_check && !sure && !evidence.verified.value_or(false)) {
+  if (state.place_check && !sure && !evidence.probability && !evidence.verified.value_or(false)) {
     evidence.place_ratio = sweep_.ratio(scores_, tracked.position_m, state.max_distance_m);
   }
   evidence.blind =
@@ -195,6 +198,12 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
   Travel travel;
   if (tracked_ns_) travel = {odometry_.between(*tracked_ns_, stamp_ns), secondsBetween(*tracked_ns_, stamp_ns)};
   tracked_ns_ = stamp_ns;
+  const TrackerEstimate tracked = trackFrom(travel, metric);
+  witness(travel, metric);
+  return tracked;
+}
+
+TrackerEstimate Localizer::trackFrom(const Travel& travel, const std::optional<MetricPose>& metric) {
   if (!metric) return tracker_->update({scores_, sweep_, *sessions_, travel});
   const Eigen::Vector2d position_m = metric->base.translation().head<2>();
   TrackerEstimate tracked = tracker_->update({scores_, sweep_, *sessions_, travel, position_m});
@@ -203,6 +212,23 @@ TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<Metr
   tracked.best = scores_[tracked.best_image];
   tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
   return tracked;
+}
+
+/// A filter beside the tracker learns from what that one compares, and costs no comparison.
+void Localizer::witness(const Travel& travel, const std::optional<MetricPose>& metric) {
+  if (tracker_->belief() != nullptr || config_.state.witness != "probability") return;
+  witness_->predict(travel);
+  if (metric) return witness_->update(witness_->around(metric->base.translation().head<2>()));
+  if (scores_.kind() != FeatureKind::kSift) return;
+  witness_->update(witness_->likelihoodBeside(scores_.compared()));
+}
+
+/// Around the estimate; by global features thresholds decide, as by choice.
+std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) const {
+  constexpr double kPlaces = 3.0;  // where training images are far apart
+  if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kSift) return std::nullopt;
+  const PlaceFilter& filter = tracker_->belief() != nullptr ? *tracker_->belief() : *witness_;
+  return filter.within(tracked.position_m, std::max(config_.state.max_distance_m, kPlaces * filter.spacing_m()));
 }
 
 /// Without landmarks the most similar training image is compared with one of another session beside it.
@@ -230,7 +256,9 @@ void Localizer::choosePose(Estimate& estimate) {
     return;
   }
   estimate.pose = poseOf(estimate.tracked, estimate.state);
-  estimate.source = estimate.tracked.best.recognised ? PoseSource::kPlace : PoseSource::kNone;
+  const bool probable = estimate.evidence.probability && estimate.state == LocalizationState::kTracking;
+  const bool placed = estimate.tracked.best.recognised || probable;
+  estimate.source = placed ? PoseSource::kPlace : PoseSource::kNone;
   const auto predicted = isMetric() ? verifier_->predicted() : std::nullopt;
   if (!predicted) return;
   const double apart_m = (predicted->position_m - estimate.pose.position_m).norm();
@@ -297,6 +325,7 @@ void Localizer::configure(const LocalizerConfig& config) {
   assessor_.configure(config_.state);
   verifier_->configure(config_.metric);
   odometry_.configure(config_.odometry);
+  witness_->configure(config_.bayes, config_.odometry);
   verifier_->useOdometry(odometry_, config_.odometry);
   configureTracker(before.tracker);
   last_.reset();
@@ -349,6 +378,7 @@ void Localizer::relocalize(const Prior& prior) {
 
 void Localizer::forgetEvidence() {
   choice_.reset();
+  witness_->reset();
   assessor_.reset();
   verifier_->reset();
   last_.reset();

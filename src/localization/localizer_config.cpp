@@ -14,9 +14,11 @@ constexpr bool kAtStartOnly = true;
 }  // namespace
 
 void LocalizerConfig::declare(ParameterVisitor& visitor) {
-  visitor.choice(
-      {"tracker", "", "dynamic particle swarm, several swarms, or particle filter with Gaussian or linear motion"},
-      tracker, {"dpso", "dpso_multi", "pf_gaussian", "pf_linear"});
+  visitor.choice({"tracker", "",
+                  "dynamic particle swarm, several swarms, particle filter with Gaussian or linear motion, or discrete "
+                  "Bayes filter "
+                  "over the training images"},
+                 tracker, {"dpso", "dpso_multi", "pf_gaussian", "pf_linear", "bayes"});
   visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
                  features, {"sift", "global", "hybrid"});
   visitor.choice(
@@ -53,6 +55,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   metric.declare(visitor);
   dpso.declare(visitor);
   pf.declare(visitor);
+  bayes.declare(visitor);
   odometry.declare(visitor);
   constexpr int kLeastOfSwarm = 4;
   visitor.require(tracker != "dpso_multi" || dpso.particles >= kLeastOfSwarm * dpso.swarms, "dpso/particles",

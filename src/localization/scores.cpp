@@ -17,26 +17,32 @@ void SimilarityConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"similarity/sift_recognised", "1",
                 "a best match below this share of the features is a bad one (journal, section 5)"},
                sift_recognised, 0.0, 1.0);
+  visitor.real({"similarity/votes_recognised", "1", "the same of a best match by votes"}, votes_recognised, 0.0, 1.0);
+  visitor.real({"similarity/votes_exponent", "1", "a share of votes is raised to this to become a weight"},
+               votes_exponent, 1.0, 1000.0);
   visitor.real({"similarity/global_recognised", "1", "a best global similarity below this is a bad one"},
                global_recognised, 0.0, 1.0);
   visitor.real({"similarity/global_exponent", "1", "a global similarity is raised to this to become a weight"},
                global_exponent, 1.0, 1000.0);
 }
 
-SiftSimilarity::SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config)
-    : match_(match), recognised_(config.sift_recognised) {}
+SiftSimilarity::SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px)
+    : match_(match),
+      recognised_(config.recognised(FeatureKind::kSift, match)),
+      exponent_(match.isByVotes() ? config.votes_exponent : 1.0),
+      image_width_px_(image_width_px) {}
 
 Score SiftSimilarity::compare(const SiftFeatures& current, const SiftFeatures& training) const {
   if (current.size() < 2 || training.size() < 2) return {};
   static thread_local std::vector<FeatureMatch> matches;
-  matchBy(match_, current, training, matches);
-  const std::size_t possible = match_.isSymmetric() ? std::min(current.size(), training.size()) : current.size();
+  matchBy(match_, current, training, image_width_px_, matches);
+  const std::size_t possible = match_.isOneWay() ? current.size() : std::min(current.size(), training.size());
   return scoreOf(static_cast<double>(matches.size()) / static_cast<double>(possible), matches.size(),
                  medianScale(current, training, matches));
 }
 
 Score SiftSimilarity::scoreOf(double similarity, std::size_t matches, double scale) const {
-  return {similarity, similarity, matches, similarity >= recognised_, scale};
+  return {similarity, std::pow(similarity, exponent_), matches, similarity >= recognised_, scale};
 }
 
 Score GlobalSimilarity::compare(const GlobalFeatures& current, const GlobalFeatures& training) const {
@@ -102,7 +108,10 @@ bool FeatureChoice::isSiftDue(bool confirmed) const {
 }
 
 LiveImage::LiveImage(const TrainingMap& map, const FrontEndConfig& front_end, const SimilarityConfig& similarity)
-    : map_(map), front_end_(front_end), sift_similarity_(front_end.match, similarity), global_similarity_(similarity) {}
+    : map_(map),
+      front_end_(front_end),
+      sift_similarity_(front_end.match, similarity, map.header().image_size.width),
+      global_similarity_(similarity) {}
 
 void LiveImage::set(std::int64_t stamp_ns, const cv::Mat& grey) {
   front_end_.setImage(stamp_ns, grey);
@@ -132,7 +141,7 @@ ImageReport LiveImage::report() const {
 
 void LiveImage::configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) {
   front_end_.configure(front_end);
-  sift_similarity_ = SiftSimilarity(front_end.match, similarity);
+  sift_similarity_ = SiftSimilarity(front_end.match, similarity, map_.header().image_size.width);
   global_similarity_ = GlobalSimilarity(similarity);
 }
 
@@ -164,6 +173,14 @@ Score Scores::operator[](std::size_t training_image) {
 
 Score Scores::global(std::size_t training_image) {
   return global_.at(FeatureKind::kGlobal, training_image, compare_).score;
+}
+
+std::vector<Scores::Compared> Scores::compared() const {
+  std::vector<Compared> compared;
+  for (const Cache::Entry& entry : (kind_ == FeatureKind::kSift ? sift_ : global_).entries()) {
+    if (entry.counted) compared.push_back({entry.training_image, entry.score});
+  }
+  return compared;
 }
 
 std::vector<std::size_t> Scores::mostSimilar() const {

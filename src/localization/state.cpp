@@ -75,6 +75,13 @@ bool MotionConsistency::stampsRise() const {
 }
 
 void StateConfig::declare(ParameterVisitor& visitor) {
+  visitor.choice(
+      {"state/witness", "",
+       "what tells TRACKING without landmarks: the probability around the estimate, by a filter over the "
+       "training images beside any tracker, or thresholds on the similarity; for global features always these"},
+      witness, {"probability", "similarity"});
+  visitor.real({"state/min_probability", "1", "a lower probability around the estimate does not confirm it"},
+               min_probability, 0.5, 1.0);
   visitor.real({"state/min_similarity", "1", "a weaker best match by SIFT does not confirm a position"}, min_similarity,
                0.0, 1.0);
   visitor.integer({"state/min_matches", "1", "fewer matched SIFT features are no evidence, whatever their share"},
@@ -138,13 +145,15 @@ LocalizationState StateAssessor::doubt(bool recovering) {
 LocalizationState StateAssessor::update(std::int64_t stamp_ns, const TrackerEstimate& estimate,
                                         const Evidence& evidence) {
   remember(stamp_ns, estimate, evidence);
-  const bool certain = evidence.verified.value_or(isCertain());
+  const bool certain = evidence.verified.value_or(evidence.probability ? lastConfirms() : isCertain());
   ever_confirmed_ = ever_confirmed_ || certain;
   // Matched local features are of a mapped place, even while the position is not certain.
-  const bool sees_map = lastConfirms() && evidence.features == FeatureKind::kSift;
+  const bool sees_map =
+      evidence.features == FeatureKind::kSift && (evidence.probability ? estimate.best.recognised : lastConfirms());
   if (certain) unconfirmed_ = 0;
   if (!certain && !evidence.blind && !sees_map) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
-  return stateOf(certain, estimate.tuning.recovering && !evidence.verified.value_or(false));
+  const bool decided = evidence.verified || evidence.probability;
+  return stateOf(certain, estimate.tuning.recovering && !(decided && certain));
 }
 
 LocalizationState StateAssessor::stateOf(bool certain, bool recovering) const {
@@ -158,7 +167,7 @@ void StateAssessor::remember(std::int64_t stamp_ns, const TrackerEstimate& estim
   if (last_position_m_ && (estimate.position_m - *last_position_m_).norm() > config_.max_step_m) forget();
   last_position_m_ = estimate.position_m;
   motion_.add(stamp_ns, estimate.position_m);
-  confirmations_.push_back(confirms(estimate, evidence.features) ? 1 : 0);
+  confirmations_.push_back(confirms(estimate, evidence) ? 1 : 0);
   place_ratios_.push_back(evidence.place_ratio);
   const auto window = static_cast<std::size_t>(config_.window);
   keepLast(window, confirmations_);
@@ -183,9 +192,10 @@ bool StateAssessor::isDoubtful() const {
   return sum < config_.min_place_ratio * static_cast<double>(place_ratios_.size());
 }
 
-bool StateAssessor::confirms(const TrackerEstimate& estimate, FeatureKind features) const {
+bool StateAssessor::confirms(const TrackerEstimate& estimate, const Evidence& evidence) const {
+  if (evidence.probability) return *evidence.probability >= config_.min_probability;
   if (estimate.best_distance_m > config_.max_distance_m) return false;
-  if (features == FeatureKind::kGlobal) return estimate.best.similarity >= config_.min_global_similarity;
+  if (evidence.features == FeatureKind::kGlobal) return estimate.best.similarity >= config_.min_global_similarity;
   return estimate.best.similarity >= config_.min_similarity &&
          estimate.best.matches >= static_cast<std::size_t>(config_.min_matches) &&
          estimate.best.scale <= config_.max_scale && estimate.best.scale * config_.max_scale >= 1.0;

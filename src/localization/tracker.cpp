@@ -1,5 +1,6 @@
 #include "visual_localization/localization/tracker.h"
 
+#include "localization/bayes_tracker.h"
 #include "localization/dpso.h"
 #include "localization/multi_swarm.h"
 #include "localization/particle_filter.h"
@@ -104,6 +105,7 @@ void ParticleFilterConfig::declare(ParameterVisitor& visitor) {
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) {
   if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed, config.odometry);
   if (config.tracker == "dpso_multi") return std::make_unique<MultiSwarm>(map, config, seed);
+  if (config.tracker == "bayes") return std::make_unique<BayesTracker>(map, config, seed);
   return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf, map, config.odometry),
                                           config.pf, config.fitness, seed);
 }

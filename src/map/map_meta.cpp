@@ -46,10 +46,21 @@ cv::Size takeImageSize(ParameterValues& meta) {
   return size;
 }
 
-SiftConfig takeSift(ParameterValues& meta) {
+bool takeFlag(ParameterValues& meta, const std::string& key) {
+  const auto flag = take<std::int64_t>(meta, key);
+  if (flag == 0 || flag == 1) return flag == 1;
+  throw std::runtime_error("meta value '" + key + "' = " + std::to_string(flag) + " is not 0 or 1");
+}
+
+/// Before kSinceUpright features have the orientation and the distance of the papers.
+SiftConfig takeSift(ParameterValues& meta, int version) {
   SiftConfig sift;
   ParameterValues values = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
   for (auto& [name, value] : values) {
+    if (std::holds_alternative<bool>(value)) {
+      if (version >= kSinceUpright) value = takeFlag(meta, name);
+      continue;
+    }
     const auto found = meta.find(name);
     if (found == meta.end()) throw std::runtime_error("meta value '" + name + "' is missing");
     value = found->second;
@@ -205,6 +216,9 @@ std::vector<std::string> takeHistory(ParameterValues& meta) {
 ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
   SiftConfig sift = header.sift;
   ParameterValues meta = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
+  for (auto& [name, value] : meta) {
+    if (const bool* flag = std::get_if<bool>(&value)) value = std::int64_t{*flag};
+  }
   meta["datum/latitude_deg"] = header.datum.latitude_deg;
   meta["datum/longitude_deg"] = header.datum.longitude_deg;
   meta["datum/altitude_m"] = header.datum.altitude_m;
@@ -249,7 +263,7 @@ MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
   header.datum.altitude_m = take<double>(meta, "datum/altitude_m");
   header.image_size = takeImageSize(meta);
   take<std::string>(meta, "package_version");
-  header.sift = takeSift(meta);
+  header.sift = takeSift(meta, version);
   header.sessions = takeSessions(meta, version, header.image_size, masks);
   if (version >= kSinceHistory) header.history = takeHistory(meta);
   if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");

@@ -42,6 +42,8 @@ constexpr int kSinceLandmarks = 4;
 constexpr int kSinceBoundRows = 5;
 /// From this version on a map has a history.
 constexpr int kSinceHistory = 6;
+/// Upright and Hellinger features, and as many values to say so.
+constexpr int kSinceUpright = 7;
 
 struct Table {
   const char* name;

@@ -96,7 +96,7 @@ cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const Trainin
   ImagePair images(grey, map, training);
   const std::shared_ptr<const SiftFeatures> training_sift = map.sift(training);
   std::vector<FeatureMatch> matches;
-  matchBy(match, sift, *training_sift, matches);
+  matchBy(match, sift, *training_sift, map.header().image_size.width, matches);
   std::size_t line = 0;
   for (const FeatureMatch& pair : matches) {
     images.join(positionOf(sift.keypoints()[pair.a]), positionOf(training_sift->keypoints()[pair.b]),

@@ -279,7 +279,7 @@ class Search {
       : map_(map),
         config_(config),
         global_(config.similarity),
-        sift_(config.match, config.similarity),
+        sift_(config.match, config.similarity, map.header().image_size.width),
         work_left_(config.most_work) {
     result_.stride = strideFor(map.size(), config.most_images);
     for (std::size_t i = 0; i < map.size(); i += result_.stride) globals_.push_back(map.global(i));

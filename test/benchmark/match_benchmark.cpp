@@ -58,6 +58,29 @@ void similarity(benchmark::State& state) {
   countMacs(state);
 }
 
+/// Mutual nearest neighbours and votes for a common displacement.
+void votes(benchmark::State& state) {
+  const Pair pair = pairOf(state);
+  const SiftSimilarity sift{{kRatio, "votes"}, SimilarityConfig()};
+  for (auto _ : state) benchmark::DoNotOptimize(sift.compare(pair.a, pair.b));
+  countMacs(state);
+}
+
+/// OpenCV's brute force with cross-check, without the votes.
+void opencvMutual(benchmark::State& state) {
+  const Pair pair = pairOf(state);
+  const cv::Mat a = floatRows(pair.a);
+  const cv::Mat b = floatRows(pair.b);
+  cv::setNumThreads(1);
+  const cv::BFMatcher matcher(cv::NORM_L2, true);
+  std::vector<cv::DMatch> matches;
+  for (auto _ : state) {
+    matcher.match(a, b, matches);
+    benchmark::DoNotOptimize(matches.data());
+  }
+  countMacs(state);
+}
+
 void nearest(benchmark::State& state) {
   const Pair pair = pairOf(state);
   NearestDescriptors found;
@@ -142,6 +165,8 @@ void eigenProduct(benchmark::State& state) {
 #define FOR_SIZES(function) BENCHMARK(function)->Arg(20)->Arg(100)->Arg(140)->Arg(350)->Unit(benchmark::kMicrosecond)
 FOR_SIZES(symmetricMatch);
 FOR_SIZES(similarity);
+BENCHMARK(votes)->Arg(500)->Arg(600)->Arg(1000)->Unit(benchmark::kMicrosecond);
+BENCHMARK(opencvMutual)->Arg(500)->Unit(benchmark::kMicrosecond);
 FOR_SIZES(nearest);
 FOR_SIZES(nearestPlainLoop);
 FOR_SIZES(eigenProduct);

@@ -5,6 +5,7 @@
 
 #include "test/localization/wall_street.h"
 #include "test/support/allocation_counter.h"
+#include "test/support/swarm_config.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
@@ -23,7 +24,7 @@ INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, SteadyState,
                          });
 
 TEST_P(SteadyState, AnImageTakesNothingFromTheHeap) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.tracker = std::get<0>(GetParam());
   Localizer localizer(map(), config);
   std::vector<cv::Mat> views;

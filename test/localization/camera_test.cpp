@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "test/localization/wall_street.h"
+#include "test/support/swarm_config.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
@@ -94,7 +95,7 @@ class Drive : public test::WallStreet {
 class EveryChoiceOfFeatures : public Drive, public ::testing::WithParamInterface<std::tuple<const char*, const char*>> {
  protected:
   static LocalizerConfig config() {
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     std::tie(config.tracker, config.features) = GetParam();
     return config;
   }
@@ -134,7 +135,7 @@ TEST_F(Drive, AScratchyImageIsLocalisedAllTheSame) {
   };
   for (const Fault& fault : faults) {
     SCOPED_TRACE(fault.name);
-    const std::vector<Step> steps = drive(LocalizerConfig(), fault);
+    const std::vector<Step> steps = drive(test::swarmConfig(), fault);
     expectSensible(steps);
     EXPECT_GE(shareOfTracking(steps, kFaultFrom, kFaultUntil), 0.8);
   }
@@ -150,7 +151,7 @@ TEST_F(Drive, ARuinedImageIsNeverAWrongPosition) {
   };
   for (const Fault& fault : faults) {
     SCOPED_TRACE(fault.name);
-    expectSensible(drive(LocalizerConfig(), fault), kView_m);
+    expectSensible(drive(test::swarmConfig(), fault), kView_m);
   }
 }
 
@@ -199,7 +200,7 @@ TEST_P(FrozenCamera, EndsTrackingAndComesBack) {
 
 TEST_F(Drive, ImagesThatComeTwiceDoNotDisturb) {
   cv::Mat held;
-  const std::vector<Step> steps = drive(LocalizerConfig(), [&held](int i, double along_m) {
+  const std::vector<Step> steps = drive(test::swarmConfig(), [&held](int i, double along_m) {
     if (i % 3 == 0) held = noisy(viewAt(along_m), i);
     return held;
   });
@@ -210,7 +211,7 @@ TEST_F(Drive, ImagesThatComeTwiceDoNotDisturb) {
 }
 
 TEST_F(Drive, AStreamThatRepeatsEachImageToReachItsRateIsNotFrozen) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   bool tracking = false;
   for (int i = 0; i < 12; ++i) {
     const cv::Mat view = noisy(viewAt(10.0 + 0.3 * i), i);
@@ -224,7 +225,7 @@ TEST_F(Drive, AStreamThatRepeatsEachImageToReachItsRateIsNotFrozen) {
 }
 
 TEST_F(Drive, AnImageThatIsSentAgainWithItsStampIsTheSameImageUntilTheDriverMustBeStuck) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   for (int i = 0; i < 10; ++i) localizer.process(i * kSecond, noisy(viewAt(10.0 + 0.3 * i), i));
   const cv::Mat last = noisy(viewAt(13.0), 10);
   const Estimate first = localizer.process(10 * kSecond, last);
@@ -238,7 +239,7 @@ TEST_F(Drive, AnImageThatIsSentAgainWithItsStampIsTheSameImageUntilTheDriverMust
 }
 
 TEST_F(Drive, WhatIsDoubtedHasTheCovarianceOfTheWholeCloud) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   Estimate estimate;
   cv::Mat view;
   for (int i = 0; i < 10; ++i) estimate = localizer.process(i * kSecond, view = noisy(viewAt(10.0 + 0.3 * i), i));
@@ -250,7 +251,7 @@ TEST_F(Drive, WhatIsDoubtedHasTheCovarianceOfTheWholeCloud) {
 }
 
 TEST_F(Drive, ASimulatedCameraWithoutNoiseMayStandStillWhenAskedTo) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   const auto standing = [](int, double) { return viewAt(12.0); };
   EXPECT_EQ(shareOfTracking(drive(config, standing), 0, kImagesInAll), 0.0);
   config.state.frozen_images = 0;
@@ -262,7 +263,7 @@ TEST_F(Drive, ASimulatedCameraWithoutNoiseMayStandStillWhenAskedTo) {
 }
 
 TEST_F(Drive, AFrozenImageIsLookedAtAnewAfterARelocalizationButIsNoPosition) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   const cv::Mat view = viewAt(12.0);
   for (int i = 0; i < 5; ++i) localizer.process(i * kSecond, view);
   localizer.relocalize(around({30.0, 0.0}, 3.0));

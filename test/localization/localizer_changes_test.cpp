@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "test/localization/localizer_fixture.h"
+#include "test/support/swarm_config.h"
 
 namespace visual_localization {
 namespace {
@@ -16,7 +17,7 @@ using LocalizerChanges = test::LocalizerTest;
 
 TEST_F(LocalizerChanges, ReconfiguringChangesTrackerAndParticles) {
   settle();
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.dpso.particles = 30;
   localizer_->configure(config);
   EXPECT_EQ(localizer_->particles().size(), 30U);
@@ -63,13 +64,13 @@ TEST_F(LocalizerChanges, RelocalizingSpreadsTheParticles) {
 
 TEST_F(LocalizerChanges, ReconfiguringReachesStateAndSweep) {
   settle();
-  LocalizerConfig strict;
+  LocalizerConfig strict = test::swarmConfig();
   strict.state.min_similarity = 0.9;
   localizer_->configure(strict);
   Estimate estimate;
   for (int i = 0; i < 10; ++i) estimate = see(20.0);
   EXPECT_NE(estimate.state, LocalizationState::kTracking) << "0.5 is not enough any more";
-  LocalizerConfig few;
+  LocalizerConfig few = test::swarmConfig();
   few.sweep_images = 10;
   few.state.sure_similarity = 1.0;
   localizer_->configure(few);

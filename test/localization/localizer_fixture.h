@@ -12,6 +12,7 @@
 
 #include "test/support/fake_image.h"
 #include "test/support/stamps.h"
+#include "test/support/swarm_config.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/localization/localizer.h"
 
@@ -78,7 +79,7 @@ inline std::shared_ptr<const TrainingMap> twoSessions() {
 /// A robot on a street of 60 m with a training image every metre.
 class LocalizerTest : public testing::Test {
  protected:
-  LocalizerTest() { make({}); }
+  LocalizerTest() { make(swarmConfig()); }
 
   void make(const LocalizerConfig& config) { make(config, mapAt(street(60, 1.0))); }
   void make(const LocalizerConfig& config, std::shared_ptr<const TrainingMap> map) {

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "test/localization/localizer_fixture.h"
+#include "test/support/swarm_config.h"
 
 namespace visual_localization {
 namespace {
@@ -39,7 +40,7 @@ TEST_F(LocalizerRules, ARepeatedImageGetsTheSameAnswerWithItsOwnStampAndReport) 
 }
 
 TEST_F(LocalizerRules, TheCameraIsFrozenAfterSoManyImagesInSoLongATime) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.frozen_images = 4;
   config.state.frozen_time_s = 2.0;
   make(config);
@@ -58,7 +59,7 @@ TEST_F(LocalizerRules, TheCameraIsFrozenAfterSoManyImagesInSoLongATime) {
 }
 
 TEST_F(LocalizerRules, ADriverThatSendsItsLastImageOnAndOnIsStuck) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.frozen_images = 4;
   config.state.frozen_time_s = 2.0;
   make(config);
@@ -70,7 +71,7 @@ TEST_F(LocalizerRules, ADriverThatSendsItsLastImageOnAndOnIsStuck) {
 }
 
 TEST_F(LocalizerRules, OneRepetitionMayFreezeTheCamera) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.frozen_images = 1;
   config.state.frozen_time_s = 0.0;
   make(config);
@@ -82,7 +83,7 @@ TEST_F(LocalizerRules, OneRepetitionMayFreezeTheCamera) {
 }
 
 TEST_F(LocalizerRules, WithoutFreezingOnlyTheSameStampIsTheSameImage) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.frozen_images = 0;
   make(config);
   settle();
@@ -101,7 +102,7 @@ TEST_F(LocalizerRules, WhatShowsNothingIsBlind) {
   EXPECT_FALSE(see(20.0).evidence.blind);
   image_->features = min_features - 1;
   EXPECT_TRUE(see(20.0).evidence.blind);
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.features = "global";
   make(config);
   image_->features = 0;
@@ -145,7 +146,7 @@ TEST_F(LocalizerRules, APlaceIsInterpolatedBetweenTheTrainingImagesOrTheBestPart
   EXPECT_NEAR(estimate.pose.position_m.x(), 20.3, 1e-6) << "by the size of what it shows";
   EXPECT_EQ(estimate.pose.position_m.y(), 0.0);
   for (const auto& [name, value] : {std::make_pair("estimate", "image"), std::make_pair("features", "global")}) {
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     (std::string(name) == "estimate" ? config.estimate : config.features) = value;
     make(config);
     for (int i = 0; i < 40; ++i) estimate = see(20.3);
@@ -154,7 +155,7 @@ TEST_F(LocalizerRules, APlaceIsInterpolatedBetweenTheTrainingImagesOrTheBestPart
 }
 
 TEST_F(LocalizerRules, AMatchFarFromTheParticlesIsNotWhereTheRobotIs) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.max_distance_m = 0.1;
   config.state.place_check = false;
   config.dpso.particles = 10;  // few are near
@@ -188,7 +189,7 @@ TEST_F(LocalizerRules, TheSecondWitnessIsAskedOnlyWhereTheFirstIsNotSure) {
 }
 
 TEST_F(LocalizerRules, GlobalFeaturesAloneAreNeverSure) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.features = "global";
   make(config);
   image_->best = 0.95;
@@ -200,7 +201,7 @@ TEST_F(LocalizerRules, GlobalFeaturesAloneAreNeverSure) {
 }
 
 TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   image_->best = 0.2;
   image_->best_of_others = 0.2;
   Estimate estimate = see(20.0);
@@ -218,7 +219,7 @@ TEST_F(LocalizerRules, SaysWhichSessionItComparesWithAndLearnsABetterOne) {
 
 TEST_F(LocalizerRules, AnImageThatIsNotRecognisedTeachesNothingAboutSessions) {
   constexpr int kTrialEvery = 4;
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   image_->best_of_others = 0.2;
   for (int i = 1; i <= 80; ++i) {
     image_->best = i % kTrialEvery == 0 ? 0.02 : 0.2;
@@ -229,7 +230,7 @@ TEST_F(LocalizerRules, AnImageThatIsNotRecognisedTeachesNothingAboutSessions) {
 }
 
 TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   for (int i = 0; i < 30; ++i) see(20.0);
   EXPECT_EQ(see(20.0).session, "first") << "something is seen";
   image_->best = image_->best_of_others = 0.0;
@@ -240,7 +241,7 @@ TEST_F(LocalizerRules, WhereNothingIsSeenTheSessionsTakeTurns) {
 
 /// Only odometry moves it.
 LocalizerConfig ofAStillSwarm() {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.dpso.quantum_share = 0.0;
   config.dpso.quantum_share_max = 0.0;
   config.dpso.inertia = 0.0;
@@ -285,7 +286,7 @@ TEST_F(LocalizerRules, AnotherShareOfOdometryHoldsFromTheNextImageOn) {
 }
 
 TEST_F(LocalizerRules, SaysHowFarTheLastImagesAreFromASteadyMotion) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.motion_length = 3;
   make(config);
   std::vector<Eigen::Vector2d> positions_m;
@@ -330,7 +331,7 @@ TEST_F(LocalizerRules, APlaceIsOnTheEarthWhereItIsInTheMap) {
 }
 
 TEST_F(LocalizerRules, BeginsWithTheSessionOfTheHour) {
-  make({}, twoSessions());
+  make(test::swarmConfig(), twoSessions());
   EXPECT_EQ(see(20.0, 1010.0).session, "second");
 }
 

@@ -11,6 +11,7 @@
 #include "test/localization/wall_street.h"
 #include "test/support/example_map.h"
 #include "test/support/fake_image.h"
+#include "test/support/swarm_config.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -22,7 +23,7 @@ using test::kSecond;
 using LocalizerTest = test::WallStreet;
 
 TEST_F(LocalizerTest, AnEstimateAgreesWithItself) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   Estimate estimate;
   for (int i = 0; i < 10; ++i) {
     estimate = localizer.process(i * kSecond, viewAt(0.5 * i + 0.3));
@@ -47,7 +48,7 @@ INSTANTIATE_TEST_SUITE_P(TrackersAndFeatures, EveryCombination,
                          });
 
 TEST_P(EveryCombination, TracksACameraAlongTheStreet) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   std::tie(config.tracker, config.features) = GetParam();
   Localizer localizer(map(), config);
   Estimate estimate;
@@ -73,7 +74,7 @@ TEST_P(EveryCombination, TracksACameraAlongTheStreet) {
 }
 
 TEST_P(EveryCombination, FogIsNeverATrackedPosition) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   std::tie(config.tracker, config.features) = GetParam();
   Localizer localizer(map(), config);
   const cv::Mat fog(240, 320, CV_8UC1, cv::Scalar(90));
@@ -86,8 +87,8 @@ TEST_P(EveryCombination, FogIsNeverATrackedPosition) {
 }
 
 TEST_F(LocalizerTest, TheSameSeedGivesTheSameTrack) {
-  Localizer first(map(), LocalizerConfig());
-  Localizer second(map(), LocalizerConfig());
+  Localizer first(map(), test::swarmConfig());
+  Localizer second(map(), test::swarmConfig());
   for (int i = 0; i < 10; ++i) {
     const cv::Mat view = viewAt(0.5 * i);
     EXPECT_EQ(first.process(i * kSecond, view).pose.position_m, second.process(i * kSecond, view).pose.position_m);
@@ -98,7 +99,7 @@ TEST_F(LocalizerTest, TheSameSeedGivesTheSameTrack) {
 TEST_F(LocalizerTest, AnotherPlaceIsNeverATrackedPosition) {
   const cv::Mat elsewhere = test::wall(1000, 240, 99);
   for (const char* tracker : {"dpso", "dpso_multi", "pf_gaussian", "pf_linear"}) {
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     config.tracker = tracker;
     Localizer localizer(map(), config);
     for (int i = 0; i < 30; ++i) {
@@ -108,7 +109,7 @@ TEST_F(LocalizerTest, AnotherPlaceIsNeverATrackedPosition) {
 }
 
 TEST_F(LocalizerTest, RelocalizeForgetsAndFindsAgain) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   for (int i = 0; i < 20; ++i) localizer.process(i * kSecond, noisy(viewAt(5.0), i));
   localizer.relocalize(around({30.0, 0.0}, 3.0));
   const Estimate first = localizer.process(20 * kSecond, noisy(viewAt(30.0), 20));
@@ -121,7 +122,7 @@ TEST_F(LocalizerTest, RelocalizeForgetsAndFindsAgain) {
 }
 
 TEST_F(LocalizerTest, HybridBeginsWithSiftWheneverThePositionIsUnknown) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.features = "hybrid";
   Localizer localizer(map(), config);
   int shown = 0;
@@ -160,7 +161,7 @@ class CountingImage final : public test::FakeImage {
 };
 
 TEST_F(LocalizerTest, ALargeMapIsSweptOnlyWhileThePositionIsUnknown) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.sweep_images = 20;
   config.state.place_check = false;
   const auto image = std::make_shared<CountingImage>();
@@ -181,7 +182,7 @@ TEST_F(LocalizerTest, ALargeMapIsSweptOnlyWhileThePositionIsUnknown) {
 }
 
 TEST_F(LocalizerTest, TheWholeMapIsAskedOnlyWhenTheMatchIsNotSure) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.dpso.recovery = "none";
   config.sweep_images = 15;
   config.state.max_distance_m = 1000.0;  // alike everywhere, so the best match may be anywhere
@@ -198,7 +199,7 @@ TEST_F(LocalizerTest, TheWholeMapIsAskedOnlyWhenTheMatchIsNotSure) {
 
 TEST_F(LocalizerTest, NoScoreIsComputedTwiceForAnImage) {
   for (const char* features : {"sift", "global", "hybrid"}) {
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     config.features = features;
     const auto image = std::make_shared<CountingImage>();
     Localizer localizer(map(), config, image);
@@ -212,7 +213,7 @@ TEST_F(LocalizerTest, NoScoreIsComputedTwiceForAnImage) {
 }
 
 TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   cv::Mat large;
   Estimate estimate;
   for (int i = 0; i < 30; ++i) {
@@ -224,7 +225,7 @@ TEST_F(LocalizerTest, OtherSizesAreResizedToTheMaps) {
 }
 
 TEST_F(LocalizerTest, RefusesABadImageAndGoesOn) {
-  Localizer localizer(map(), LocalizerConfig());
+  Localizer localizer(map(), test::swarmConfig());
   EXPECT_THROW(localizer.process(0, cv::Mat()), std::invalid_argument);
   EXPECT_THROW(localizer.process(0, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
   EXPECT_THROW(localizer.process(0, cv::Mat(4, 4, CV_8UC1)), std::invalid_argument);
@@ -232,16 +233,16 @@ TEST_F(LocalizerTest, RefusesABadImageAndGoesOn) {
 }
 
 TEST_F(LocalizerTest, RefusesABadConfiguration) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.dpso.particles = 0;
   EXPECT_THROW(Localizer(map(), config), ParameterError);
-  config = LocalizerConfig();
+  config = test::swarmConfig();
   config.tracker = "crystal_ball";
   EXPECT_THROW(Localizer(map(), config), ParameterError);
 }
 
 TEST_F(LocalizerTest, ALiveImageIsRecognisedByThePresentThreshold) {
-  const FrontEndConfig front_end = frontEndConfigOf(LocalizerConfig(), map()->header());
+  const FrontEndConfig front_end = frontEndConfigOf(test::swarmConfig(), map()->header());
   LiveImage image(*map(), front_end, SimilarityConfig());
   image.set(0, viewAt(12.0));
   ASSERT_TRUE(image.compare(FeatureKind::kSift, 20).recognised);
@@ -256,7 +257,7 @@ TEST_F(LocalizerTest, ALiveImageIsRecognisedByThePresentThreshold) {
 
 TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
   const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
-  LiveImage image(*map(), frontEndConfigOf(LocalizerConfig(), map()->header()), SimilarityConfig());
+  LiveImage image(*map(), frontEndConfigOf(test::swarmConfig(), map()->header()), SimilarityConfig());
   image.set(0, viewAt(12.0 + 1e-9));
   EXPECT_FALSE(image.sift()) << "nothing was asked for yet";
   EXPECT_EQ(image.report().features_kept, 0U);
@@ -277,11 +278,11 @@ TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
 }
 
 TEST_F(LocalizerTest, TheCameraIsTheMapsUntilAnotherOneIsGiven) {
-  EXPECT_FALSE(Localizer(map(), LocalizerConfig()).camera());
+  EXPECT_FALSE(Localizer(map(), test::swarmConfig()).camera());
   MapHeader header = map()->header();
   header.sessions.front().camera = test::exampleCamera();
   Localizer localizer(std::make_shared<TrainingMap>(header, std::vector<TrainingImage>{map()->image(0)}),
-                      LocalizerConfig());
+                      test::swarmConfig());
   EXPECT_EQ(localizer.camera(), test::exampleCamera());
   const CameraModel other({{640, 360}, 500.0, 500.0, 320.0, 180.0, Distortion::kPlumbBob, {}});
   localizer.setCamera(other);
@@ -293,7 +294,7 @@ TEST_F(LocalizerTest, FeaturesUnderTheMaskOfMapOrDriveAreNotUsed) {
   left.colRange(160, 320).setTo(0);
   MapHeader header = map()->header();
   header.sessions.front().mask = Mask(left);
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.features = "sift";
   Localizer localizer(std::make_shared<TrainingMap>(header, std::vector<TrainingImage>{map()->image(0)}), config);
   localizer.process(0, viewAt(0.3));

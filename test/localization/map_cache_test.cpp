@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "test/localization/wall_street.h"
+#include "test/support/swarm_config.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/localization/localizer.h"
 #include "visual_localization/map/map_file.h"
@@ -18,7 +19,7 @@ class MapCache : public test::WallStreet {
  protected:
   /// Positions and similarities, image by image, of a drive along the street with a jump in the middle.
   static std::vector<double> track(const std::shared_ptr<const TrainingMap>& map, const std::string& features) {
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     config.features = features;
     Localizer localizer(map, config);
     std::vector<double> numbers;

@@ -13,6 +13,7 @@
 #include "base/time.h"
 #include "test/localization/street_map.h"
 #include "test/support/stamps.h"
+#include "test/support/swarm_config.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
@@ -87,7 +88,7 @@ TEST_F(MetricEstimate, SaysWhatItRestsOn) {
 }
 
 TEST_F(MetricEstimate, AVerifiedPoseBringsTheParticles) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.max_step_m = 2.0;
   config.metric.min_inliers_tracking = config.metric.min_inliers;
   make(config);
@@ -101,7 +102,7 @@ TEST_F(MetricEstimate, AVerifiedPoseBringsTheParticles) {
 }
 
 TEST_F(MetricEstimate, AVerifiedPoseBringsParticlesThatAreWideApartAroundIt) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.max_step_m = 4.0;
   config.metric.min_inliers_tracking = config.metric.min_inliers;
   make(config);
@@ -116,7 +117,7 @@ TEST_F(MetricEstimate, AVerifiedPoseBringsParticlesThatAreWideApartAroundIt) {
 }
 
 TEST_F(MetricEstimate, APoseThatIsNotConfirmedLeavesTheParticles) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.max_step_m = 2.0;
   make(config);
   for (std::size_t i = 3; i < 8; ++i) see(i);
@@ -178,7 +179,7 @@ TEST_F(MetricEstimate, TheTimeOfGeometryIsThatOfThisImage) {
   const Estimate predicted = see(11);
   ASSERT_TRUE(predicted.metric);
   EXPECT_GT(predicted.image.match_ms, 0.0);
-  LocalizerConfig places;
+  LocalizerConfig places = test::swarmConfig();
   places.metric.pose_source = "place";
   localizer_->configure(places);
   EXPECT_EQ(see(12).image.match_ms, 0.0);
@@ -203,7 +204,7 @@ class SlowImage final : public test::FakeImage {
 
 TEST_F(MetricEstimate, NoTimeIsCountedTwice) {
   const std::shared_ptr<const TrainingMap> map(std::shared_ptr<void>(), &street_.map());
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.tracker = "pf_gaussian";  // sweeps nothing itself: geometry is the first to
   Localizer localizer(map, config, std::make_shared<SlowImage>());
   const Estimate estimate = localizer.process(kSecond_ns, cv::Mat());
@@ -259,7 +260,7 @@ TEST_F(MetricEstimate, ADoubtLeavesOdometry) {
 
 // The wheels turn twelve metres while the robot drives one: what it is compared with first lies far ahead.
 TEST_F(MetricEstimate, ItsBestImageIsThatOfThePoseWhenTheWheelsSlip) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.odometry.max_speed_mps = 20.0;
   make(config);
   double x_m = 10.0;
@@ -277,7 +278,7 @@ TEST_F(MetricEstimate, ItsBestImageIsThatOfThePoseWhenTheWheelsSlip) {
 TEST_F(MetricEstimate, OdometryIsJudgedByThePresentParameters) {
   for (const double max_speed_mps : {10.0, 0.5}) {
     make({});
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     config.odometry.max_speed_mps = max_speed_mps;
     localizer_->configure(config);
     for (std::size_t i = 2; i < 6; ++i) {
@@ -297,7 +298,7 @@ TEST_F(MetricEstimate, OdometryIsJudgedByThePresentParameters) {
 }
 
 TEST_F(MetricEstimate, APlaceIsNeverSurerThanItsFloor) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.metric.pose_source = "place";
   config.min_position_std_m = 3.0;
   config.min_yaw_std_rad = 0.4;
@@ -342,7 +343,7 @@ TEST_F(MetricEstimate, WithoutLandmarksTheMotionLeadsOn) {
 }
 
 TEST_F(MetricEstimate, AProposedPoseAttractsTheTracker) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.max_step_m = 10000.0;  // the particles stay; only the attractor moves
   make(config);
   for (std::size_t i = 3; i < 8; ++i) see(i);
@@ -357,7 +358,7 @@ TEST_F(MetricEstimate, AnImageThatLostItsLandmarksIsPassedOver) {
   images[20].geometry->landmarks.clear();
   const auto map = std::make_shared<const TrainingMap>(street_.map().header(), images);
   image_ = std::make_shared<GivenImage>(*map);
-  localizer_ = std::make_unique<Localizer>(map, LocalizerConfig(), image_);
+  localizer_ = std::make_unique<Localizer>(map, test::swarmConfig(), image_);
   for (std::size_t i = 15; i < 25; ++i) EXPECT_EQ(see(i).source, PoseSource::kMetric) << i;
 }
 

@@ -10,6 +10,7 @@
 #include "localization/pose_verifier.h"
 #include "test/localization/street_map.h"
 #include "test/support/stamps.h"
+#include "test/support/swarm_config.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
@@ -22,7 +23,7 @@ using test::kSecond_ns;
 class DriveWithOdometry : public testing::Test {
  protected:
   explicit DriveWithOdometry(const char* tracker = "dpso") {
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     config.tracker = tracker;
     const std::shared_ptr<const TrainingMap> map(std::shared_ptr<void>(), &street_.map());
     image_ = std::make_shared<GivenImage>(street_.map());
@@ -91,7 +92,7 @@ TEST_F(DriveWithOdometry, LeadsOverAStretchOfNothing) {
 }
 
 TEST_F(DriveWithOdometry, LeadsWhereTheParticlesAreNot) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.max_distance_m = 0.1;
   localizer_->configure(config);
   for (std::size_t i = 2; i <= 6; ++i) {
@@ -235,7 +236,7 @@ TEST_F(RecognisedPlace, WhereOdometryLeadsToThatIsThePose) {
 }
 
 TEST_F(RecognisedPlace, TheVelocityAloneDoesNotLeadFarFromTheParticles) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.state.max_distance_m = 0.1;
   localizer_->configure(config);
   for (std::size_t i = 2; i <= 6; ++i) ASSERT_EQ(see(i).source, PoseSource::kMetric) << i;

@@ -8,6 +8,7 @@
 
 #include "localization/dpso.h"
 #include "test/support/refusal.h"
+#include "test/support/swarm_config.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
 #include "visual_localization/localization/localizer_config.h"
@@ -166,7 +167,7 @@ TEST(PaperDpso, RecoveryRaisesThePerturbationStepByStepAndEndsAtOnce) {
 
 TEST(PaperDpso, RecoveryLeavesAnyPerturbationAloneUnlessToldToRaiseIt) {
   for (const double phi0 : {0.005, 0.3, 1.5}) {
-    LocalizerConfig config;
+    LocalizerConfig config = test::swarmConfig();
     assignParameters(config, {{"dpso/phi0", phi0}, {"recovery", std::string("paper")}});
     World world = roundWorld();
     Dpso swarm(world.map(), config.dpso, FitnessConfig(), 4);
@@ -177,7 +178,7 @@ TEST(PaperDpso, RecoveryLeavesAnyPerturbationAloneUnlessToldToRaiseIt) {
 }
 
 TEST(PaperDpso, ThePresetIsAConfiguration) {
-  LocalizerConfig config;
+  LocalizerConfig config = test::swarmConfig();
   config.tracker = "pf_linear";
   assignParameters(config, presetValues("paper"));
   EXPECT_EQ(config.tracker, "pf_linear") << "what it does not name stays";

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "test/localization/wall_street.h"
+#include "test/support/swarm_config.h"
 #include "visual_localization/localization/localizer.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -41,7 +42,7 @@ class Reconfiguration : public test::WallStreet {
     EXPECT_TRUE(always_tracking_);
   }
 
-  LocalizerConfig config_;
+  LocalizerConfig config_ = test::swarmConfig();
   Localizer localizer_{map(), config_};
   Estimate last_;
   int shown_ = 0;

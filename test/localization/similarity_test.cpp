@@ -37,7 +37,7 @@ TEST(SiftSimilarity, OneWayCountsMatchesOverTheTestImage) {
 
 TEST(SiftSimilarity, AnImageIsFullySimilarToItself) {
   const SiftFeatures features = test::randomFeatures(40, 11);
-  for (const char* mode : {"symmetric", "one_way"}) {
+  for (const char* mode : {"votes", "symmetric", "one_way"}) {
     EXPECT_DOUBLE_EQ(SiftSimilarity({0.6, mode}, SimilarityConfig()).compare(features, features).similarity, 1.0);
   }
 }

@@ -79,8 +79,16 @@ TEST(MapBuilder, CountsWhyImagesAreDropped) {
   EXPECT_EQ(builder.report().images_unusable, 3U);
 }
 
+/// As in the papers.
+MapBuilderConfig pruning() {
+  MapBuilderConfig config;
+  config.prune = true;
+  config.sift = SiftConfig();
+  return config;
+}
+
 TEST(MapBuilder, PruningDropsWhatOnlyOneImageShows) {
-  MapBuilder builder({});
+  MapBuilder builder(pruning());
   builder.beginSession("round", straightRound());
   for (int i = 0; i < 6; ++i) builder.addImage(i * kSecond_ns, scene(i == 3 ? 99U : 1U, 3 * i));
   const auto map = builder.build();
@@ -91,7 +99,7 @@ TEST(MapBuilder, PruningDropsWhatOnlyOneImageShows) {
 }
 
 TEST(MapBuilder, OneImageKeepsAllItsFeatures) {
-  MapBuilder builder({});
+  MapBuilder builder(pruning());
   builder.beginSession("round", straightRound());
   builder.addImage(kSecond_ns, scene(1, 0));
   EXPECT_EQ(builder.build()->size(), 1U);

@@ -22,8 +22,8 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 }
 
 TEST_F(MapStore, NamesBothVersions) {
-  tamper("PRAGMA user_version = 7");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 7"), HasSubstr("versions 3 to 6")));
+  tamper("PRAGMA user_version = 8");
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 8"), HasSubstr("versions 3 to 7")));
 }
 
 TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {

@@ -58,8 +58,8 @@ TEST_F(ReconfigureMessages, RangesAndDefaultsAreThoseOfTheDeclarations) {
   EXPECT_EQ(valueOf(message.max.ints, "dpso/particles"), 100000);
   EXPECT_EQ(valueOf(message.dflt.ints, "dpso/particles"), 80);
   EXPECT_EQ(valueOf(message.max.doubles, "similarity/global_exponent"), 1000.0);
-  EXPECT_EQ(valueOf(message.dflt.strs, "tracker"), "dpso");
-  EXPECT_EQ(valueOf(message.dflt.bools, "prune"), 1);
+  EXPECT_EQ(valueOf(message.dflt.strs, "tracker"), "bayes");
+  EXPECT_EQ(valueOf(message.dflt.bools, "prune"), 0);
 }
 
 TEST_F(ReconfigureMessages, GroupsAreWhatStandsBeforeTheSlashAndHaveNoNameThatToolsUseThemselves) {

@@ -68,10 +68,16 @@ struct SiftConfig {
   double edge_threshold = 10.0;
   double sigma_px = 1.6;
   int max_features = 0;
+  bool upright = false;
+  bool hellinger = false;
 
   /// What holds instead of max_features 0: far more than an image with structure has, and few enough that dense noise,
   /// with four features per 1000 pixels, is matched in a second or two; time grows with the square.
   static constexpr int kMostFeatures = 20000;
+
+  /// What survives another light and another season: many weak features of one orientation each, which a camera that
+  /// keeps its roll needs no more of.
+  static SiftConfig uprightHellinger();
 
   void declare(ParameterVisitor& visitor);
   /// How many features are kept, the strongest.

@@ -12,10 +12,12 @@ namespace visual_localization {
 /// When two descriptors count as the same thing in the world.
 struct MatchConfig {
   double max_angle_ratio = 0.6;
-  std::string mode = "symmetric";
+  std::string mode = "symmetric";  ///< as in the papers
 
   void declare(ParameterVisitor& visitor);
-  bool isSymmetric() const { return mode == "symmetric"; }
+  /// Of which image's features a similarity is the share: of those of the first one, or of the smaller set.
+  bool isOneWay() const { return mode == "one_way"; }
+  bool isByVotes() const { return mode == "votes"; }
 };
 
 /// Feature `a` of the first image matches feature `b` of the second.
@@ -37,8 +39,11 @@ void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_
                  std::vector<FeatureMatch>& matches);
 void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
                     std::vector<FeatureMatch>& matches);
-/// By the mode and the ratio of `config`.
-void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b,
+/// Pairs that are each other's nearest neighbour, however near the second nearest is.
+void matchMutual(const SiftFeatures& a, const SiftFeatures& b, std::vector<FeatureMatch>& matches);
+/// By the mode and the ratio of `config`. By votes: of matchMutual(), the largest number with a common displacement
+/// (see displacement_votes.h), for images of this width.
+void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b, double image_width_px,
              std::vector<FeatureMatch>& matches);
 
 /// Median size of the matched features of `a` as a share of their partners' in `b`: how much larger the same things

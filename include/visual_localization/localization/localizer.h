@@ -20,6 +20,7 @@
 
 namespace visual_localization {
 
+class PlaceFilter;
 class PoseVerifier;
 class SessionChoice;
 
@@ -101,6 +102,9 @@ class Localizer {
   std::optional<MetricPose> poseNearPrediction(std::int64_t stamp_ns);
   std::optional<MetricPose> poseNearProposal(const TrackerEstimate& tracked);
   TrackerEstimate track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric);
+  TrackerEstimate trackFrom(const Travel& travel, const std::optional<MetricPose>& metric);
+  void witness(const Travel& travel, const std::optional<MetricPose>& metric);
+  std::optional<double> probabilityOf(const TrackerEstimate& tracked) const;
   void learnSession(const TrackerEstimate& tracked);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
   void choosePose(Estimate& estimate);
@@ -119,6 +123,7 @@ class Localizer {
   Scores scores_;
   MapSweep sweep_;
   std::unique_ptr<Tracker> tracker_;
+  std::unique_ptr<PlaceFilter> witness_;  ///< beside a tracker that keeps no posterior of its own
   FeatureChoice choice_;
   StateAssessor assessor_;
   OdometryTrack odometry_;

@@ -18,17 +18,19 @@ namespace visual_localization {
 /// Everything a user can set about localisation. With which parameters features are extracted is not here: the map
 /// says it.
 struct LocalizerConfig : TrackerConfig {
+  LocalizerConfig() { tracker = "bayes"; }
+
   std::string features = "sift";
   std::string estimate = "interpolated";
   std::string sift_backend = kNativeSift;
   int seed = 1;
-  bool prune = true;
+  bool prune = false;
   bool choose_session = true;
   double max_image_gap_s = 10.0;
   double min_position_std_m = 0.5;
   double min_yaw_std_rad = 0.1;
   int sweep_images = 20000;
-  MatchConfig match;
+  MatchConfig match{MatchConfig().max_angle_ratio, "votes"};
   SimilarityConfig similarity;
   HybridConfig hybrid;
   StateConfig state;

@@ -30,7 +30,7 @@ std::string toString(FeatureKind kind);
 /// How alike two images are, and on how much evidence.
 struct Score {
   double similarity = 0.0;  ///< m in [0, 1]
-  double weight = 0.0;      ///< what counts for a particle, [0, 1]: m, sharpened for global features
+  double weight = 0.0;      ///< what counts for a particle, [0, 1]: m, sharpened for votes and global features
   std::size_t matches = 0;  ///< matched local features behind it; 0 for global features
   bool recognised = false;  ///< m is good enough to be no accident
   double scale = 1.0;       ///< median size of the matched features, share of their size in training; 1 without any
@@ -39,9 +39,16 @@ struct Score {
 /// What a similarity means, for each kind of features.
 struct SimilarityConfig {
   double sift_recognised = 0.05;
+  double votes_recognised = 0.016;
+  double votes_exponent = 2.0;
   double global_recognised = 0.6;
   double global_exponent = 20.0;
 
+  /// The least similarity that is no accident.
+  double recognised(FeatureKind features, const MatchConfig& match) const {
+    if (features == FeatureKind::kGlobal) return global_recognised;
+    return match.isByVotes() ? votes_recognised : sift_recognised;
+  }
   void declare(ParameterVisitor& visitor);
 };
 
@@ -59,7 +66,8 @@ struct HybridConfig {
 /// Stateless, so that one may serve several threads.
 class SiftSimilarity {
  public:
-  SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config);
+  /// `image_width_px`: the map's.
+  SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px = 640);
   /// 0 when either image has fewer than two features.
   Score compare(const SiftFeatures& current, const SiftFeatures& training) const;
   /// The score of a similarity that is known already.
@@ -68,6 +76,8 @@ class SiftSimilarity {
  private:
   MatchConfig match_;
   double recognised_;
+  double exponent_;
+  double image_width_px_;
 };
 
 /// Product of the normalised intersections of the WGOH and of the WGII histograms (Weiss et al., section II.C).
@@ -182,6 +192,13 @@ class Scores {
   /// The score by global features, whatever particles are compared by.
   Score global(std::size_t training_image);
 
+  /// A training image and how it compares.
+  struct Compared {
+    std::size_t training_image = 0;
+    Score score;
+  };
+  /// All that particles were compared with, in the order of comparison.
+  std::vector<Compared> compared() const;
   /// The training images that particles were compared with, the most similar first.
   std::vector<std::size_t> mostSimilar() const;
   /// Training images that were compared otherwise, by SIFT.

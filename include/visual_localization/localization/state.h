@@ -29,6 +29,8 @@ std::string toString(LocalizationState state);
 
 /// When a position counts as confirmed.
 struct StateConfig {
+  std::string witness = "probability";
+  double min_probability = 0.97;
   double min_similarity = 0.08;
   int min_matches = 5;
   double max_scale = 1.2;
@@ -57,6 +59,9 @@ struct Evidence {
   bool blind = false;                         ///< there is hardly anything to see in the image
   /// Whether landmarks verify the pose; nothing where map or camera do not allow that. Then it alone decides.
   std::optional<bool> verified = {};
+  /// How likely the robot is around the estimate, by a filter over the training images; nothing where the similarity
+  /// of the image decides.
+  std::optional<double> probability = {};
 };
 
 /// Whether the last estimates follow one motion. A robot moves steadily between a few images; an estimate that jumps
@@ -105,7 +110,7 @@ class StateAssessor {
   double motionResidual_m() const { return motion_.residual_m(); }
 
  private:
-  bool confirms(const TrackerEstimate& estimate, FeatureKind features) const;
+  bool confirms(const TrackerEstimate& estimate, const Evidence& evidence) const;
   void remember(std::int64_t stamp_ns, const TrackerEstimate& estimate, const Evidence& evidence);
   void forget();
   bool isCertain() const;

@@ -42,6 +42,7 @@ struct TrackerEstimate {
   double rival_weight = 0.0;
 };
 
+class PlaceFilter;
 class SessionChoice;
 
 /// What one image brings to a tracker.
@@ -71,6 +72,8 @@ class Tracker {
   virtual void attract(const Eigen::Vector2d& position_m) = 0;
   virtual const std::vector<Particle>& particles() const = 0;
   virtual TrackerTuning tuning() const = 0;
+  /// How likely each training image is, where it keeps a posterior over them; null otherwise.
+  virtual const PlaceFilter* belief() const { return nullptr; }
 };
 
 /// The chosen tracker, with its particles anywhere in the map. `map` must outlive it.

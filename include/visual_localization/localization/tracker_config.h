@@ -66,11 +66,23 @@ struct ParticleFilterConfig {
   void declare(ParameterVisitor& visitor);
 };
 
+/// Parameters of the discrete Bayes filter over the training images.
+struct BayesConfig {
+  double anywhere = 0.02;
+  double exponent = 3.0;
+  double uniform = 0.03;
+  int comparisons = 60;
+  int first_comparisons = 400;
+
+  void declare(ParameterVisitor& visitor);
+};
+
 /// Which tracker, and the parameters of all of them.
 struct TrackerConfig {
   std::string tracker = "dpso";
   DpsoConfig dpso;
   ParticleFilterConfig pf;
+  BayesConfig bayes;
   FitnessConfig fitness;
   OdometryConfig odometry;
 

@@ -33,14 +33,14 @@ struct RawImage;
 struct MapBuilderConfig {
   double min_spacing_m = 0.0;
   double spacing_m = 0.0;
-  bool prune = true;
+  bool prune = false;
   int preview_width_px = 80;
   std::string sift_backend = kNativeSift;
   std::string base_frame = "base_link";
   std::string camera_mount;
   std::string antenna_mount;
   std::string fix_frame;
-  SiftConfig sift;
+  SiftConfig sift = SiftConfig::uprightHellinger();
   MatchConfig match;
   TrajectoryCleanerConfig trajectory;
   GeometryConfig geometry;

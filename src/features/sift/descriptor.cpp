@@ -174,8 +174,14 @@ float lengthOf(const float* elements) {
   return std::sqrt(hn::GetLane(hn::SumOfLanes(d, sum)));
 }
 
+/// Replaces each element by its square root, so that the length becomes that of the sum.
+void takeRoots(float* elements) {
+  const Floats d;
+  for (int i = 0; i < kElements; i += kLanes) hn::Store(hn::Sqrt(hn::Load(d, elements + i)), d, elements + i);
+}
+
 /// Lowe 2004, section 6.1: clips large elements, scales to a length of 512 and rounds.
-void toBytes(float* elements, std::uint8_t* descriptor) {
+void toBytes(float* elements, bool hellinger, std::uint8_t* descriptor) {
   constexpr float kLargest = 0.2F;
   constexpr float kLength = 512.0F;
   constexpr float kLeastLength = 1.1920929e-7F;
@@ -185,6 +191,7 @@ void toBytes(float* elements, std::uint8_t* descriptor) {
   for (int i = 0; i < kElements; i += kLanes) {
     hn::Store(hn::Min(hn::Load(d, elements + i), largest), d, elements + i);
   }
+  if (hellinger) takeRoots(elements);
   const V scale = hn::Set(d, kLength / std::max(lengthOf(elements), kLeastLength));
   for (int i = 0; i < kElements; i += kLanes) {
     const auto whole = hn::NearestInt(hn::Mul(hn::Load(d, elements + i), scale));
@@ -237,7 +244,7 @@ void collect(const FloatPlane& level, const Square& square, int radius, SiftDesc
   addSamples(samples, work.samples, histograms);
 }
 
-void describeImpl(const FloatPlane& level, const SiftPoint& point, SiftDescriber::Workspace& work,
+void describeImpl(const FloatPlane& level, const SiftPoint& point, bool hellinger, SiftDescriber::Workspace& work,
                   std::uint8_t* descriptor) {
   constexpr float kDiagonal = 1.41421356F;
   const Square square = squareOf(point);
@@ -247,7 +254,7 @@ void describeImpl(const FloatPlane& level, const SiftPoint& point, SiftDescriber
   collect(level, square, radius, work, histograms);
   alignas(64) float elements[kElements];
   gather(histograms, elements);
-  toBytes(elements, descriptor);
+  toBytes(elements, hellinger, descriptor);
 }
 
 // Orientations: Lowe 2004, section 5.
@@ -355,7 +362,7 @@ void SiftOrientations::assign(const FloatPlane& level, const SiftPoint& point, s
 }
 
 void SiftDescriber::describe(const FloatPlane& level, const SiftPoint& point, std::uint8_t* descriptor) {
-  HWY_DYNAMIC_DISPATCH(describeImpl)(level, point, work_, descriptor);
+  HWY_DYNAMIC_DISPATCH(describeImpl)(level, point, hellinger_, work_, descriptor);
 }
 
 }  // namespace visual_localization

@@ -34,8 +34,11 @@ class SiftOrientations {
 /// 3 sigma, turned by the point's angle, with 8 directions each.
 class SiftDescriber {
  public:
-  /// Writes 128 bytes, a vector of length 512 whose elements were clipped at 0.2 of its length. `level`: the blurred
-  /// image that the point was found in.
+  /// `hellinger`: see SiftConfig.
+  explicit SiftDescriber(bool hellinger = false) : hellinger_(hellinger) {}
+
+  /// Writes 128 bytes, a vector of length 512 whose elements were clipped at 0.2 of its length, or the square roots of
+  /// such elements, again of length 512. `level`: the blurred image that the point was found in.
   void describe(const FloatPlane& level, const SiftPoint& point, std::uint8_t* descriptor);
 
   /// What pixels add to the histograms.
@@ -56,6 +59,7 @@ class SiftDescriber {
   };
 
  private:
+  bool hellinger_;
   Workspace work_;
 };
 

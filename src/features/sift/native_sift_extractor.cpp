@@ -124,7 +124,7 @@ void SiftScaleSpace::advanceLevel(std::size_t level) {
 }
 
 NativeSiftExtractor::NativeSiftExtractor(const SiftConfig& config)
-    : config_(config), scale_space_(config), search_(config) {}
+    : config_(config), scale_space_(config), search_(config), describer_(config.hellinger) {}
 
 void NativeSiftExtractor::extract(const cv::Mat& grey, SiftFeatures& features) {
   requireExtractable(grey);
@@ -160,7 +160,12 @@ void NativeSiftExtractor::detectIn(std::size_t octave_index) {
   }
   for (const SiftExtremum& extremum : extrema_) {
     const auto point = refine(octave, static_cast<int>(octave_index), extremum, config_);
-    if (point) orientations_.assign(octave.levels[static_cast<std::size_t>(point->level)], *point, points_);
+    if (!point) continue;
+    if (config_.upright) {
+      points_.push_back(*point);
+    } else {
+      orientations_.assign(octave.levels[static_cast<std::size_t>(point->level)], *point, points_);
+    }
   }
 }
 

@@ -1,0 +1,141 @@
+#include "localization/bayes_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/numbers.h"
+
+namespace visual_localization {
+namespace {
+
+constexpr std::size_t kOthers = 10;    ///< training images that are compared in turn
+constexpr double kKnown = 0.9;         ///< probability around the estimate, from which on few are compared
+constexpr double kAround_m = 5.0;      ///< or
+constexpr double kPlacesAround = 3.0;  ///< training images, where they are farther apart
+constexpr std::size_t kProposed = 6;   ///< every so-many-th looks alike as a whole
+
+}  // namespace
+
+BayesTracker::BayesTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed)
+    : map_(map),
+      config_(config.bayes),
+      random_(seed),
+      filter_(map, config.bayes, config.odometry),
+      particles_(config.particles()) {
+  drawParticles();
+}
+
+void BayesTracker::reset() {
+  filter_.reset();
+  seen_an_image_ = is_known_ = false;
+  drawParticles();
+}
+
+void BayesTracker::reset(const Prior& prior) {
+  constexpr std::size_t kDraws = 1000;
+  std::vector<Eigen::Vector2d> drawn_m;
+  while (drawn_m.size() < kDraws) drawn_m.push_back(prior(random_));
+  filter_.reset(drawn_m);
+  seen_an_image_ = is_known_ = false;
+  drawParticles();
+}
+
+void BayesTracker::configure(const TrackerConfig& config) {
+  config_ = config.bayes;
+  filter_.configure(config.bayes, config.odometry);
+}
+
+TrackerEstimate BayesTracker::update(const TrackerInput& input) {
+  if (seen_an_image_) filter_.predict(input.travel);
+  seen_an_image_ = true;
+  ++images_;
+  chosen_.clear();
+  if (input.verified_m) {
+    filter_.update(filter_.around(*input.verified_m));
+  } else {
+    choose(input);
+    filter_.update(compare(input.scores));
+  }
+  drawParticles();
+  return estimate(input.scores);
+}
+
+/// As one more likelihood.
+void BayesTracker::attract(const Eigen::Vector2d& position_m) {
+  filter_.update(filter_.around(position_m));
+  drawParticles();
+}
+
+void BayesTracker::choose(const TrackerInput& input) {
+  const auto most = static_cast<std::size_t>(is_known_ ? config_.comparisons : config_.first_comparisons);
+  others_ = std::min({kOthers, most / 2, map_.size()});
+  const std::size_t rest = most - others_;
+  const bool sees_all = map_.size() <= static_cast<std::size_t>(config_.first_comparisons);
+  std::vector<std::size_t> proposed;
+  if (!sees_all) proposed = input.sweep.mostSimilar(input.scores, is_known_ ? rest / kProposed : rest / 2);
+  filter_.mostProbable(rest - std::min(rest, proposed.size()), chosen_);
+  chosen_.insert(chosen_.end(), proposed.begin(), proposed.end());
+  std::sort(chosen_.begin(), chosen_.end());
+  chosen_.erase(std::unique(chosen_.begin(), chosen_.end()), chosen_.end());
+  // Evenly over the map, so that all of it is seen after some images: a robot that was carried away is found there.
+  const double stride = static_cast<double>(map_.size()) / static_cast<double>(others_);
+  const double golden = std::fmod(0.618033988749895 * static_cast<double>(images_), 1.0);
+  for (std::size_t i = 0; i < others_; ++i) {
+    const auto image = static_cast<std::size_t>((static_cast<double>(i) + golden) * stride);
+    chosen_.push_back(std::min(image, map_.size() - 1));
+  }
+}
+
+/// A training image that the image was not compared with is as likely as the usual one of those that were taken in
+/// turn.
+PlaceLikelihood BayesTracker::compare(Scores& scores) {
+  PlaceLikelihood likelihood;
+  std::vector<double> usual;
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    likelihood.compared.push_back({chosen_[i], filter_.likelihoodOf(scores[chosen_[i]])});
+    if (i + others_ >= chosen_.size()) usual.push_back(likelihood.compared.back().likelihood);
+  }
+  likelihood.elsewhere = median(std::move(usual));
+  return likelihood;
+}
+
+TrackerEstimate BayesTracker::estimate(Scores& scores) {
+  const CloudMoments mode = filter_.mode();
+  const double around_m = std::max(kAround_m, kPlacesAround * filter_.spacing_m());
+  is_known_ = filter_.within(mode.mean_m, around_m) >= kKnown;
+  TrackerEstimate result;
+  result.position_m = mode.mean_m;
+  result.mode_covariance_m2 = mode.covariance_m2;
+  result.cloud_covariance_m2 = filter_.covarianceAbout(mode.mean_m);
+  result.spread_m = result.cloud_covariance_m2.diagonal().cwiseMax(0.0).cwiseSqrt();
+  result.training_image = map_.nearest(mode.mean_m).image;
+  result.best_image = result.training_image;
+  for (const std::size_t image : chosen_) {
+    const bool is_there = (map_.position_m(image) - mode.mean_m).norm() <= around_m;
+    if (!is_there || scores[image].similarity <= result.best.similarity) continue;
+    result.best = scores[image];
+    result.best_image = image;
+  }
+  result.best_distance_m = (map_.position_m(result.best_image) - mode.mean_m).norm();
+  tuning_.speed_mps = filter_.speed_mps(result.training_image);
+  result.tuning = tuning_;
+  return result;
+}
+
+/// By one random offset and equal steps through the posterior, so that all weigh the same.
+void BayesTracker::drawParticles() {
+  const std::vector<double>& probabilities = filter_.probabilities();
+  const double step = 1.0 / static_cast<double>(particles_.size());
+  double target = random_.uniform(0.0, step);
+  double cumulated = probabilities.front();
+  std::size_t image = 0;
+  for (Particle& particle : particles_) {
+    while (target > cumulated && image + 1 < probabilities.size()) cumulated += probabilities[++image];
+    particle = Particle();
+    particle.position_m = map_.position_m(image);
+    particle.weight = step;
+    target += step;
+  }
+}
+
+}  // namespace visual_localization

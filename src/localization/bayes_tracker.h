@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "localization/place_filter.h"
+#include "visual_localization/localization/particles.h"
+#include "visual_localization/localization/tracker.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// Follows the position by a discrete Bayes filter over the training images. Compares an image with the most probable
+/// ones, with such as look alike as a whole where the map has more than that, and with a few others in turn, which tell
+/// what a similarity to a wrong place is like.
+class BayesTracker final : public Tracker {
+ public:
+  /// `map` must outlive the tracker. Starts anywhere in the map.
+  BayesTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed);
+
+  void reset() override;
+  void reset(const Prior& prior) override;
+  void configure(const TrackerConfig& config) override;
+  TrackerEstimate update(const TrackerInput& input) override;
+  void attract(const Eigen::Vector2d& position_m) override;
+  /// Drawn from the posterior.
+  const std::vector<Particle>& particles() const override { return particles_; }
+  TrackerTuning tuning() const override { return tuning_; }
+  const PlaceFilter* belief() const override { return &filter_; }
+
+ private:
+  void choose(const TrackerInput& input);
+  PlaceLikelihood compare(Scores& scores);
+  TrackerEstimate estimate(Scores& scores);
+  void drawParticles();
+
+  const TrainingMap& map_;
+  BayesConfig config_;
+  Random random_;
+  PlaceFilter filter_;
+  std::vector<Particle> particles_;
+  TrackerTuning tuning_;
+  bool seen_an_image_ = false;
+  bool is_known_ = false;            ///< most of the probability is around the last estimate
+  std::size_t images_ = 0;           ///< since the start
+  std::vector<std::size_t> chosen_;  ///< training images to be compared; the last kOthers of them in turn
+  std::size_t others_ = 0;
+};
+
+}  // namespace visual_localization

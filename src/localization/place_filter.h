@@ -1,0 +1,111 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "visual_localization/localization/particles.h"
+#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/tracker_config.h"
+#include "visual_localization/map/training_map.h"
+
+namespace visual_localization {
+
+/// What an image says of the training images: of those it was compared with, how likely it is there, not normalised.
+struct PlaceLikelihood {
+  struct Compared {
+    std::size_t training_image = 0;
+    double likelihood = 0.0;
+  };
+  std::vector<Compared> compared;
+  double elsewhere = 1.0;  ///< of each training image that it was not compared with
+};
+
+/// Discrete Bayes filter over the training images: how likely the robot is at each. It moves along the direction that
+/// they look, as fast as the session did there times a factor of which a distribution is kept (0: it stands), or as
+/// odometry says, and to any of them with a small probability: it may have been carried away, or lost. Between sessions
+/// it moves as within one.
+class PlaceFilter {
+ public:
+  /// `map` must outlive the filter. Anywhere.
+  PlaceFilter(const TrainingMap& map, const BayesConfig& config, const OdometryConfig& odometry);
+
+  void configure(const BayesConfig& config, const OdometryConfig& odometry);
+  /// Anywhere again.
+  void reset();
+  /// At the training images nearest to these positions, each counted the same; there must be one.
+  void reset(const std::vector<Eigen::Vector2d>& positions_m);
+  /// The motion since the last image.
+  void predict(const Travel& travel);
+  /// How likely an image with this score was taken at the training image: a power of the matches and one, or what the
+  /// score counts for a particle where there are none. Images that follow each other more closely than the training
+  /// images do are not independent: the nearer they are the less each says.
+  double likelihoodOf(const Score& score) const;
+  /// What the comparisons that another tracker chose say. It may not have looked at the right place: elsewhere is half
+  /// way, on a logarithmic scale, between chance and what matched best lately.
+  PlaceLikelihood likelihoodBeside(const std::vector<Scores::Compared>& compared);
+  /// What the image says.
+  void update(const PlaceLikelihood& likelihood);
+
+  /// Of each training image; they sum to one.
+  const std::vector<double>& probabilities() const { return probabilities_; }
+  /// The `count` most probable training images, the first of equals; not in order.
+  void mostProbable(std::size_t count, std::vector<std::size_t>& found) const;
+  /// Of being within `radius_m` of a position.
+  double within(const Eigen::Vector2d& position_m, double radius_m) const;
+  /// How likely an image is taken at each training image by its distance from a position.
+  PlaceLikelihood around(const Eigen::Vector2d& position_m) const;
+
+  /// The position with most probability around, and its covariance there.
+  CloudMoments mode() const;
+  /// Of everything that is possible, about `centre_m`.
+  Eigen::Matrix2d covarianceAbout(const Eigen::Vector2d& centre_m) const;
+  /// Expected speed at a training image, metres per second.
+  double speed_mps(std::size_t training_image) const;
+  /// Usual distance of successive training images.
+  double spacing_m() const { return spacing_m_; }
+
+  /// Speeds as shares of the session's.
+  static constexpr std::array<double, 11> kSpeeds{-1.0, 0.0, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
+  using PerSpeed = std::array<double, kSpeeds.size()>;
+
+ private:
+  /// Where the robot comes to, by each speed; added up as each training image becomes a place it may come to.
+  struct Arrival {
+    std::size_t training_image = 0;
+    PerSpeed by_speed{};
+    double by_odometry = 0.0;
+  };
+
+  void learnPace();
+  double secondsOf(const Travel& travel) const;
+  void moveFrom(std::size_t image, const Travel& travel);
+  Arrival& arrivalAt(std::size_t image);
+  double expectedSpeed() const;
+  void learnSpeed(double elsewhere);
+
+  const TrainingMap& map_;
+  BayesConfig config_;
+  OdometryConfig odometry_;
+  double spacing_m_ = 1.0;
+  double interval_s_ = 1.0;      ///< usual time between successive training images
+  std::vector<float> pace_mps_;  ///< of the session at each training image
+  std::vector<double> probabilities_;
+  PerSpeed speeds_{};                ///< how likely each of kSpeeds is
+  std::vector<double> likelihoods_;  ///< of each training image; kept to save the allocation
+  std::vector<double> stayed_;       ///< probability of those too improbable to be moved
+  std::vector<Arrival> arrivals_;
+  std::vector<std::uint32_t> arrival_of_;  ///< of each training image; holds if the arrival says so too
+  double odometry_share_ = 0.0;            ///< of the last motion
+  std::optional<double> log_best_;         ///< of the likelihoods of late, smoothed
+  double independence_ = 1.0;              ///< of the image from the one before, (0, 1]
+  mutable std::vector<Neighbour> neighbours_;
+  std::vector<double> ahead_m_;
+  std::vector<double> kernel_;
+};
+
+}  // namespace visual_localization

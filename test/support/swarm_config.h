@@ -1,0 +1,18 @@
+#pragma once
+
+#include "visual_localization/localization/localizer_config.h"
+
+namespace visual_localization::test {
+
+/// The swarm with the papers' similarity, and TRACKING by thresholds on it: what most rules of the localizer were
+/// written for, and what these tests ask about. The defaults have tests of their own.
+inline LocalizerConfig swarmConfig() {
+  LocalizerConfig config;
+  config.tracker = "dpso";
+  config.match = MatchConfig();
+  config.prune = true;
+  config.state.witness = "similarity";
+  return config;
+}
+
+}  // namespace visual_localization::test
