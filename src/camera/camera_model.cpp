@@ -316,6 +316,21 @@ bool operator==(const CameraModel& a, const CameraModel& b) {
          first.coefficients == second.coefficients;
 }
 
+bool areAlike(const CameraModel& a, const CameraModel& b) {
+  constexpr double kRoundingError = 1e-6;
+  const Intrinsics& first = a.intrinsics();
+  const Intrinsics& second = b.intrinsics();
+  if (first.size != second.size || first.distortion != second.distortion) return false;
+  for (const auto& [name, number] : kNumbers) {
+    if (std::abs(first.*number - second.*number) > kRoundingError * first.fx) return false;
+  }
+  for (std::size_t i = 0; i < kMostCoefficients; ++i) {
+    const double difference = lens::at(first.coefficients, i) - lens::at(second.coefficients, i);
+    if (std::abs(difference) > kRoundingError) return false;
+  }
+  return true;
+}
+
 std::string describe(const CameraModel& camera) {
   const Intrinsics& values = camera.intrinsics();
   std::string words = text(values.size) + " px, focal length " + tenths(values.fx) + " x " + tenths(values.fy) +

@@ -16,6 +16,14 @@ namespace {
 
 constexpr std::size_t kSweptImages = 20;  ///< those of the whole map that look most alike: a few positions
 
+/// What the map's images made of the same calibration, if they had it: one camera took them and the live ones.
+CameraModel adjustedCamera(const MapHeader& map, const CameraModel& published) {
+  for (const Session& session : map.sessions) {
+    if (session.published && areAlike(*session.published, published)) return *session.camera;
+  }
+  return published;
+}
+
 }  // namespace
 
 Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
@@ -332,7 +340,7 @@ void Localizer::configure(const LocalizerConfig& config) {
 }
 
 void Localizer::setCamera(const CameraModel& camera) {
-  camera_ = camera.scaledTo(map_->header().image_size);
+  camera_ = adjustedCamera(map_->header(), camera.scaledTo(map_->header().image_size));
   verifier_->resetCamera();
   last_.reset();
 }

@@ -13,7 +13,8 @@ namespace visual_localization::map_schema {
 namespace {
 
 constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
-constexpr const char* kMount = "/mount/";    ///< likewise
+constexpr const char* kPublished = "/published_camera/";
+constexpr const char* kMount = "/mount/";  ///< likewise
 constexpr const char* kMask = "/mask";
 constexpr const char* kGeometryCount = "geometry/images";
 constexpr const char* kHistory = "history/";  ///< before the number of the edit
@@ -83,8 +84,8 @@ ParameterValues takeGroup(ParameterValues& meta, const std::string& prefix) {
   return group;
 }
 
-std::optional<CameraModel> takeCamera(ParameterValues& meta, const std::string& session) {
-  const ParameterValues values = takeGroup(meta, session + kCamera);
+std::optional<CameraModel> takeCamera(ParameterValues& meta, const std::string& session, const char* group) {
+  const ParameterValues values = takeGroup(meta, session + group);
   if (values.empty()) return std::nullopt;
   try {
     return cameraOf(values);
@@ -191,10 +192,11 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
     Session session{take<std::string>(meta, key)};
     requireName(key, session.name);
     if (version >= kSinceCameras) {
-      session.camera = takeCamera(meta, key);
+      session.camera = takeCamera(meta, key, kCamera);
       session.mount = takeMount(meta, key);
       session.mask = takeMask(meta, sessions.size(), masks, decoded);
     }
+    if (version >= kSincePublished) session.published = takeCamera(meta, key, kPublished);
     if (!session.mask.empty()) ++used;
     sessions.push_back(std::move(session));
   }
@@ -209,6 +211,15 @@ std::vector<std::string> takeHistory(ParameterValues& meta) {
     history.push_back(take<std::string>(meta, key));
   }
   return history;
+}
+
+}  // namespace
+
+namespace {
+
+void addCamera(const std::optional<CameraModel>& camera, const std::string& group, ParameterValues& meta) {
+  if (!camera) return;
+  for (const auto& [name, value] : toValues(*camera)) meta[group + name] = value;
 }
 
 }  // namespace
@@ -234,9 +245,8 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
     const std::string key = sessionKey(i);
     requireName(key, session.name);
     meta[key] = session.name;
-    if (session.camera) {
-      for (const auto& [name, value] : toValues(*session.camera)) meta[key + kCamera + name] = value;
-    }
+    addCamera(session.camera, key + kCamera, meta);
+    addCamera(session.published, key + kPublished, meta);
     if (session.mount) {
       for (const auto& [name, value] : toValues(*session.mount)) meta[key + kMount + name] = value;
     }

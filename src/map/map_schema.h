@@ -45,6 +45,9 @@ constexpr int kSinceHistory = 6;
 /// Upright and Hellinger features, and as many values to say so.
 constexpr int kSinceUpright = 7;
 
+/// From this version on a session's camera may differ from the calibration that was published for it.
+constexpr int kSincePublished = 7;
+
 struct Table {
   const char* name;
   const char* sql;

@@ -29,6 +29,9 @@ void requireCamerasOfSize(const MapHeader& header) {
     const Session& session = header.sessions[i];
     const std::string of_session = " of session " + std::to_string(i);
     if (session.camera) requireOfSize(session.camera->size(), header.image_size, "the camera" + of_session);
+    if (session.published) {
+      requireOfSize(session.published->size(), header.image_size, "the published camera" + of_session);
+    }
     if (!session.mask.empty()) requireOfSize(session.mask.size(), header.image_size, "the mask" + of_session);
   }
 }

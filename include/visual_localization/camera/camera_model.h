@@ -86,6 +86,9 @@ class CameraModel {
 bool operator==(const CameraModel& a, const CameraModel& b);
 inline bool operator!=(const CameraModel& a, const CameraModel& b) { return !(a == b); }
 
+/// Equal but for rounding: every number to a millionth of a focal length, or of one.
+bool areAlike(const CameraModel& a, const CameraModel& b);
+
 /// In a few words: "320 x 240 px, focal length 266.3 x 266.3 px, plumb_bob".
 std::string describe(const CameraModel& camera);
 /// What differs of two cameras, in words: "fx 266.3 instead of 260.1, distortion plumb_bob instead of equidistant";

@@ -62,6 +62,8 @@ struct Session {
   std::optional<CameraModel> camera = {};  ///< of images of the map's size; none: not calibrated
   Mask mask = {};                          ///< of the map's size; features under it were not used
   std::optional<SensorMount> mount = {};   ///< of the robot that recorded it; none: nobody said
+  /// The calibration that `camera` was adjusted from, for the same images; none: it is as it was published.
+  std::optional<CameraModel> published = {};
 };
 
 /// What holds for all images of a map.
