@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -59,14 +60,30 @@ void printMount(const SessionImages& session) {
   std::cout << session.name << ": " << describe(*session.camera.mount) << '\n';
 }
 
-void printGeometry(const SessionImages& session) {
+/// Nothing for what the images do not tell.
+std::string plusMinus(double sigma) {
+  if (sigma == 0.0) return " (the images do not tell it better)";
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(2) << " +- " << sigma;
+  return out.str();
+}
+
+void printGeometry(const SessionImages& session, const GeometryConfig& config) {
   const SessionLandmarks& geometry = session.geometry;
   if (!session.camera.model) return;
   if (geometry.contradicts_calibration) {
-    std::cout << session.name << ": the images contradict the calibration (they ask for "
-              << 100.0 * geometry.focal_scale << " % of its focal length, move " << 100.0 * geometry.far_share
-              << " % of the images that fixes confirm by more than 3 m, and explain " << 100.0 * geometry.agreeing_share
-              << " % of the matched features): a map of places\n";
+    std::cout << session.name << ": the images contradict the calibration: they ask for "
+              << 100.0 * geometry.focal_scale
+              << " % of its focal length (one sigma of a calibration: " << 100.0 * config.focal_sigma
+              << " %). Another camera, or K of the raw images with rectified ones? A map "
+              << "of places\n";
+    return;
+  }
+  if (geometry.contradicts_fixes) {
+    std::cout << session.name << ": images and fixes disagree: of " << session.kept << " images " << geometry.off_fixes
+              << " lie elsewhere than the fixes around them, and around " << geometry.unexplained
+              << " too little fits together; of the matched features " << 100.0 * geometry.agreeing_share
+              << " % agree. A map of places\n";
     return;
   }
   std::cout << session.name << ": " << geometry.located << " of " << session.kept
@@ -74,8 +91,12 @@ void printGeometry(const SessionImages& session) {
             << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
             << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "
             << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
-            << " % of the calibration's; delay of fixes " << std::showpos << geometry.fix_delay_s << std::noshowpos
-            << " s\n";
+            << " %" << plusMinus(100.0 * geometry.focal_sigma) << " of the calibration's; delay of fixes "
+            << std::showpos << geometry.fix_delay_s << std::noshowpos << plusMinus(geometry.delay_sigma_s) << " s\n";
+  if (geometry.off_fixes + geometry.unexplained > 0) {
+    std::cout << session.name << ": " << geometry.off_fixes << " images lie elsewhere than the fixes around them, "
+              << geometry.unexplained << " have no landmarks because too little around them fits together\n";
+  }
   if (geometry.tied_apart_m > 0.0) {
     std::cout << session.name << ": tied to the sessions before; median offset before that " << geometry.tied_apart_m
               << " m\n";
@@ -147,7 +168,7 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
   for (const PlottedSession& session : sessions) printRemarks(session);
   for (const PlottedSession& session : sessions) printFixes(session);
   for (const SessionImages& session : report.session_images) {
-    if (geometry.enabled) printGeometry(session);
+    if (geometry.enabled) printGeometry(session, geometry);
   }
   for (const SessionImages& session : report.session_images) printOtherSizes(session);
   for (const SessionImages& session : report.session_images) {

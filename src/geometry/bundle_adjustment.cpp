@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <memory>
 #include <utility>
 
 #include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
 #include <ceres/autodiff_cost_function.h>
+#include <ceres/crs_matrix.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 #include <ceres/rotation.h>
@@ -22,9 +26,9 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kTiltLoss = 2.0;      ///< sigmas
-constexpr double kAltitudeLoss = 2.0;  ///< sigmas
-constexpr double kRoughness_m = 0.01;  ///< of a level road, from one image to the next
+constexpr double kShortestWay_m = 0.2;  ///< between cameras that say where a robot drives
+constexpr double kLongestWay_m = 20.0;
+constexpr double kWayNoise_m = 0.05;
 
 /// The problem as Ceres takes it. Losses and parameters must live as long as Ceres works on it.
 class Adjustment {
@@ -36,13 +40,12 @@ class Adjustment {
         sighting_loss_(config.landmark_loss),
         tilt_loss_(kTiltLoss),
         position_loss_(config.position_loss),
+        doubtful_position_loss_(config.position_loss),
         altitude_loss_(kAltitudeLoss),
         ceres_(borrowedLosses()) {
     for (const CameraPose& camera : problem.cameras) {
       const Eigen::Vector3d& position = camera.position_m;
-      const std::size_t next = sessions_.empty() ? 1 : sessions_.back() + 1;
-      const bool begins = next < problem.sessions.size() && problem.sessions[next].begin == sessions_.size();
-      sessions_.push_back(begins ? next : next - 1);
+      sessions_.push_back(static_cast<std::size_t>(&problem.sessionOf(sessions_.size()) - problem.sessions.data()));
       starts_.push_back(camera.rotation.toRotationMatrix());
       cameras_.push_back({0.0, 0.0, 0.0, position.x(), position.y(), position.z()});
     }
@@ -68,7 +71,44 @@ class Adjustment {
     return summary.final_cost;
   }
 
+  /// Standard deviations of the entries of some parameter blocks, one after the other; zero for those that are held.
+  std::vector<double> sigmasOf(const std::vector<std::pair<double*, int>>& blocks) {
+    ceres::Problem::EvaluateOptions options;
+    std::map<double*, Eigen::Index> columns;
+    Eigen::Index count = 0;
+    ceres_.GetParameterBlocks(&options.parameter_blocks);
+    auto& all = options.parameter_blocks;
+    all.erase(std::remove_if(all.begin(), all.end(), [this](double* b) { return ceres_.IsParameterBlockConstant(b); }),
+              all.end());
+    for (double* block : all) {
+      columns[block] = count;
+      count += ceres_.ParameterBlockSize(block);
+    }
+    ceres::CRSMatrix rows;
+    if (all.empty() || !ceres_.Evaluate(options, nullptr, nullptr, nullptr, &rows)) return {};
+    const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> jacobian(
+        rows.num_rows, rows.num_cols, static_cast<Eigen::Index>(rows.values.size()), rows.rows.data(), rows.cols.data(),
+        rows.values.data());
+    const Eigen::SparseMatrix<double> by_column = jacobian;
+    Eigen::SparseMatrix<double> information = by_column.transpose() * by_column;
+    for (Eigen::Index i = 0; i < count; ++i) information.coeffRef(i, i) += kRegular;
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(information);
+    std::vector<double> sigmas;
+    for (const auto& [block, size] : blocks) {
+      const auto column = columns.find(block);
+      for (int i = 0; i < size; ++i) {
+        sigmas.push_back(0.0);
+        if (column == columns.end() || solver.info() != Eigen::Success) continue;
+        const Eigen::Index k = column->second + i;
+        sigmas.back() = std::sqrt(std::max(0.0, Eigen::VectorXd(solver.solve(Eigen::VectorXd::Unit(count, k)))[k]));
+      }
+    }
+    return sigmas;
+  }
+
  private:
+  static constexpr double kRegular = 1e-9;  ///< on the diagonal: a landmark at a great distance is hardly determined
+
   template <class Residual, int kResiduals, int... kSizes>
   static ceres::CostFunction* automatic(const Residual& residual) {
     return new ceres::AutoDiffCostFunction<Residual, kResiduals, kSizes...>(new Residual(residual));
@@ -97,12 +137,26 @@ class Adjustment {
       landmarks_.push_back(landmark.position_m.data());
       for (const LandmarkSighting& sighting : landmark.sightings) {
         if (!window_.knows(sighting.image)) continue;
-        ceres_.AddResidualBlock(new SightingCost(starts_[sighting.image], sighting), &sighting_loss_,
-                                cameras_[sighting.image].data(), landmark.position_m.data(), &problem_.focal_scale);
+        BundleLens& lens = problem_.lenses[problem_.sessions[sessions_[sighting.image]].lens];
+        ceres_.AddResidualBlock(new SightingCost(starts_[sighting.image], sighting, lens.published), &sighting_loss_,
+                                cameras_[sighting.image].data(), landmark.position_m.data(), lens.correction.data());
       }
     }
-    ceres_.AddResidualBlock(automatic<FocalResidual, 1, 1>({}), nullptr, &problem_.focal_scale);
-    if (!config_.focal_is_free) ceres_.SetParameterBlockConstant(&problem_.focal_scale);
+    const bool are_free = !config_.lens_sigma.isZero(0.0);
+    for (BundleLens& lens : problem_.lenses) {
+      double* correction = lens.correction.data();
+      if (!ceres_.HasParameterBlock(correction)) continue;
+      if (are_free) {
+        ceres_.AddResidualBlock(automatic<PriorResidual<6>, 6, 6>({config_.lens_sigma}), nullptr, correction);
+      } else {
+        ceres_.SetParameterBlockConstant(correction);
+      }
+    }
+  }
+
+  ceres::LossFunction* lossOf(const PositionObservation& position) {
+    if (position.believed) return &position_loss_;
+    return &doubtful_position_loss_;
   }
 
   void addPositions() {
@@ -110,16 +164,18 @@ class Adjustment {
       if (!window_.moves(position.image)) continue;
       BundleSession& session = problem_.sessions[sessions_[position.image]];
       const PositionResidual residual{position, starts_[position.image], session.antenna_m};
-      ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6, 2, 1>(residual), &position_loss_,
+      ceres_.AddResidualBlock(automatic<PositionResidual, 2, 6, 2, 1>(residual), lossOf(position),
                               cameras_[position.image].data(), session.fix_bias_m.data(), &session.fix_delay_s);
     }
     for (BundleSession& session : problem_.sessions) {
       double* bias = session.fix_bias_m.data();
       double* delay = &session.fix_delay_s;
       if (!ceres_.HasParameterBlock(bias)) continue;
-      ceres_.AddResidualBlock(automatic<ZeroResidual<2>, 2, 2>({config_.fix_bias_sigma_m}), nullptr, bias);
+      ceres_.AddResidualBlock(automatic<PriorResidual<2>, 2, 2>({Eigen::Vector2d::Constant(config_.fix_bias_sigma_m)}),
+                              nullptr, bias);
       if (problem_.sessions.size() == 1) ceres_.SetParameterBlockConstant(bias);
-      ceres_.AddResidualBlock(automatic<ZeroResidual<1>, 1, 1>({config_.fix_delay_sigma_s}), nullptr, delay);
+      ceres_.AddResidualBlock(
+          automatic<PriorResidual<1>, 1, 1>({Eigen::Matrix<double, 1, 1>(config_.fix_delay_sigma_s)}), nullptr, delay);
     }
   }
 
@@ -135,8 +191,13 @@ class Adjustment {
 
   void addPriors() {
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      if (window_.moves(i)) addMounting(i);
+      if (window_.moves(i)) addTravel(i);
       if (i + 1 < cameras_.size() && sessions_[i + 1] == sessions_[i]) addSlope(i);
+    }
+    for (BundleSession& session : problem_.sessions) {
+      double* correction = session.mounting_rad.data();
+      if (!ceres_.HasParameterBlock(correction)) continue;
+      ceres_.AddResidualBlock(automatic<PriorResidual<3>, 3, 3>({session.mounting_sigma_rad}), nullptr, correction);
     }
     anchorHeights();
   }
@@ -157,21 +218,34 @@ class Adjustment {
     ceres_.AddResidualBlock(automatic<HeightResidual, 1, 6>({up_m}), nullptr, cameras_[first].data());
   }
 
-  void addMounting(std::size_t i) {
-    const auto [yaw_rad, slope] = problem_.road[i];
-    const MountingResidual mounting(problem_.cameras[i].rotation, uprightCamera(yaw_rad, slope),
-                                    config_.tilt_sigma_rad);
-    ceres_.AddResidualBlock(automatic<CameraMountingResidual, 3, 6, 3>({mounting}), &tilt_loss_, cameras_[i].data(),
-                            problem_.sessions[sessions_[i]].mounting_rad.data());
+  /// By the cameras on either side, as far as they are of the same session and known. Where a robot hardly moves its
+  /// direction of travel says little.
+  void addTravel(std::size_t i) {
+    BundleSession& session = problem_.sessions[sessions_[i]];
+    const RobotAttitude robot(problem_.cameras[i].rotation, session.mounting);
+    double* correction = session.mounting_rad.data();
+    ceres_.AddResidualBlock(automatic<LeanResidual, 1, 6, 3>({robot, config_.tilt_sigma_rad.z()}), &tilt_loss_,
+                            cameras_[i].data(), correction);
+    const auto is_beside = [&](std::size_t other) {
+      return other < cameras_.size() && sessions_[other] == sessions_[i] && window_.knows(other);
+    };
+    if (i == 0 || !is_beside(i - 1) || !is_beside(i + 1)) return;
+    const double way_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i - 1].position_m).norm();
+    if (way_m < kShortestWay_m || way_m > kLongestWay_m) return;
+    const double noise_rad = kWayNoise_m / way_m;
+    const TravelResidual travel{
+        robot,
+        problem_.road[i].direction,
+        {std::hypot(config_.tilt_sigma_rad.y(), noise_rad), std::hypot(config_.tilt_sigma_rad.x(), noise_rad)}};
+    ceres_.AddResidualBlock(automatic<TravelResidual, 2, 6, 6, 6, 3>(travel), &tilt_loss_, cameras_[i].data(),
+                            cameras_[i - 1].data(), cameras_[i + 1].data(), correction);
   }
 
   /// From a camera to the next one.
   void addSlope(std::size_t i) {
     if (!(window_.moves(i) || window_.moves(i + 1)) || !(window_.knows(i) && window_.knows(i + 1))) return;
-    const double run_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i].position_m).head<2>().norm();
-    const SlopeResidual climb{problem_.road[i].slope * run_m, config_.slope_sigma * run_m + kRoughness_m};
-    ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>(climb), nullptr, cameras_[i].data(),
-                            cameras_[i + 1].data());
+    ceres_.AddResidualBlock(automatic<SlopeResidual, 1, 6, 6>(slopeOf(problem_, config_, i)), nullptr,
+                            cameras_[i].data(), cameras_[i + 1].data());
   }
 
   void holdOthers() {
@@ -203,7 +277,7 @@ class Adjustment {
       add(&session.fix_delay_s, 4);
       add(&session.fix_height_m, 5);
     }
-    add(&problem_.focal_scale, 6);
+    for (BundleLens& lens : problem_.lenses) add(lens.correction.data(), 6);
     return options;
   }
 
@@ -212,7 +286,8 @@ class Adjustment {
   const BundleWindow& window_;
   ceres::CauchyLoss sighting_loss_;
   ceres::CauchyLoss tilt_loss_;
-  GemanMcClureLoss position_loss_;
+  ceres::CauchyLoss position_loss_;
+  GemanMcClureLoss doubtful_position_loss_;
   ceres::CauchyLoss altitude_loss_;
   std::vector<std::size_t> sessions_;  ///< of the cameras
   std::vector<Eigen::Matrix3d> starts_;
@@ -227,21 +302,47 @@ double adjust(BundleProblem& problem, const BundleConfig& config, const BundleWi
   return Adjustment(problem, config, window).solve();
 }
 
-double reprojectionError(const CameraPose& camera, const Eigen::Vector3d& landmark_m, const Eigen::Vector2d& seen) {
-  const Eigen::Vector3d point = camera.toCamera(landmark_m);
-  if (!(point.z() >= kNearest_m)) return std::numeric_limits<double>::infinity();
-  return (point.hnormalized() - seen).norm();
+SharedSigmas sharedSigmas(BundleProblem problem, const BundleConfig& config, const BundleWindow& window) {
+  Adjustment adjustment(problem, config, window);
+  const std::vector<double> sigmas =
+      adjustment.sigmasOf({{problem.lenses.front().correction.data(), 6}, {&problem.sessions.front().fix_delay_s, 1}});
+  SharedSigmas shared;
+  if (sigmas.empty()) return shared;
+  shared.lens = Eigen::Map<const LensCorrection>(sigmas.data());
+  shared.fix_delay_s = sigmas.back();
+  return shared;
 }
 
-Eigen::Matrix3d covarianceOf(const Landmark& landmark, const std::vector<CameraPose>& cameras) {
+const BundleSession& BundleProblem::sessionOf(std::size_t camera) const {
+  const auto after =
+      std::upper_bound(sessions.begin(), sessions.end(), camera,
+                       [](std::size_t image, const BundleSession& session) { return image < session.begin; });
+  return *std::prev(after);
+}
+
+LensProjection BundleProblem::lensOf(std::size_t camera) const {
+  const BundleLens& lens = lenses[sessionOf(camera).lens];
+  return {lens.published, lens.correction};
+}
+
+double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark, const LandmarkSighting& sighting) {
+  const Eigen::Vector3d point = problem.cameras[sighting.image].toCamera(landmark.position_m);
+  if (!(point.z() >= kNearest_m)) return std::numeric_limits<double>::infinity();
+  return (problem.lensOf(sighting.image).project(point.hnormalized()) - sighting.pixel).norm();
+}
+
+Eigen::Matrix3d covarianceOf(const Landmark& landmark, const BundleProblem& problem) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   for (const LandmarkSighting& sighting : landmark.sightings) {
-    const CameraPose& camera = cameras[sighting.image];
+    const CameraPose& camera = problem.cameras[sighting.image];
     const Eigen::Vector3d point = camera.toCamera(landmark.position_m);
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << 1.0, 0.0, -point.x() / point.z(), 0.0, 1.0, -point.y() / point.z();
-    by_point *= 1.0 / (point.z() * sighting.sigma);
-    const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera.rotation.conjugate().toRotationMatrix();
+    Eigen::Matrix<double, 2, 3> ray_by_point;
+    ray_by_point << 1.0, 0.0, -point.x() / point.z(), 0.0, 1.0, -point.y() / point.z();
+    ray_by_point *= 1.0 / (point.z() * sighting.sigma_px);
+    Eigen::Matrix2d by_ray;
+    problem.lensOf(sighting.image).project(point.hnormalized(), &by_ray);
+    const Eigen::Matrix<double, 2, 3> by_landmark =
+        by_ray * ray_by_point * camera.rotation.conjugate().toRotationMatrix();
     information += by_landmark.transpose() * by_landmark;
   }
   return information.ldlt().solve(Eigen::Matrix3d::Identity());

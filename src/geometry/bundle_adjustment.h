@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "geometry/lens_correction.h"
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/geometry/image_geometry.h"
 
@@ -18,8 +19,8 @@ namespace visual_localization {
 struct LandmarkSighting {
   std::uint32_t image = 0;
   std::uint32_t feature = 0;
-  Eigen::Vector2d normalised = Eigen::Vector2d::Zero();  ///< x/z, y/z in the camera's frame
-  double sigma = 1.0;                                    ///< of each coordinate, in the same unit
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< as recorded, by the lens of the image's session
+  double sigma_px = 1.0;                            ///< of each coordinate
 };
 
 /// A point of the world and the images that show it.
@@ -34,6 +35,7 @@ struct PositionObservation {
   Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();
   double sigma_m = 0.3;
   Eigen::Vector2d velocity_m_s = Eigen::Vector2d::Zero();  ///< of the antenna
+  bool believed = true;  ///< it always has a say; otherwise only where the images agree with it
 };
 
 /// What it says about how high the antenna was.
@@ -43,19 +45,28 @@ struct HeightObservation {
   double sigma_m = 1.0;
 };
 
-/// Where a road leads.
-struct RoadDirection {
-  double yaw_rad = 0.0;  ///< of travel: 0 = east, counter-clockwise
-  double slope = 0.0;    ///< rise over run, as far as it is known
+/// How a robot drives on a road.
+struct RoadTravel {
+  double direction = 1.0;  ///< 1 ahead, -1 backwards
+  double slope = 0.0;      ///< rise over run ahead, as far as it is known
+};
+
+/// A lens: its published calibration, and how the images say it differs. By default pixels are normalised coordinates.
+struct BundleLens {
+  Intrinsics published{{}, 1.0, 1.0, 0.0, 0.0, Distortion::kPlumbBob, {}};
+  LensCorrection correction = LensCorrection::Zero();
 };
 
 /// What the images of one recording have in common.
 struct BundleSession {
-  std::size_t begin = 0;                                   ///< its first camera
-  Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
-  Eigen::Vector2d fix_bias_m = Eigen::Vector2d::Zero();    ///< its fixes are this far off; not for a single session
-  Eigen::Vector3d antenna_m = Eigen::Vector3d::Zero();     ///< in the camera's optical frame; known
-  double fix_height_m = 0.0;                               ///< its altitudes are this far off
+  std::size_t begin = 0;                                         ///< its first camera
+  std::size_t lens = 0;                                          ///< of its images, among those of the problem
+  Eigen::Quaterniond mounting = Eigen::Quaterniond::Identity();  ///< see AveragedRotations; as it is known before
+  Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();        ///< see AveragedRotations
+  Eigen::Vector3d mounting_sigma_rad{0.5, 0.5, 0.02};            ///< of that: pitch, yaw, roll of a level camera
+  Eigen::Vector2d fix_bias_m = Eigen::Vector2d::Zero();  ///< its fixes are this far off; not for a single session
+  Eigen::Vector3d antenna_m = Eigen::Vector3d::Zero();   ///< in the camera's optical frame; known
+  double fix_height_m = 0.0;                             ///< its altitudes are this far off
   double fix_delay_s = 0.0;  ///< a fix says where the antenna was this long before its stamp, by the clock of images
 };
 
@@ -65,21 +76,25 @@ struct BundleProblem {
   std::vector<Landmark> landmarks;
   std::vector<PositionObservation> positions;
   std::vector<HeightObservation> heights;
-  std::vector<RoadDirection> road;  ///< at each camera
+  std::vector<RoadTravel> road;  ///< at each camera
   std::vector<BundleSession> sessions;
-  double focal_scale = 1.0;  ///< true focal length, as a share of the calibration's
+  std::vector<BundleLens> lenses = {{}};
+
+  const BundleSession& sessionOf(std::size_t camera) const;
+  LensProjection lensOf(std::size_t camera) const;
 };
 
 struct BundleConfig {
-  double landmark_loss = 2.5;                       ///< scale of the Cauchy loss of a sighting, sigmas
-  double position_loss = 1.0;                       ///< scale of the Geman-McClure loss of a fix, sigmas
-  Eigen::Vector3d tilt_sigma_rad{0.02, 0.1, 0.02};  ///< of a camera about the mounting: pitch, yaw, roll
+  double landmark_loss = 2.5;  ///< scale of the Cauchy loss of a sighting, sigmas
+  double position_loss = 1.0;  ///< scale of the loss of a fix, sigmas: Cauchy's if believed, else Geman and McClure's
+  Eigen::Vector3d tilt_sigma_rad{0.02, 0.1, 0.02};  ///< of a robot about its direction of travel: pitch, yaw, roll
   double slope_sigma = 0.1;                         ///< rise over run
   double fix_bias_sigma_m = 0.3;                    ///< per axis, of a session's fixes
   double fix_delay_sigma_s = 0.1;
-  int max_iterations = 30;
+  int max_iterations = 50;
   double tolerance = 1e-4;  ///< relative change of the cost at which it ends
-  bool focal_is_free = false;
+  /// One sigma of each entry of a calibration; zero: all calibrations stay as they are.
+  LensCorrection lens_sigma = LensCorrection::Zero();
 };
 
 /// Cameras that are adjusted together. Those that are known and do not move stand still; what others saw does not
@@ -99,14 +114,27 @@ struct BundleWindow {
 };
 
 /// Moves the cameras of the window, the landmarks that they see, mountings, biases and delays of their sessions, and
-/// the focal length when it is free, to where all observations agree best. Returns the final cost.
+/// their lenses where these are free, to where all observations agree best. Returns the final cost.
 double adjust(BundleProblem& problem, const BundleConfig& config, const BundleWindow& window = {});
 
-/// Distance of where a landmark is seen from where it projects to, normalised coordinates; infinite behind the camera.
-double reprojectionError(const CameraPose& camera, const Eigen::Vector3d& landmark_m, const Eigen::Vector2d& seen);
+/// Turns, scales and shifts a single session as a whole, and turns its mounting, to where fixes, altitudes, slopes and
+/// level robots agree best. What images see of each other does not change, and an adjustment of all of them hardly
+/// feels it: it would need hundreds of iterations.
+void moveAsOne(BundleProblem& problem, const BundleConfig& config);
+
+/// What an adjustment does not tell by its result: standard deviations of what the images of a session share.
+struct SharedSigmas {
+  LensCorrection lens = LensCorrection::Zero();  ///< of the first lens
+  double fix_delay_s = 0.0;                      ///< of the first session
+};
+/// Of an adjusted problem, by the curvature of its cost there. Zero where nothing depends on it.
+SharedSigmas sharedSigmas(BundleProblem problem, const BundleConfig& config, const BundleWindow& window = {});
+
+/// Distance of where a landmark is seen from where it projects to, pixels; infinite behind the camera.
+double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark, const LandmarkSighting& sighting);
 
 /// Of a landmark's position (m2, map frame) among cameras that stand still.
-Eigen::Matrix3d covarianceOf(const Landmark& landmark, const std::vector<CameraPose>& cameras);
+Eigen::Matrix3d covarianceOf(const Landmark& landmark, const BundleProblem& problem);
 /// Appends the landmark to an image that shows it; not one whose covariance is none.
 void addSighting(const Landmark& landmark, const Eigen::Matrix3d& covariance, std::uint32_t feature, std::uint32_t id,
                  ImageGeometry& image);

@@ -33,45 +33,120 @@ class QuietCeres {
 /// w, x, y, z as Ceres takes them.
 inline Eigen::Vector4d ceresQuaternion(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
-/// How far a camera is turned away from where its mounting on the robot would have it. Parameters: the rotation vector
-/// of the camera from `start` (camera_in_map = start * exp(w)), and that of the mounting.
+/// The robot's attitude by a camera on it, as a camera has it that looks along the direction of travel (x right, y
+/// down, z ahead): camera_in_map = robot * mounting * exp(correction), and camera_in_map = start * exp(turn).
+class RobotAttitude {
+ public:
+  RobotAttitude(const Eigen::Quaterniond& start, const Eigen::Quaterniond& mounting)
+      : start_(ceresQuaternion(start)), mounting_inverse_(ceresQuaternion(mounting.conjugate())) {}
+
+  /// robot_in_map, as a quaternion.
+  template <class T>
+  void of(const T* turn, const T* correction, T* robot) const {
+    const T back[3] = {-correction[0], -correction[1], -correction[2]};
+    T turned[4];
+    T corrected[4];
+    T camera[4];
+    T product[4];
+    const Eigen::Matrix<T, 4, 1> start = start_.cast<T>();
+    const Eigen::Matrix<T, 4, 1> mounting_inverse = mounting_inverse_.cast<T>();
+    ceres::AngleAxisToQuaternion(turn, turned);
+    ceres::AngleAxisToQuaternion(back, corrected);
+    ceres::QuaternionProduct(start.data(), turned, camera);
+    ceres::QuaternionProduct(camera, corrected, product);
+    ceres::QuaternionProduct(product, mounting_inverse.data(), robot);
+  }
+
+ private:
+  Eigen::Vector4d start_;
+  Eigen::Vector4d mounting_inverse_;
+};
+
+/// How far a robot is turned away from a direction of travel. Parameters: the camera's turn, and the correction of its
+/// mounting.
 class MountingResidual {
  public:
-  /// `travel`: camera_in_map of an upright camera that looks along the direction of travel. `sigma_rad`: of pitch, yaw
-  /// and roll.
-  MountingResidual(const Eigen::Quaterniond& start, const Eigen::Quaterniond& travel, const Eigen::Vector3d& sigma_rad)
-      : travel_from_start_(ceresQuaternion(travel.conjugate() * start)), sigma_rad_(sigma_rad) {}
+  /// `travel`: of a camera that looks along the direction of travel. `sigma_rad`: of pitch, yaw and roll.
+  MountingResidual(const RobotAttitude& robot, const Eigen::Quaterniond& travel, const Eigen::Vector3d& sigma_rad)
+      : robot_(robot), travel_inverse_(ceresQuaternion(travel.conjugate())), sigma_rad_(sigma_rad) {}
 
   template <class T>
-  bool operator()(const T* turn, const T* mounting, T* residual) const {
-    const T back[3] = {-mounting[0], -mounting[1], -mounting[2]};
-    T mounted[4];
-    T turned[4];
-    T travel_from_start[4];
+  bool operator()(const T* turn, const T* correction, T* residual) const {
+    T robot[4];
     T difference[4];
-    T product[4];
-    for (int i = 0; i < 4; ++i) travel_from_start[i] = T(travel_from_start_[i]);
-    ceres::AngleAxisToQuaternion(back, mounted);
-    ceres::AngleAxisToQuaternion(turn, turned);
-    ceres::QuaternionProduct(travel_from_start, turned, product);
-    ceres::QuaternionProduct(mounted, product, difference);
+    const Eigen::Matrix<T, 4, 1> travel_inverse = travel_inverse_.cast<T>();
+    robot_.of(turn, correction, robot);
+    ceres::QuaternionProduct(travel_inverse.data(), robot, difference);
     ceres::QuaternionToAngleAxis(difference, residual);
     for (int i = 0; i < 3; ++i) residual[i] /= T(sigma_rad_[i]);
     return true;
   }
 
  private:
-  Eigen::Vector4d travel_from_start_;
+  RobotAttitude robot_;
+  Eigen::Vector4d travel_inverse_;
   Eigen::Vector3d sigma_rad_;
 };
 
+/// A robot drives where it looks, up and down as well. Parameters: the camera, the one before and the one behind it,
+/// and the correction of the mounting.
+struct TravelResidual {
+  RobotAttitude robot;
+  double direction;     ///< 1 ahead, -1 backwards
+  double sigma_rad[2];  ///< yaw, pitch
+
+  template <class T>
+  bool operator()(const T* camera, const T* before, const T* behind, const T* correction, T* residual) const {
+    T attitude[4];
+    robot.of(camera, correction, attitude);
+    const T inverse[4] = {attitude[0], -attitude[1], -attitude[2], -attitude[3]};
+    T way[3];
+    T in_robot[3];
+    for (int i = 0; i < 3; ++i) way[i] = T(direction) * (behind[3 + i] - before[3 + i]);
+    ceres::QuaternionRotatePoint(inverse, way, in_robot);
+    const T aside2 = in_robot[0] * in_robot[0] + in_robot[1] * in_robot[1];
+    T per_length = T(1.0) / in_robot[2];  // of a small angle
+    if (!(in_robot[2] > T(0.0) && aside2 < T(1e-12) * in_robot[2] * in_robot[2])) {
+      const T aside = ceres::sqrt(aside2 + T(1e-300));
+      per_length = ceres::atan2(aside, in_robot[2]) / aside;
+    }
+    for (int i = 0; i < 2; ++i) residual[i] = per_length * in_robot[i] / T(sigma_rad[i]);
+    return true;
+  }
+};
+
+/// It leans to no side. Parameters: the camera, and the correction of the mounting.
+struct LeanResidual {
+  RobotAttitude robot;
+  double sigma_rad;
+
+  template <class T>
+  bool operator()(const T* camera, const T* correction, T* residual) const {
+    T attitude[4];
+    robot.of(camera, correction, attitude);
+    const T right[3] = {T(1.0), T(0.0), T(0.0)};
+    T in_map[3];
+    ceres::QuaternionRotatePoint(attitude, right, in_map);
+    residual[0] = in_map[2] / T(sigma_rad);
+    return true;
+  }
+};
+
+constexpr double kTiltLoss = 2.0;      ///< sigmas, of the Cauchy loss of a lean or a direction of travel
+constexpr double kAltitudeLoss = 2.0;  ///< likewise
+
 constexpr double kNearest_m = 0.05;  ///< a landmark closer to a camera's plane than this has no projection
 
-/// Camera parameters: turn[3] (camera_in_map = start * exp(turn)) and position[3]. Landmark: position[3]. Focal scale.
-class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 1> {
+/// Camera parameters: turn[3] (camera_in_map = start * exp(turn)) and position[3]. Landmark: position[3]. Lens:
+/// LensCorrection[6].
+class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 6> {
  public:
-  SightingCost(const Eigen::Matrix3d& map_from_start, const LandmarkSighting& sighting)
-      : start_from_map_(map_from_start.transpose()), seen_(sighting.normalised), weight_(1.0 / sighting.sigma) {}
+  /// `published` must live longer.
+  SightingCost(const Eigen::Matrix3d& map_from_start, const LandmarkSighting& sighting, const Intrinsics& published)
+      : start_from_map_(map_from_start.transpose()),
+        pixel_(sighting.pixel),
+        weight_(1.0 / sighting.sigma_px),
+        published_(published) {}
 
   bool Evaluate(const double* const* parameters, double* residuals, double** derivatives) const override {
     const Eigen::Map<const Eigen::Vector3d> turn(parameters[0]);
@@ -87,14 +162,18 @@ class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 1> {
       }
       return true;
     }
-    const double inverse_z = 1.0 / point.z();
-    const double scale = *parameters[2];
-    residual = weight_ * (scale * point.head<2>() * inverse_z - seen_);
+    const LensProjection lens(published_, Eigen::Map<const LensCorrection>(parameters[2]));
+    const bool by_lens = derivatives != nullptr && derivatives[2] != nullptr;
+    Eigen::Matrix2d by_ray;
+    Eigen::Matrix<double, 2, 6> by_correction;
+    residual = weight_ * (lens.project(point.hnormalized(), &by_ray, by_lens ? &by_correction : nullptr) - pixel_);
     if (derivatives == nullptr) return true;
 
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << inverse_z, 0.0, -point.x() * inverse_z * inverse_z, 0.0, inverse_z, -point.y() * inverse_z * inverse_z;
-    by_point *= scale * weight_;
+    const double inverse_z = 1.0 / point.z();
+    Eigen::Matrix<double, 2, 3> ray_by_point;
+    ray_by_point << inverse_z, 0.0, -point.x() * inverse_z * inverse_z, 0.0, inverse_z,
+        -point.y() * inverse_z * inverse_z;
+    const Eigen::Matrix<double, 2, 3> by_point = weight_ * by_ray * ray_by_point;
     const Eigen::Matrix<double, 2, 3> by_landmark = by_point * camera_from_map;
     if (derivatives[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> jacobian(derivatives[0]);
@@ -105,20 +184,21 @@ class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 1> {
       Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> jacobian(derivatives[1]);
       jacobian = by_landmark;
     }
-    if (derivatives[2] != nullptr) {
-      derivatives[2][0] = weight_ * point.x() * inverse_z;
-      derivatives[2][1] = weight_ * point.y() * inverse_z;
+    if (by_lens) {
+      Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> jacobian(derivatives[2]);
+      jacobian = weight_ * by_correction;
     }
     return true;
   }
 
  private:
-  static constexpr int kDerivatives[] = {12, 6, 2};
+  static constexpr int kDerivatives[] = {12, 6, 12};
   static constexpr double kBehind_sigmas = 1e3;
 
   Eigen::Matrix3d start_from_map_;
-  Eigen::Vector2d seen_;
+  Eigen::Vector2d pixel_;
   double weight_;
+  const Intrinsics& published_;
 };
 
 /// rho(s) = s / (1 + s / c^2): what is far off has no influence at all (Geman and McClure 1987).
@@ -156,18 +236,6 @@ struct PositionResidual {
   }
 };
 
-/// Unknowns that are near zero.
-template <int kSize>
-struct ZeroResidual {
-  double sigma;
-
-  template <class T>
-  bool operator()(const T* unknown, T* residual) const {
-    for (int i = 0; i < kSize; ++i) residual[i] = unknown[i] / T(sigma);
-    return true;
-  }
-};
-
 struct AltitudeResidual {
   HeightObservation seen;
   Eigen::Matrix3d map_from_start;
@@ -197,16 +265,6 @@ struct SlopeResidual {
   }
 };
 
-/// MountingResidual on the six parameters of a camera.
-struct CameraMountingResidual {
-  MountingResidual residual_of_turn;
-
-  template <class T>
-  bool operator()(const T* camera, const T* mounting, T* residual) const {
-    return residual_of_turn(camera, mounting, residual);
-  }
-};
-
 struct HeightResidual {
   double up_m;
 
@@ -217,11 +275,24 @@ struct HeightResidual {
   }
 };
 
-/// A calibration is about right.
-struct FocalResidual {
+/// From a camera to the next one. A slope goes on for a while: it counts once on its length, not for each image.
+inline SlopeResidual slopeOf(const BundleProblem& problem, const BundleConfig& config, std::size_t camera) {
+  constexpr double kRoughness_m = 0.01;  // of a level road, from one image to the next
+  constexpr double kLength_m = 500.0;
+  const Eigen::Vector3d way_m = problem.cameras[camera + 1].position_m - problem.cameras[camera].position_m;
+  const double run_m = way_m.head<2>().norm();
+  const double correlated_m = std::sqrt(run_m * std::max(run_m, kLength_m));
+  return {problem.road[camera].slope * run_m, config.slope_sigma * correlated_m + kRoughness_m};
+}
+
+/// Unknowns that are near zero, each to a sigma of its own.
+template <int kSize>
+struct PriorResidual {
+  Eigen::Matrix<double, kSize, 1> sigma;
+
   template <class T>
-  bool operator()(const T* scale, T* residual) const {
-    residual[0] = (scale[0] - T(1.0)) / T(0.1);
+  bool operator()(const T* unknown, T* residual) const {
+    for (int i = 0; i < kSize; ++i) residual[i] = unknown[i] / T(sigma[i]);
     return true;
   }
 };

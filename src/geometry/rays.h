@@ -51,19 +51,31 @@ inline Eigen::Vector3d medianOf(const std::vector<Eigen::Vector3d>& vectors) {
 struct KeypointRays {
   std::vector<Eigen::Vector2d> normalised;  ///< x/z, y/z; NaN where the lens has no ray
   std::vector<double> sigmas;               ///< standard deviation of each coordinate, same unit
+  std::vector<Eigen::Vector2f> pixels;      ///< as recorded
+  std::vector<float> sigmas_px;             ///< standard deviation of each coordinate
 };
+
+/// The same features by another calibration.
+inline void setCamera(const CameraModel& camera, KeypointRays& rays) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (const Eigen::Vector2f& pixel : rays.pixels) pixels.push_back(pixel.cast<double>());
+  rays.normalised = camera.undistort(pixels);
+  rays.sigmas.clear();
+  for (const float sigma_px : rays.sigmas_px) {
+    rays.sigmas.push_back(static_cast<double>(sigma_px) / camera.intrinsics().fx);
+  }
+}
 
 /// A small feature is found to `sigma_px`, a large one, whose octave has larger pixels, less exactly.
 inline KeypointRays raysOf(const SiftFeatures& features, const CameraModel& camera, double sigma_px) {
   constexpr double kSmall_px = 6.0;
-  std::vector<Eigen::Vector2d> pixels;
   KeypointRays rays;
   for (const SiftKeypoint& keypoint : features.keypoints()) {
-    pixels.emplace_back(keypoint.x_px, keypoint.y_px);
     const double growth = std::hypot(1.0, keypoint.size_px / kSmall_px);
-    rays.sigmas.push_back(sigma_px * growth / camera.intrinsics().fx);
+    rays.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
+    rays.sigmas_px.push_back(static_cast<float>(sigma_px * growth));
   }
-  rays.normalised = camera.undistort(pixels);
+  setCamera(camera, rays);
   return rays;
 }
 

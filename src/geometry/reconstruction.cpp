@@ -11,19 +11,22 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kMinAngle_rad = 0.01;  ///< between two rays to a landmark
-constexpr std::size_t kNeighbours = 7;  ///< on each side of an image
-constexpr double kAstray_m = 2.0;       ///< an image moved by this more or less than its neighbours lost its way
-constexpr double kAstray_rad = 0.1;     ///< so did one that was turned by this more or less
-constexpr double kFarthest_m = 1000.0;  ///< a landmark farther away has no position to rely on
-constexpr int kMostFocalSteps = 100;
-constexpr std::size_t kFocalWindows = 5;  ///< that are asked for the focal length, about
-constexpr std::size_t kOverlap = 4;       ///< a window shares this part of its images with the next one
+constexpr double kMinAngle_rad = 0.01;     ///< between two rays to a landmark
+constexpr std::size_t kNeighbours = 7;     ///< on each side of an image
+constexpr double kAstray_m = 2.0;          ///< an image moved by this more or less than its neighbours lost its way
+constexpr double kAstray_rad = 0.1;        ///< so did one that was turned by this more or less
+constexpr double kFarthest_m = 1000.0;     ///< a landmark farther away has no position to rely on
+constexpr double kSignificant = 3.0;       ///< sigmas
+constexpr double kSignificantDelay = 4.0;  ///< the same: of late fixes and of a bent path images see alike
+constexpr double kHeld = 1e-9;             ///< a sigma that holds
+constexpr std::size_t kLensWindows = 5;    ///< that are asked for the calibration, about
+constexpr std::size_t kOverlap = 4;        ///< a window shares this part of its images with the next one
 
 }  // namespace
 
 void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointRays> rays,
-                         const AveragedRotations& rotations, const FeatureSets& sets) {
+                         const AveragedRotations& rotations, const std::vector<double>& directions,
+                         const FeatureSets& sets) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
   std::vector<double> sigmas_m;
   for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
@@ -34,7 +37,14 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
   }
   fix_sigmas_m_.push_back(sigmas_m.empty() ? config_.fix_sigma_m : median(sigmas_m));
   const Eigen::Vector3d antenna_m = session.mount.antennaInCamera_m();
-  problem_.sessions.push_back({begin, rotations.mounting_rad, Eigen::Vector2d::Zero(), antenna_m});
+  BundleSession& added = problem_.sessions.emplace_back();
+  added.begin = begin;
+  added.lens = addLens({session.camera->intrinsics(), LensCorrection::Zero()});
+  const Mounting mounting = mountingOf(session.mount);
+  added.mounting = mounting.rotation;
+  added.mounting_sigma_rad = mounting.sigma_rad;
+  added.mounting_rad = rotations.mounting_rad;
+  added.antenna_m = antenna_m;
   const PathHeights heights = pathHeights(session.images, session.fixes);
   for (std::size_t i = 0; i < session.images.size(); ++i) {
     const TrajectoryPoint& image = session.images[i];
@@ -43,7 +53,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
     const Eigen::Vector3d antenna_in_map_m(image.position_m.x(), image.position_m.y(), up_m);
     images_.push_back({static_cast<std::uint32_t>(sessions_.size()), image, std::move(rays[i]), start, up_m});
     problem_.cameras.push_back({start, antenna_in_map_m - start * antenna_m});
-    problem_.road.push_back({image.yaw_rad, heights.slope[i]});
+    problem_.road.push_back({directions[i], heights.slope[i]});
     ranks_.push_back(ranks_.size());
     if (!heights.measured) continue;
     problem_.heights.push_back(
@@ -71,6 +81,7 @@ void Reconstruction::append(const Reconstruction& other) {
   }
   for (BundleSession added : other.problem_.sessions) {
     added.begin += begin;
+    added.lens = addLens(other.problem_.lenses[added.lens]);
     problem_.sessions.push_back(added);
   }
   for (Landmark landmark : other.problem_.landmarks) {
@@ -83,6 +94,25 @@ void Reconstruction::append(const Reconstruction& other) {
   add(other.problem_.cameras, problem_.cameras);
   add(other.problem_.road, problem_.road);
   sets_.append(other.sets_);
+  applyLenses(session);
+}
+
+/// One that is there already, if it has the same calibration: one camera took the images of both.
+std::size_t Reconstruction::addLens(const BundleLens& lens) {
+  const CameraModel published(lens.published);
+  std::size_t i = 0;
+  while (i < problem_.lenses.size() && CameraModel(problem_.lenses[i].published) != published) ++i;
+  if (i == problem_.lenses.size()) problem_.lenses.push_back(lens);
+  return i;
+}
+
+Intrinsics Reconstruction::lensOf(std::size_t session) const {
+  const BundleLens& lens = problem_.lenses[problem_.sessions[session].lens];
+  return corrected(lens.published, lens.correction);
+}
+
+const LensCorrection& Reconstruction::lensCorrection(std::size_t session) const {
+  return problem_.lenses[problem_.sessions[session].lens].correction;
 }
 
 void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d>& shifts_m) {
@@ -112,6 +142,8 @@ bool Reconstruction::isWithin(double farthest_m, const PositionObservation& fix)
   return (fix.east_north_m - images_[fix.image].cleaned.position_m).norm() <= farthest_m;
 }
 
+void Reconstruction::moveAsOne() { visual_localization::moveAsOne(problem_, bundle_); }
+
 void Reconstruction::triangulateAll(double gate_px, std::size_t max_views) {
   problem_.landmarks.clear();
   const auto session_of = [this](std::uint32_t image) { return sessionOf(image); };
@@ -127,14 +159,15 @@ void Reconstruction::addLandmark(const FeatureTrack& track, double gate_px) {
   for (const FeatureObservation& seen : track) {
     const KeypointRays& rays = images_[seen.image].rays;
     sights.push_back({&problem_.cameras[seen.image], rays.normalised[seen.feature]});
-    landmark.sightings.push_back({seen.image, seen.feature, sights.back().normalised, rays.sigmas[seen.feature]});
+    landmark.sightings.push_back({seen.image, seen.feature, rays.pixels[seen.feature].cast<double>(),
+                                  static_cast<double>(rays.sigmas_px[seen.feature])});
   }
   const std::optional<Eigen::Vector3d> point = triangulate(sights, kMinAngle_rad);
   if (!point) return;
   landmark.position_m = *point;
   auto& all = landmark.sightings;
   const auto is_off = [&](const LandmarkSighting& sighting) {
-    return !(error(landmark, sighting) * focal_px(sighting.image) <= gate_px);
+    return !(reprojectionError_px(problem_, landmark, sighting) <= gate_px);
   };
   all.erase(std::remove_if(all.begin(), all.end(), is_off), all.end());
   if (all.size() >= 2) problem_.landmarks.push_back(std::move(landmark));
@@ -154,13 +187,24 @@ std::vector<BundleWindow> Reconstruction::windows() const {
   return windows;
 }
 
+void Reconstruction::adjustWindows() {
+  const std::vector<BundleWindow> all = windows();
+  BundleConfig config = bundle_;
+  if (all.size() > 1) {
+    adjustLenses(all);
+    config.lens_sigma.setZero();
+  }
+  for (const BundleWindow& window : all) adjust(problem_, config, window);
+}
+
 void Reconstruction::adjustAndPrune(double tolerance, std::size_t min_views) {
   bundle_.tolerance = tolerance;
-  for (const BundleWindow& window : windows()) adjust(problem_, bundle_, window);
+  adjustWindows();
+  if (!bundle_.lens_sigma.isZero(0.0)) applyLenses(0);
   for (Landmark& landmark : problem_.landmarks) {
     auto& all = landmark.sightings;
     const auto disagrees = [&](const LandmarkSighting& sighting) {
-      return !(error(landmark, sighting) <= config_.max_residual_sigmas * sighting.sigma);
+      return !(reprojectionError_px(problem_, landmark, sighting) <= config_.max_residual_sigmas * sighting.sigma_px);
     };
     all.erase(std::remove_if(all.begin(), all.end(), disagrees), all.end());
   }
@@ -231,7 +275,8 @@ void Reconstruction::bringBack() {
 
 /// With those landmarks only that its cameras see.
 BundleProblem Reconstruction::problemOf(const BundleWindow& window) const {
-  BundleProblem problem{problem_.cameras, {}, problem_.positions, problem_.heights, problem_.road, problem_.sessions};
+  BundleProblem problem{problem_.cameras, {}, problem_.positions, problem_.heights, problem_.road, problem_.sessions,
+                        problem_.lenses};
   std::copy_if(problem_.landmarks.begin(), problem_.landmarks.end(), std::back_inserter(problem.landmarks),
                [&window](const Landmark& landmark) {
                  return std::any_of(landmark.sightings.begin(), landmark.sightings.end(),
@@ -240,27 +285,59 @@ BundleProblem Reconstruction::problemOf(const BundleWindow& window) const {
   return problem;
 }
 
-double Reconstruction::freeFocalScale(double tolerance) const {
-  BundleConfig config = bundle_;
-  config.focal_is_free = true;
-  config.tolerance = tolerance;
-  config.max_iterations = kMostFocalSteps;
-  const std::vector<BundleWindow> all = windows();
-  std::vector<double> scales;
-  for (std::size_t i = 0; i < all.size(); i += 1 + all.size() / kFocalWindows) {
-    BundleProblem problem = problemOf(all[i]);
-    BundleWindow window = all[i];
-    window.known_begin = window.begin;  // the others keep to the focal length that they have
+/// By the median of what some windows say, each on its own: a lens is one for all of them.
+void Reconstruction::adjustLenses(const std::vector<BundleWindow>& windows) {
+  if (bundle_.lens_sigma.isZero(0.0)) return;
+  std::vector<std::vector<LensCorrection>> found(problem_.lenses.size());
+  for (std::size_t i = 0; i < windows.size(); i += 1 + windows.size() / kLensWindows) {
+    BundleProblem problem = problemOf(windows[i]);
+    BundleWindow window = windows[i];
+    window.known_begin = window.begin;  // the others keep to the lens that they have
     window.known_end = window.end;
-    adjust(problem, config, window);
-    scales.push_back(problem.focal_scale);
+    adjust(problem, bundle_, window);
+    for (std::size_t k = 0; k < found.size(); ++k) found[k].push_back(problem.lenses[k].correction);
   }
-  return median(scales);
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    for (Eigen::Index entry = 0; entry < LensCorrection::RowsAtCompileTime; ++entry) {
+      std::vector<double> values;
+      for (const LensCorrection& correction : found[k]) values.push_back(correction[entry]);
+      problem_.lenses[k].correction[entry] = median(values);
+    }
+  }
 }
 
-/// In normalised coordinates.
-double Reconstruction::error(const Landmark& landmark, const LandmarkSighting& sighting) const {
-  return reprojectionError(problem_.cameras[sighting.image], landmark.position_m, sighting.normalised);
+/// By a window in the middle, if there are several: it knows them less well than all of them.
+SharedSigmas Reconstruction::sharedSigmasNow() const {
+  const std::vector<BundleWindow> all = windows();
+  if (all.size() == 1) return sharedSigmas(problem_, bundle_, all.front());
+  BundleWindow window = all[all.size() / 2];
+  window.known_begin = window.begin;
+  window.known_end = window.end;
+  return sharedSigmas(problemOf(window), bundle_, window);
+}
+
+void Reconstruction::keepSignificant() {
+  shared_ = sharedSigmasNow();
+  LensCorrection& correction = problem_.lenses.front().correction;
+  for (Eigen::Index entry = 0; entry < correction.size(); ++entry) {
+    if (std::abs(correction[entry]) > kSignificant * shared_.lens[entry]) continue;
+    correction[entry] = shared_.lens[entry] = 0.0;
+    bundle_.lens_sigma[entry] = std::min(bundle_.lens_sigma[entry], kHeld);
+  }
+  double& delay_s = problem_.sessions.front().fix_delay_s;
+  if (std::abs(delay_s) > kSignificantDelay * shared_.fix_delay_s) return;
+  delay_s = shared_.fix_delay_s = 0.0;
+  bundle_.fix_delay_sigma_s = kHeld;
+}
+
+/// The rays of all keypoints from a session on, by the lenses as they are now.
+void Reconstruction::applyLenses(std::size_t first_session) {
+  for (std::size_t session = first_session; session < sessions_.size(); ++session) {
+    const CameraModel camera(lensOf(session));
+    for (std::size_t i = begin(session); i < begin(session) + imagesIn(session); ++i) {
+      setCamera(camera, images_[i].rays);
+    }
+  }
 }
 
 double Reconstruction::distance_m(const Landmark& landmark) const {

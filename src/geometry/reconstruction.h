@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -43,12 +44,12 @@ class Reconstruction {
   static constexpr std::size_t kMinViews = 3;    ///< of a landmark, in the end
   static constexpr double kBelievedFix_m = 1.0;  ///< from the cleaned path, of a fix that confirms it
 
-  explicit Reconstruction(const GeometryConfig& config) : config_(config) {}
+  explicit Reconstruction(const GeometryConfig& config) : config_(config) { problem_.lenses.clear(); }
 
   /// Appends the images of a session, where the cleaned path has their antenna, and what they show. `session` must
-  /// outlive it.
+  /// outlive it. `directions`: see drivingDirections().
   void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations,
-           const FeatureSets& sets);
+           const std::vector<double>& directions, const FeatureSets& sets);
   /// Appends those of another one, with its landmarks, as they are there.
   void append(const Reconstruction& other);
 
@@ -61,7 +62,10 @@ class Reconstruction {
   const UnadjustedSession& session(std::size_t session) const { return *sessions_[session]; }
   std::uint32_t sessionOf(std::size_t image) const { return images_[image].session; }
   const KeypointRays& rays(std::size_t image) const { return images_[image].rays; }
-  double focal_px(std::size_t image) const { return sessions_[images_[image].session]->camera->intrinsics().fx; }
+  double focal_px(std::size_t image) const { return lensOf(images_[image].session).fx; }
+  /// As the images have it so far.
+  Intrinsics lensOf(std::size_t session) const;
+  const LensCorrection& lensCorrection(std::size_t session) const;
   const TrajectoryPoint& cleaned(std::size_t image) const { return images_[image].cleaned; }
   const CameraPose& camera(std::size_t image) const { return problem_.cameras[image]; }
   const std::vector<Landmark>& landmarks() const { return problem_.landmarks; }
@@ -80,10 +84,15 @@ class Reconstruction {
   /// Adjusts everything, window by window, then drops sightings that disagree and landmarks that fewer than `min_views`
   /// images see.
   void adjustAndPrune(double tolerance, std::size_t min_views);
+  /// See the function of that name.
+  void moveAsOne();
   /// A single image may end in a minimum of its own, metres off. It starts again among its neighbours.
   void bringBack();
-  /// What the images make of the focal length of all cameras, when they may. `tolerance`: as of adjustAndPrune().
-  double freeFocalScale(double tolerance) const;
+  /// From now on the calibrations are adjusted as well. `sigma`: what is known of each entry before.
+  void freeLenses(const LensCorrection& sigma) { bundle_.lens_sigma = sigma; }
+  /// What the images do not tell apart from nothing stays as it was published from now on: entries of the lenses, and
+  /// the delay of the fixes.
+  void keepSignificant();
   /// What it came to, session by session; landmark ids begin with `first_id`.
   std::vector<SessionGeometry> results(std::uint32_t first_id) const;
 
@@ -108,18 +117,23 @@ class Reconstruction {
   Eigen::Vector3d usualShift_m(std::size_t image) const;
   Eigen::Vector3d usualTurn_rad(std::size_t image) const;
   bool isAstray(std::size_t image) const;
-  double error(const Landmark& landmark, const LandmarkSighting& sighting) const;
   double distance_m(const Landmark& landmark) const;
   std::vector<TiedSessions> tiedSessions() const;
   double mapSigma_m(const TiedSessions& tied) const;
   ImageGeometry imageAt(std::size_t image, const TiedSessions& tied) const;
   void addLandmark(const FeatureTrack& track, double gate_px);
+  std::size_t addLens(const BundleLens& lens);
+  void adjustWindows();
+  void adjustLenses(const std::vector<BundleWindow>& windows);
+  void applyLenses(std::size_t first_session);
+  SharedSigmas sharedSigmasNow() const;
   std::vector<BundleWindow> windows() const;
   BundleProblem problemOf(const BundleWindow& window) const;
   bool isWithin(double farthest_m, const PositionObservation& fix) const;
   std::vector<bool> confirmedByFixes() const;
   std::vector<double> distancesFromFixes_m() const;
-  double farShare(const SessionGeometry& geometry, std::size_t begin, const std::vector<bool>& confirmed) const;
+  std::vector<std::optional<double>> distancesOffFixes() const;
+  std::optional<double> usual(const std::vector<std::optional<double>>& values, std::size_t image) const;
   void addPath(std::vector<ImageGeometry> images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;
@@ -131,6 +145,7 @@ class Reconstruction {
   FeatureSets sets_;                        ///< of what the images show
   BundleProblem problem_;
   std::vector<std::size_t> ranks_;  ///< of the images, in windows
+  SharedSigmas shared_;             ///< by keepSignificant(); zero for what is held
 };
 
 /// Moves each session of `reconstruction` to where those before it have what both see: its landmarks beside theirs, by

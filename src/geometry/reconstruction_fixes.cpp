@@ -120,17 +120,23 @@ std::vector<PositionObservation> positionsAt(const std::vector<TrajectoryPoint>&
     std::vector<double> north;
     std::vector<double> sigmas_m;
     while (fix != fixes.end() && fix->stamp_ns < stamp_ns - before_ns) ++fix;
-    for (; fix != fixes.end() && fix->stamp_ns < stamp_ns + after_ns; ++fix) {
-      const std::optional<TrajectoryPoint> then = path.at(fix->stamp_ns);
-      if (!then) continue;
-      const Eigen::Vector2d moved = fix->position_m + images[i].position_m - then->position_m;
+    const auto begin = fix;
+    while (fix != fixes.end() && fix->stamp_ns < stamp_ns + after_ns) ++fix;
+    const bool believed = std::any_of(begin, fix, [](const MapFix& one) { return one.believed; });
+    for (auto one = begin; one != fix; ++one) {
+      const std::optional<TrajectoryPoint> then = path.at(one->stamp_ns);
+      if (!then || one->believed != believed) continue;
+      const Eigen::Vector2d moved = one->position_m + images[i].position_m - then->position_m;
       east.push_back(moved.x());
       north.push_back(moved.y());
-      sigmas_m.push_back(fix->sigma_m > 0.0 ? std::clamp(fix->sigma_m, kSmallestSigma_m, kLargestSigma_m) : sigma_m);
+      sigmas_m.push_back(one->sigma_m > 0.0 ? std::clamp(one->sigma_m, kSmallestSigma_m, kLargestSigma_m) : sigma_m);
     }
     if (east.empty()) continue;
-    positions.push_back(
-        {static_cast<std::uint32_t>(i), {median(east), median(north)}, median(sigmas_m), velocityAt_m_s(images, i)});
+    positions.push_back({static_cast<std::uint32_t>(i),
+                         {median(east), median(north)},
+                         median(sigmas_m),
+                         velocityAt_m_s(images, i),
+                         believed});
   }
   return positions;
 }

@@ -18,11 +18,12 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kLeastConfirmed = 0.2;       ///< of a session's images, for these to speak for all
-constexpr double kFar_m = 3.0;                ///< an image moved by more than this is far from the cleaned path
-constexpr std::size_t kEnoughTracked = 20;    ///< features of an image on average, for their share to say anything
-constexpr double kAttitudeSigma_rad = 0.004;  ///< of a training image in the map
-constexpr double kDrift = 0.04;               ///< metres that images stray in a metre without fixes, one sigma
+constexpr std::size_t kEnoughTracked = 20;  ///< features of an image, for their share to say anything
+/// Sigmas from believed fixes, where it is as likely by chance as 3.4 sigmas on a line.
+constexpr double kOffFixes = 3.7;
+constexpr double kLeastExplained = 1.0 / 3.0;  ///< of what is matched; leaves and people move
+constexpr double kAttitudeSigma_rad = 0.004;   ///< of a training image in the map
+constexpr double kDrift = 0.04;                ///< metres that images stray in a metre without fixes, one sigma
 
 }  // namespace
 
@@ -34,10 +35,10 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   const std::vector<TiedSessions> tied = tiedSessions();
   for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i, tied[i]);
   for (const Landmark& landmark : problem_.landmarks) {
-    const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_.cameras);
+    const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_);
     ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
     for (const LandmarkSighting& sighting : landmark.sightings) {
-      errors_px[sessionOf(sighting.image)].push_back(error(landmark, sighting) * focal_px(sighting.image));
+      errors_px[sessionOf(sighting.image)].push_back(reprojectionError_px(problem_, landmark, sighting));
       addSighting(landmark, covariance, sighting.feature, first_id, images[sighting.image]);
     }
     ++first_id;
@@ -53,8 +54,14 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
       geometry.agreeing_share = static_cast<double>(geometry.sightings) / static_cast<double>(tracked[k]);
     }
     geometry.median_error_px = median(errors_px[k]);
-    geometry.mounting_rad = problem_.sessions[k].mounting_rad;
+    const BundleSession& session = problem_.sessions[k];
+    const Eigen::AngleAxisd mounting(session.mounting * Eigen::Quaterniond(exponential(session.mounting_rad)));
+    geometry.mounting_rad = mounting.angle() * mounting.axis();
     geometry.fix_delay_s = problem_.sessions[k].fix_delay_s;
+    geometry.lens = lensOf(k);
+    geometry.focal_scale = std::exp(lensCorrection(k)[kFocalLength]);
+    geometry.focal_sigma = shared_.lens[kFocalLength];
+    geometry.delay_sigma_s = shared_.fix_delay_s;
   }
   return geometries;
 }
@@ -129,45 +136,65 @@ std::vector<double> Reconstruction::distancesFromFixes_m() const {
   return away_m;
 }
 
-/// Of the images that fixes confirm: elsewhere the cleaned path is a guess, and an image moved away from it says
-/// nothing. Of a session of which fixes confirm little, all images. `geometry`: its images; `begin`: the first of them.
-double Reconstruction::farShare(const SessionGeometry& geometry, std::size_t begin,
-                                const std::vector<bool>& confirmed) const {
-  const auto first = confirmed.begin() + static_cast<std::ptrdiff_t>(begin);
-  const std::size_t images = geometry.images.size();
-  auto counted = static_cast<double>(std::count(first, first + static_cast<std::ptrdiff_t>(images), true));
-  const bool all = counted < kLeastConfirmed * static_cast<double>(images);
-  if (all) counted = static_cast<double>(images);
-  double far = 0.0;
-  for (std::size_t k = 0; k < images; ++k) {
-    const bool counts = geometry.images[k] && (all || confirmed[begin + k]);
-    if (counts && shiftOf_m(begin + k).head<2>().norm() > kFar_m) far += 1.0;
+/// Of each image from where believed fixes have it, in sigmas of these.
+std::vector<std::optional<double>> Reconstruction::distancesOffFixes() const {
+  std::vector<std::optional<double>> distances(images_.size());
+  for (const PositionObservation& fix : fixes_) {
+    if (!fix.believed) continue;
+    const BundleSession& session = problem_.sessionOf(fix.image);
+    const Eigen::Vector2d then_m = fix.east_north_m + session.fix_delay_s * fix.velocity_m_s - session.fix_bias_m;
+    const Eigen::Vector3d antenna_m = antennaInMap_m(problem_.cameras[fix.image], fix.image);
+    distances[fix.image] = (antenna_m.head<2>() - then_m).norm() / fix.sigma_m;
   }
-  return far / std::max(1.0, counted);
+  return distances;
 }
 
-/// Images with enough landmarks, and how far they were moved.
+/// The median around an image: one fix may err.
+std::optional<double> Reconstruction::usual(const std::vector<std::optional<double>>& values, std::size_t image) const {
+  std::vector<double> around;
+  for (const std::size_t neighbour : neighboursOf(image)) {
+    if (values[neighbour]) around.push_back(*values[neighbour]);
+  }
+  return around.empty() ? std::nullopt : std::optional<double>(median(around));
+}
+
+/// Images with enough landmarks, and how far they were moved. Those around which most of what was matched fits nowhere
+/// get none: their places stay.
 void Reconstruction::addPath(std::vector<ImageGeometry> images, std::vector<SessionGeometry>& geometries) const {
+  const std::vector<std::optional<double>> off_fixes = distancesOffFixes();
+  std::vector<std::optional<double>> explained(images.size());
+  std::vector<std::size_t> tracked(images.size());
+  for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
+    for (const FeatureObservation& seen : track) ++tracked[seen.image];
+  }
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (tracked[i] < kEnoughTracked) continue;
+    explained[i] = static_cast<double>(images[i].landmarks.size()) / static_cast<double>(tracked[i]);
+  }
+  std::vector<std::size_t> trackable(geometries.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     SessionGeometry& geometry = geometries[sessionOf(i)];
-    const auto least = static_cast<std::size_t>(config_.min_landmarks);
-    if (images[i].landmarks.size() < least || isAstray(i)) {
-      geometry.images.emplace_back();
-      continue;
-    }
-    ImageGeometry& image = geometry.images.emplace_back(std::move(images[i])).value();
-    std::sort(image.landmarks.begin(), image.landmarks.end(),
+    std::optional<ImageGeometry>& image = geometry.images.emplace_back();
+    if (tracked[i] >= kEnoughTracked) ++trackable[sessionOf(i)];
+    if (images[i].landmarks.size() < static_cast<std::size_t>(config_.min_landmarks) || isAstray(i)) continue;
+    const bool is_off = usual(off_fixes, i).value_or(0.0) > kOffFixes;
+    const bool is_unexplained = usual(explained, i).value_or(1.0) < kLeastExplained;
+    if (is_off) ++geometry.off_fixes;
+    if (is_unexplained) ++geometry.unexplained;
+    if (is_unexplained) continue;
+    image = std::move(images[i]);
+    std::sort(image->landmarks.begin(), image->landmarks.end(),
               [](const SeenLandmark& a, const SeenLandmark& b) { return a.feature < b.feature; });
     ++geometry.located;
     const double shift_m = shiftOf_m(i).head<2>().norm();
     geometry.mean_shift_m += shift_m;
     geometry.largest_shift_m = std::max(geometry.largest_shift_m, shift_m);
   }
-  const std::vector<bool> confirmed = confirmedByFixes();
   for (std::size_t k = 0; k < geometries.size(); ++k) {
     SessionGeometry& geometry = geometries[k];
     if (geometry.located > 0) geometry.mean_shift_m /= static_cast<double>(geometry.located);
-    geometry.far_share = farShare(geometry, begin(k), confirmed);
+    // Most images lie elsewhere, or most of those that match each other have no place where their matches fit.
+    geometry.contradicts_fixes = 2 * geometry.off_fixes > geometry.located || 2 * geometry.located < trackable[k];
   }
 }
 

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/geometry/camera_pose.h"
 
 namespace visual_localization {
 
@@ -37,17 +38,31 @@ struct RelativeRotation {
   Eigen::Quaterniond b_from_a = Eigen::Quaterniond::Identity();
 };
 
+/// How a camera is mounted, and how well that is known.
+struct Mounting {
+  /// Of the camera, turned against a level one that looks where the robot does.
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d sigma_rad{0.2, 0.5, 0.02};  ///< about the axes of the camera
+};
+
+/// As somebody said that it is: known better in roll than in pitch, and least in yaw (of the robot).
+Mounting mountingOf(const SensorMount& mount);
+
+/// Which way a robot drives at each image: 1 ahead, -1 backwards. Where the course turns about and the images do not,
+/// it reverses; it drives ahead most of the time.
+std::vector<double> drivingDirections(const std::vector<double>& courses_rad,
+                                      const std::vector<RelativeRotation>& relative);
+
 /// What the directions of the cameras come to.
 struct AveragedRotations {
   std::vector<Eigen::Quaterniond> camera_in_map;
-  /// How the camera is mounted: turned against a level camera that looks along the direction of travel, as a rotation
-  /// vector in its frame (x pitch, y yaw, z roll), radians.
+  /// How the camera is mounted: turned against how it was said to be, as a rotation vector in its frame, radians.
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();
 };
 
 /// Rotations of all cameras from relative rotations and the directions of travel (`travel_yaws_rad`, 0 = east,
 /// counter-clockwise), of which both may be wrong here and there (Cauchy losses). The mounting is one for all cameras.
 AveragedRotations averageRotations(const std::vector<double>& travel_yaws_rad,
-                                   const std::vector<RelativeRotation>& relative);
+                                   const std::vector<RelativeRotation>& relative, const Mounting& mounting = {});
 
 }  // namespace visual_localization

@@ -1,3 +1,8 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
@@ -14,8 +19,7 @@ namespace visual_localization {
 namespace {
 
 constexpr double kRelativeSigma_rad = 0.005;
-const Eigen::Vector3d kTravelSigma_rad(0.03, 0.08, 0.03);  ///< of one camera about the mounting: pitch, yaw, roll
-const Eigen::Vector3d kMountingSigma_rad(0.2, 0.5, 0.05);  ///< of the mounting about none
+const Eigen::Vector3d kTravelSigma_rad(0.1, 0.08, 0.03);  ///< of one camera about the mounting: pitch, yaw, roll
 
 /// How far two cameras' rotations are from the relative one that their images show.
 class RelativeResidual {
@@ -59,38 +63,55 @@ class RelativeResidual {
   Eigen::Vector4d a_from_b_;
 };
 
-/// The mounting is probably that of a level camera that looks ahead.
-class MountingPrior {
- public:
-  template <class T>
-  bool operator()(const T* mounting, T* residual) const {
-    for (int i = 0; i < 3; ++i) residual[i] = mounting[i] / T(kMountingSigma_rad[i]);
-    return true;
-  }
-};
-
 }  // namespace
 
+Mounting mountingOf(const SensorMount& mount) {
+  Mounting mounting;
+  mounting.rotation = levelCamera(0.0).conjugate() * mount.camera.rotation;
+  const Eigen::Matrix3d robot_from_camera = mounting.rotation.toRotationMatrix();
+  const Eigen::Vector3d variances = mounting.sigma_rad.cwiseAbs2();
+  mounting.sigma_rad = (robot_from_camera.cwiseAbs2().transpose() * variances).cwiseSqrt();
+  return mounting;
+}
+
+std::vector<double> drivingDirections(const std::vector<double>& courses_rad,
+                                      const std::vector<RelativeRotation>& relative) {
+  constexpr double kAbout_rad = 0.75 * kPi;
+  std::vector<bool> seen(courses_rad.size());  // with the image before
+  for (const RelativeRotation& pair : relative) {
+    if (pair.b == pair.a + 1) seen[pair.b] = true;
+  }
+  std::vector<double> directions(courses_rad.size(), 1.0);
+  for (std::size_t i = 1; i < directions.size(); ++i) {
+    const bool turns_about = std::abs(angleDifference(courses_rad[i - 1], courses_rad[i])) > kAbout_rad;
+    directions[i] = turns_about && seen[i] ? -directions[i - 1] : directions[i - 1];
+  }
+  const double ahead = std::accumulate(directions.begin(), directions.end(), 0.0);
+  if (ahead < 0.0) std::transform(directions.begin(), directions.end(), directions.begin(), std::negate<>());
+  return directions;
+}
+
 AveragedRotations averageRotations(const std::vector<double>& travel_yaws_rad,
-                                   const std::vector<RelativeRotation>& relative) {
-  std::vector<Eigen::Quaterniond> travel;
-  for (const double yaw_rad : travel_yaws_rad) travel.push_back(levelCamera(yaw_rad));
-  std::vector<Eigen::Vector3d> turns(travel.size(), Eigen::Vector3d::Zero());
+                                   const std::vector<RelativeRotation>& relative, const Mounting& mounting) {
+  std::vector<Eigen::Quaterniond> starts;
+  for (const double yaw_rad : travel_yaws_rad) starts.push_back(levelCamera(yaw_rad) * mounting.rotation);
+  std::vector<Eigen::Vector3d> turns(starts.size(), Eigen::Vector3d::Zero());
   AveragedRotations result;
 
   ceres::Problem problem;
-  for (std::size_t i = 0; i < travel.size(); ++i) {
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<MountingResidual, 3, 3, 3>(
-                                 new MountingResidual(travel[i], travel[i], kTravelSigma_rad)),
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<MountingResidual, 3, 3, 3>(new MountingResidual(
+                                 {starts[i], mounting.rotation}, levelCamera(travel_yaws_rad[i]), kTravelSigma_rad)),
                              new ceres::CauchyLoss(1.0), turns[i].data(), result.mounting_rad.data());
   }
   for (const RelativeRotation& pair : relative) {
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<RelativeResidual, 3, 3, 3>(
-                                 new RelativeResidual(travel[pair.a], travel[pair.b], pair.b_from_a)),
+                                 new RelativeResidual(starts[pair.a], starts[pair.b], pair.b_from_a)),
                              new ceres::CauchyLoss(1.0), turns[pair.a].data(), turns[pair.b].data());
   }
-  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<MountingPrior, 3, 3>(new MountingPrior), nullptr,
-                           result.mounting_rad.data());
+  problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<PriorResidual<3>, 3, 3>(new PriorResidual<3>{mounting.sigma_rad}), nullptr,
+      result.mounting_rad.data());
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = 100;
@@ -98,8 +119,8 @@ AveragedRotations averageRotations(const std::vector<double>& travel_yaws_rad,
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
 
-  for (std::size_t i = 0; i < travel.size(); ++i) {
-    const Eigen::Matrix3d rotation = travel[i].toRotationMatrix() * exponential(turns[i]);
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const Eigen::Matrix3d rotation = starts[i].toRotationMatrix() * exponential(turns[i]);
     result.camera_in_map.push_back(Eigen::Quaterniond(rotation).normalized());
   }
   return result;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/numbers.h"
 #include "base/parallel.h"
 #include "geometry/feature_tracks.h"
 #include "geometry/rays.h"
@@ -18,9 +19,7 @@ namespace {
 constexpr double kMaxTurn_rad = 0.6;  ///< from one image to the next
 constexpr double kMaxRevisitTurn_rad = 0.8;
 constexpr std::uint32_t kRotationSpan = 3;  ///< images farther apart say little about each other's rotation
-constexpr double kMostFar = 0.05;           ///< share of images far from the cleaned path in a session to be believed
-constexpr double kFocalTolerance = 0.01;
-constexpr double kLeastAgreeing = 2.0 / 3.0;  ///< share of the tracked features that must agree with the adjustment
+constexpr double kContradiction = 3.0;      ///< sigmas of a calibration, beyond which it is none of this camera
 constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 /// Relative changes of the cost at which adjustments end. The whole path turns and shifts along a flat valley of the
 /// cost: thousands of sightings hardly feel it. One that ends early leaves it metres off where the camera looks aside
@@ -28,7 +27,8 @@ constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 constexpr double kRough = 1e-3;
 constexpr double kCoarse = 1e-4;
 constexpr double kFine = 1e-6;
-constexpr double kFocal = 1e-5;  ///< of the focal length that a calibration gets
+constexpr double kUnknownFocal = 0.3;   ///< one sigma of the logarithm of a focal length that nobody calibrated
+constexpr double kAspectSigma = 0.002;  ///< of square pixels
 /// Landmarks that many images show tie all of these to each other, which costs time. Until positions are about right
 /// their tracks are cut.
 constexpr std::size_t kCoarseViews = 20;
@@ -36,6 +36,13 @@ constexpr std::size_t kAllViews = std::numeric_limits<std::size_t>::max();
 constexpr double kCoarseLoss = 5.0;  ///< the same for the loss of fixes, as a multiple: no fix is without influence yet
 
 using Indices = std::pair<std::uint32_t, std::uint32_t>;
+
+LensCorrection lensSigmaOf(const GeometryConfig& config) {
+  LensCorrection sigma;
+  sigma << config.focal_sigma, kAspectSigma, config.principal_point_sigma, config.principal_point_sigma,
+      config.distortion_sigma, config.distortion_sigma;
+  return sigma;
+}
 
 /// Two images, and what they agree on.
 struct Pair {
@@ -92,8 +99,13 @@ class PairMatcher {
 /// A session on its own.
 class SessionAdjuster {
  public:
-  SessionAdjuster(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads)
-      : session_(session), config_(config), matcher_(config, threads), reconstruction_(config) {
+  SessionAdjuster(const UnadjustedSession& session, const GeometryConfig& config, const LensCorrection& lens_sigma,
+                  std::size_t threads)
+      : session_(session),
+        config_(config),
+        lens_sigma_(lens_sigma),
+        matcher_(config, threads),
+        reconstruction_(config) {
     start();
     adjust();
   }
@@ -101,8 +113,8 @@ class SessionAdjuster {
   /// Of a single session; landmark ids begin with `first_id`.
   SessionGeometry result(std::uint32_t first_id) const {
     SessionGeometry geometry = std::move(reconstruction_.results(first_id).front());
-    geometry.focal_scale = reconstruction_.freeFocalScale(kRough);  // tells one that is a hundredth off
-    geometry.contradicts_calibration = !isBelievable(geometry);
+    const LensCorrection& lens = reconstruction_.lensCorrection(0);
+    geometry.contradicts_calibration = (lens.array().abs() > kContradiction * lens_sigma_.array()).any();
     return geometry;
   }
   const Reconstruction& reconstruction() const { return reconstruction_; }
@@ -140,8 +152,11 @@ class SessionAdjuster {
     });
     std::vector<double> yaws_rad;
     for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
+    const std::vector<double> directions = drivingDirections(yaws_rad, relative);
+    for (std::size_t i = 0; i < yaws_rad.size(); ++i) yaws_rad[i] += directions[i] < 0.0 ? kPi : 0.0;
     // Level, whatever the altitudes say: a camera turned aside by much would explain how a robot leans across a slope.
-    reconstruction_.add(session_, std::move(rays), averageRotations(yaws_rad, relative), sets);
+    const AveragedRotations rotations = averageRotations(yaws_rad, relative, mountingOf(session_.mount));
+    reconstruction_.add(session_, std::move(rays), rotations, directions, sets);
   }
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
@@ -151,23 +166,21 @@ class SessionAdjuster {
     reconstruction_.adjustAndPrune(kRough, 2);
     reconstruction_.bringBack();
     reconstruction_.useFixes(kAllFixes_m, config_.fix_loss);
+    reconstruction_.freeLenses(lens_sigma_);
     reconstruction_.triangulateAll(4.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
     reconstruction_.bringBack();
+    reconstruction_.moveAsOne();
     reconstruction_.triangulateAll(4.0, kAllViews);
     reconstruction_.adjustAndPrune(kRough, 2);
+    reconstruction_.keepSignificant();
+    reconstruction_.moveAsOne();
     reconstruction_.adjustAndPrune(kFine, Reconstruction::kMinViews);
-  }
-
-  /// A wrong calibration bends the path away from the fixes, or the images would rather have another one; one that is
-  /// wrong by far leaves many sightings that fit nowhere.
-  static bool isBelievable(const SessionGeometry& geometry) {
-    return geometry.far_share <= kMostFar && std::abs(geometry.focal_scale - 1.0) <= kFocalTolerance &&
-           geometry.agreeing_share >= kLeastAgreeing;
   }
 
   const UnadjustedSession& session_;
   const GeometryConfig& config_;
+  const LensCorrection lens_sigma_;
   PairMatcher matcher_;
   Reconstruction reconstruction_;
 };
@@ -236,23 +249,27 @@ std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>
   std::vector<std::size_t> believed;
   std::uint32_t next_id = 0;
   for (std::size_t k = 0; k < sessions.size(); ++k) {
-    const SessionAdjuster alone(sessions[k], config, threads);
+    const SessionAdjuster alone(sessions[k], config, lensSigmaOf(config), threads);
     geometries.push_back(alone.result(next_id));
-    if (geometries.back().contradicts_calibration) continue;
+    if (geometries.back().contradicts_calibration || geometries.back().contradicts_fixes) continue;
     next_id += static_cast<std::uint32_t>(geometries.back().landmarks);
     tier.add(alone);
     believed.push_back(k);
   }
   auto tied = believed.size() > 1 ? tier.run() : std::nullopt;
   for (std::size_t i = 0; tied && i < believed.size(); ++i) {
-    (*tied)[i].focal_scale = geometries[believed[i]].focal_scale;
+    (*tied)[i].focal_sigma = geometries[believed[i]].focal_sigma;
+    (*tied)[i].delay_sigma_s = geometries[believed[i]].delay_sigma_s;
     geometries[believed[i]] = std::move((*tied)[i]);
   }
   return geometries;
 }
 
 double focalScaleOf(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads) {
-  return SessionAdjuster(session, config, threads).reconstruction().freeFocalScale(kFocal);
+  LensCorrection sigma = lensSigmaOf(config);
+  sigma[kFocalLength] = kUnknownFocal;
+  const SessionAdjuster adjuster(session, config, sigma, threads);
+  return std::exp(adjuster.reconstruction().lensCorrection(0)[kFocalLength]);
 }
 
 namespace {
@@ -326,6 +343,12 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                   min_pair_inliers, 6, 10000);
   visitor.real({"geometry/keypoint_sigma", "px", "standard deviation of the position of a small SIFT feature"},
                keypoint_sigma_px, 0.01, 100.0);
+  visitor.real({"geometry/focal_sigma", "1", "how well a calibration knows the focal length, as a share of it"},
+               focal_sigma, 1e-6, 1.0);
+  visitor.real({"geometry/principal_point_sigma", "1", "and the principal point, as a share of the focal length"},
+               principal_point_sigma, 1e-6, 1.0);
+  visitor.real({"geometry/distortion_sigma", "1", "and the radial coefficients k1 and k2"}, distortion_sigma, 1e-6,
+               1.0);
   visitor.real({"geometry/max_residual", "1", "sightings farther from their landmark, in sigmas, are dropped"},
                max_residual_sigmas, 1.0, 1000.0);
   visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},

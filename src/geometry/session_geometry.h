@@ -19,13 +19,14 @@
 
 namespace visual_localization {
 
-/// A fix in the map frame, believable or not.
+/// A fix in the map frame.
 struct MapFix {
   std::int64_t stamp_ns = 0;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();    ///< east, north
   double sigma_m = 0.0;                                    ///< per axis, as the receiver claims; 0: not known
   double up_m = std::numeric_limits<double>::quiet_NaN();  ///< above the datum; NaN: not known
   double sigma_up_m = 0.0;                                 ///< the same as sigma_m
+  bool believed = true;                                    ///< by the cleaning of the path
 };
 
 /// A session before its adjustment.
@@ -41,6 +42,7 @@ struct UnadjustedSession {
 struct SessionGeometry : SessionLandmarks {
   std::vector<std::optional<ImageGeometry>> images;        ///< nothing where too few landmarks are seen
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
+  Intrinsics lens;                                         ///< the calibration as the images have it
 };
 
 /// Landmarks and camera poses of sessions from their images and fixes: matches of neighbouring images and of those that

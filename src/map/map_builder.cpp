@@ -8,7 +8,6 @@
 #include "base/files.h"
 #include "base/time.h"
 #include "features/image_size.h"
-#include "geo/trajectory_parts.h"
 #include "map/extraction_pool.h"
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
@@ -72,7 +71,7 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   try {
     const LocalFrame frame = frame_ ? *frame_ : frameFor(fixes, config_.trajectory);
     requireNear(fixes, frame.datum());
-    CleanedTrajectory cleaned = cleanInParts(fixes, frame, config_.trajectory);
+    CleanedTrajectory cleaned = cleanTrajectory(fixes, frame, config_.trajectory);
     requireMotion(cleaned);
     report_.sessions.push_back(std::move(cleaned));
     frame_ = frame;
@@ -81,7 +80,7 @@ void MapBuilder::beginSession(const std::string& name, const std::vector<Fix>& f
   }
   header_.datum = frame_->datum();
   header_.sessions.push_back({name, {}, {}, camera.mount});
-  fixes_.push_back(inFrame(fixes, *frame_));
+  fixes_.push_back(inFrame(fixes, report_.sessions.back().verdicts, *frame_));
   report_.session_images.push_back({name, 0, camera.image_size, camera, false, {}, {}});
   last_stamp_ns_.reset();
   last_kept_m_.reset();
@@ -185,9 +184,13 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   for (std::size_t i = 0; i < geometries.size(); ++i) {
     if (!geometries[i]) continue;
     report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks
-    if (!geometries[i]->contradicts_calibration) continue;
-    geometries[i].reset();
-    header_.sessions[i].camera.reset();
+    Session& session = header_.sessions[i];
+    if (geometries[i]->contradicts_calibration || geometries[i]->contradicts_fixes) {
+      geometries[i].reset();
+      session.camera.reset();
+    } else if (const CameraModel adjusted(geometries[i]->lens); adjusted != *session.camera) {
+      session.published = std::exchange(session.camera, adjusted);
+    }
   }
   const PruningNeighbours neighbours(*unpruned);
   report_.features_kept = 0;

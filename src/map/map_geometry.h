@@ -38,9 +38,10 @@ double distanceBetween_m(const GeodeticPoint& a, const GeodeticPoint& b);
 void requireNear(const std::vector<Fix>& fixes, const GeodeticPoint& datum);
 /// Refuses a path that spans less than kSmallestSession_m: all images of the drive would be on one spot.
 void requireMotion(const CleanedTrajectory& cleaned);
-/// Those that have a position, in order of time. Altitudes that no robot can have or that stand out are left out, and
-/// those behind a change of what they are measured from are moved to those before.
-std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const LocalFrame& frame);
+/// Those that have a position, in order of time. `verdicts`: of cleaning, on each fix. Altitudes that no robot can have
+/// or that stand out are left out, and those behind a change of what they are measured from are moved to those before.
+std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const std::vector<FixVerdict>& verdicts,
+                            const LocalFrame& frame);
 
 /// The training images of each session of a map by their positions.
 class SessionIndex {

@@ -36,8 +36,10 @@ TEST(KeypointRays, OfNothingAreNone) {
 
 TEST(KeypointRays, AreUsableWhereBothImagesHaveThem) {
   const Eigen::Vector2d none(std::nan(""), std::nan(""));
-  const KeypointRays a{{{0.0, 0.0}, none, {0.1, 0.0}}, {1.0, 1.0, 1.0}};
-  const KeypointRays b{{none, {0.0, 0.0}}, {1.0, 1.0}};
+  KeypointRays a;
+  a.normalised = {{0.0, 0.0}, none, {0.1, 0.0}};
+  KeypointRays b;
+  b.normalised = {none, {0.0, 0.0}};
   const auto kept = usable({{0, 0}, {0, 1}, {1, 1}, {2, 1}}, a, b);
   ASSERT_EQ(kept.size(), 2U);
   EXPECT_EQ(kept[0].a, 0U);

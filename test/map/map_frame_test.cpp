@@ -39,7 +39,7 @@ TEST(MapFrame, AnAbsurdAltitudeIsNoneAndTheFixStays) {
   std::vector<Fix> fixes = levelRound();
   fixes[200].position.altitude_m *= 1000.0;
   const LocalFrame frame = frameFor(fixes, {});
-  const std::vector<MapFix> found = inFrame(fixes, frame);
+  const std::vector<MapFix> found = inFrame(fixes, std::vector<FixVerdict>(fixes.size(), FixVerdict::kKept), frame);
   ASSERT_EQ(found.size(), fixes.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(std::isfinite(found[i].up_m), i != 200) << i;
@@ -52,7 +52,8 @@ TEST(MapFrame, AnAbsurdAltitudeIsNoneAndTheFixStays) {
 TEST(MapFrame, AltitudesOfTheSeaAndOfTheEllipsoidAreBroughtTogether) {
   std::vector<Fix> fixes = levelRound();
   for (std::size_t i = 300; i < fixes.size(); ++i) fixes[i].position.altitude_m += 47.0;
-  const std::vector<MapFix> found = inFrame(fixes, frameFor(fixes, {}));
+  const std::vector<MapFix> found =
+      inFrame(fixes, std::vector<FixVerdict>(fixes.size(), FixVerdict::kKept), frameFor(fixes, {}));
   for (const MapFix& fix : found) EXPECT_NEAR(fix.up_m, found.front().up_m, 1.0);
 }
 

@@ -133,6 +133,12 @@ View viewOf(const std::vector<WorldPoint>& world, const CameraModel& camera, con
   return viewOf(world, all, camera, pose, noise_px, random, image);
 }
 
+Eigen::Quaterniond mountingOf(const StreetDrive& street) {
+  return Eigen::Quaterniond(turned(street.yaw_rad, Eigen::Vector3d::UnitY()) *
+                            turned(street.pitch_rad, Eigen::Vector3d::UnitX()) *
+                            turned(street.roll_rad, Eigen::Vector3d::UnitZ()));
+}
+
 std::vector<DrivenPose> drive(const StreetDrive& street) {
   std::vector<DrivenPose> poses;
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
@@ -144,11 +150,11 @@ std::vector<DrivenPose> drive(const StreetDrive& street) {
     DrivenPose pose;
     pose.travel_yaw_rad = yaw_rad;
     pose.camera.position_m = position_m;
-    pose.camera.rotation = levelCamera(yaw_rad) * turned(std::atan(slope), Eigen::Vector3d::UnitX()) *
-                           turned(street.yaw_rad, Eigen::Vector3d::UnitY()) *
-                           turned(street.pitch_rad, Eigen::Vector3d::UnitX());
+    pose.camera.rotation =
+        levelCamera(yaw_rad) * turned(std::atan(slope), Eigen::Vector3d::UnitX()) * mountingOf(street);
     poses.push_back(pose);
-    position_m += street.spacing_m * Eigen::Vector3d(std::cos(yaw_rad), std::sin(yaw_rad), slope);
+    const double way_m = street.reverses && share > 0.8 ? -street.spacing_m : street.spacing_m;
+    position_m += way_m * Eigen::Vector3d(std::cos(yaw_rad), std::sin(yaw_rad), slope);
   }
   return poses;
 }
@@ -178,7 +184,11 @@ UnadjustedSession RecordedDrive::unadjusted() const {
   const LocalFrame frame({48.5, 9.05, 430.0});
   std::vector<Fix> raw;
   for (const MapFix& fix : fixes) raw.push_back({fix.stamp_ns, frame.toGeodetic(fix.position_m), true});
-  const Trajectory path = cleanTrajectory(raw, frame, {}).trajectory;
+  const CleanedTrajectory cleaned = cleanTrajectory(raw, frame, {});
+  const Trajectory& path = cleaned.trajectory;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    session.fixes[i].believed = cleaned.verdicts[i] == FixVerdict::kKept;
+  }
   for (std::size_t i = 0; i < views.size(); ++i) {
     const std::int64_t stamp_ns = static_cast<std::int64_t>(i) * kFixesPerImage * kFixInterval_ns;
     const std::int64_t known_ns = std::clamp(stamp_ns, path.points().front().stamp_ns, path.points().back().stamp_ns);

@@ -51,6 +51,8 @@ struct StreetDrive {
   double pitch_rad = 0.0;  ///< of the camera on the robot, upwards positive
   double yaw_rad = 0.0;    ///< of the camera on the robot, to the right positive
   double slope = 0.0;      ///< rise over run in the middle third
+  double roll_rad = 0.0;   ///< of the camera, clockwise
+  bool reverses = false;   ///< backwards in the last fifth: `travel_yaw_rad` stays where the robot looks
 };
 
 /// Where the robot is and where it drives to, the camera on it and the time.
@@ -58,6 +60,9 @@ struct DrivenPose {
   CameraPose camera;
   double travel_yaw_rad = 0.0;
 };
+
+/// Of the camera, turned against a level one that looks where the robot does.
+Eigen::Quaterniond mountingOf(const StreetDrive& street);
 
 std::vector<DrivenPose> drive(const StreetDrive& street);
 

@@ -20,6 +20,9 @@ struct GeometryConfig {
   double epipolar_tolerance_px = 1.0;
   int min_pair_inliers = 15;
   double keypoint_sigma_px = 0.3;
+  double focal_sigma = 0.03;
+  double principal_point_sigma = 0.01;
+  double distortion_sigma = 0.05;
   double max_residual_sigmas = 5.0;
   double fix_sigma_m = 0.3;
   double fix_correlation = 3.3;
@@ -55,14 +58,17 @@ struct SessionLandmarks {
   std::size_t located = 0;  ///< images with a pose and landmarks
   std::size_t landmarks = 0;
   std::size_t sightings = 0;             ///< features that show one
-  bool contradicts_calibration = false;  ///< then the session has places only
+  bool contradicts_calibration = false;  ///< no lens near it explains the images: the session has places only
+  bool contradicts_fixes = false;        ///< most of its images do: likewise
+  std::size_t off_fixes = 0;             ///< images that are elsewhere than believed fixes around have them
+  std::size_t unexplained = 0;           ///< images without landmarks since too little around them fits together
   double focal_scale = 1.0;              ///< what the images say the focal length is, as a share of the calibration's
+  double focal_sigma = 0.0;              ///< of that; 0: it stays as it is published, the images do not tell
   double median_error_px = 0.0;          ///< distance of a sighting from its landmark's projection
   double mean_shift_m = 0.0;             ///< of these images from the cleaned path
   double largest_shift_m = 0.0;
-  /// Of the images that fixes confirm (to 1 m), or of all when these are less than a fifth: moved by more than 3 m.
-  double far_share = 0.0;
   double fix_delay_s = 0.0;     ///< fixes say where the antenna was this long before their stamps
+  double delay_sigma_s = 0.0;   ///< of that; 0: the images do not tell it from none
   double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
   double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
 };

@@ -1,0 +1,71 @@
+// Cameras that are mounted in any attitude, and robots that reverse.
+
+#include <gtest/gtest.h>
+
+#include "base/numbers.h"
+#include "geometry/relative_rotation.h"
+#include "test/geometry/recorded_street.h"
+
+namespace visual_localization {
+namespace {
+
+using test::imagesIn;
+using test::kPathError_m;
+using test::pathError_m;
+using test::recorded;
+using test::RecordedDrive;
+
+constexpr double kTimes = 1.3;  ///< the error of the camera that looks ahead
+
+SessionGeometry mounted(const test::StreetDrive& street, const RecordedDrive& drive) {
+  UnadjustedSession session = drive.unadjusted();
+  session.mount.camera.rotation = levelCamera(0.0) * test::mountingOf(street);
+  return adjustSessions({session}, {}, 1).front();
+}
+
+class SessionAttitude : public testing::TestWithParam<Eigen::Vector3d> {};  // yaw, pitch, roll, degrees
+
+TEST_P(SessionAttitude, StartsFromTheMounting) {
+  test::StreetDrive street;
+  street.yaw_rad = toRadians(GetParam().x());
+  street.pitch_rad = toRadians(GetParam().y());
+  street.roll_rad = toRadians(GetParam().z());
+  const RecordedDrive drive = recorded(street, 61);
+  const SessionGeometry geometry = mounted(street, drive);
+  EXPECT_GT(imagesIn(geometry), drive.truth.size() * 2 / 3) << "who looks aside or back sees no things at first";
+  EXPECT_LT(pathError_m(geometry, drive.truth), kTimes * kPathError_m);
+  const Eigen::AngleAxisd found(geometry.mounting_rad.norm(), geometry.mounting_rad.normalized());
+  EXPECT_LT(Eigen::Quaterniond(found).angularDistance(test::mountingOf(street)), toRadians(2.0));
+}
+
+INSTANTIATE_TEST_SUITE_P(Mountings, SessionAttitude,
+                         testing::Values(Eigen::Vector3d(0.0, 0.0, 20.0), Eigen::Vector3d(0.0, 0.0, 90.0),
+                                         Eigen::Vector3d(0.0, 0.0, 180.0), Eigen::Vector3d(90.0, 0.0, 0.0),
+                                         Eigen::Vector3d(180.0, 0.0, 0.0), Eigen::Vector3d(0.0, 10.0, 0.0),
+                                         Eigen::Vector3d(-45.0, -10.0, 90.0)));
+
+TEST(SessionAttitude, LooksWhereItLookedWhileTheRobotReverses) {
+  test::StreetDrive street;
+  street.reverses = true;
+  const RecordedDrive drive = recorded(street, 62);
+  const SessionGeometry geometry = mounted(street, drive);
+  EXPECT_GT(imagesIn(geometry), drive.truth.size() * 9 / 10);
+  EXPECT_LT(pathError_m(geometry, drive.truth), kTimes * kPathError_m);
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    if (!geometry.images[i]) continue;
+    EXPECT_LT(geometry.images[i]->camera.rotation.angularDistance(drive.truth[i].camera.rotation), 0.1) << i;
+  }
+}
+
+TEST(DrivingDirections, TurnAboutWhereTheCourseDoesAndTheImagesDoNot) {
+  std::vector<double> courses_rad(10, 0.3);
+  for (std::size_t i = 6; i < 9; ++i) courses_rad[i] = 0.3 - kPi;
+  std::vector<RelativeRotation> relative;
+  for (std::uint32_t i = 1; i < 10; ++i) relative.push_back({i - 1, i, Eigen::Quaterniond::Identity()});
+  const std::vector<double> directions = drivingDirections(courses_rad, relative);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(directions[i], i >= 6 && i < 9 ? -1.0 : 1.0) << i;
+  EXPECT_EQ(drivingDirections(courses_rad, {}), std::vector<double>(10, 1.0)) << "a robot may turn about";
+}
+
+}  // namespace
+}  // namespace visual_localization
