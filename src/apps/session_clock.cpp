@@ -13,7 +13,6 @@
 #include "base/time.h"
 #include "features/picture_motion.h"
 #include "geo/clock_offset.h"
-#include "geo/trajectory_parts.h"
 
 namespace visual_localization::apps {
 namespace {
@@ -76,7 +75,7 @@ Paths pathsOf(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& conf
   }
   std::vector<StampedPosition> believed;
   try {
-    const CleanedTrajectory cleaned = cleanInParts(fixes, frame, config);
+    const CleanedTrajectory cleaned = cleanTrajectory(fixes, frame, config);
     for (std::size_t i = 0; i < fixes.size(); ++i) {
       if (cleaned.verdicts[i] != FixVerdict::kKept) continue;
       believed.push_back({fixes[i].stamp_ns, frame.toEastNorth(fixes[i].position)});

@@ -37,7 +37,7 @@ std::vector<PictureShift> picturesOf(const Path& path, double roll_rad = 0.0) {
 }
 
 /// Fixes five times a second, stamped too late by `late_s`.
-std::vector<StampedPosition> pathOf(const Path& path, double late_s, double noise_m) {
+std::vector<StampedPosition> coursePathOf(const Path& path, double late_s, double noise_m) {
   std::mt19937 engine(5);
   std::normal_distribution<double> noise(0.0, noise_m);
   std::vector<StampedPosition> fixes;
@@ -51,12 +51,12 @@ std::vector<StampedPosition> pathOf(const Path& path, double late_s, double nois
 class ClockOffsetTest : public testing::TestWithParam<double> {};
 
 TEST_P(ClockOffsetTest, IsFoundByTheTurns) {
-  const auto exact = clockOffset(picturesOf(block), pathOf(block, GetParam(), 0.02));
+  const auto exact = clockOffset(picturesOf(block), coursePathOf(block, GetParam(), 0.02));
   ASSERT_TRUE(exact);
   EXPECT_NEAR(exact->offset_s, GetParam(), 0.1);
   EXPECT_NEAR(exact->width_rad, kWidth_rad, 0.1);
   EXPECT_TRUE(exact->along_rows);
-  const auto noisy = clockOffset(picturesOf(block), pathOf(block, GetParam(), 0.12));
+  const auto noisy = clockOffset(picturesOf(block), coursePathOf(block, GetParam(), 0.12));
   ASSERT_TRUE(noisy);
   EXPECT_NEAR(noisy->offset_s, GetParam(), 3.0 * noisy->sigma_s);
   EXPECT_LT(noisy->sigma_s, 0.3);
@@ -65,15 +65,15 @@ TEST_P(ClockOffsetTest, IsFoundByTheTurns) {
 INSTANTIATE_TEST_SUITE_P(Offsets, ClockOffsetTest, testing::Values(0.0, 0.5, 2.0, 5.0, 18.0, -18.0, 29.0));
 
 TEST(ClockOffset, SaysHowMuchWorseNoOffsetIs) {
-  EXPECT_LT(clockOffset(picturesOf(block), pathOf(block, 0.0, 0.05))->at_zero_sigmas, 2.0);
-  EXPECT_GT(clockOffset(picturesOf(block), pathOf(block, 5.0, 0.05))->at_zero_sigmas, 5.0);
+  EXPECT_LT(clockOffset(picturesOf(block), coursePathOf(block, 0.0, 0.05))->at_zero_sigmas, 2.0);
+  EXPECT_GT(clockOffset(picturesOf(block), coursePathOf(block, 5.0, 0.05))->at_zero_sigmas, 5.0);
 }
 
 TEST(ClockOffset, IsNothingWithoutTurns) {
   const Path straight = [](double time_s) { return Eigen::Vector2d(test::kSpeed * time_s, 0.0); };
-  EXPECT_FALSE(clockOffset(picturesOf(straight), pathOf(straight, 0.0, 0.12)));
-  EXPECT_FALSE(clockOffset(picturesOf(block), pathOf(straight, 0.0, 0.12)));
-  EXPECT_FALSE(clockOffset(picturesOf(straight), pathOf(block, 0.0, 0.12)));
+  EXPECT_FALSE(clockOffset(picturesOf(straight), coursePathOf(straight, 0.0, 0.12)));
+  EXPECT_FALSE(clockOffset(picturesOf(block), coursePathOf(straight, 0.0, 0.12)));
+  EXPECT_FALSE(clockOffset(picturesOf(straight), coursePathOf(block, 0.0, 0.12)));
 }
 
 TEST(ClockOffset, IsNothingForPicturesOfAnotherDrive) {
@@ -81,32 +81,32 @@ TEST(ClockOffset, IsNothingForPicturesOfAnotherDrive) {
     const double along_m = test::kSpeed * time_s;
     return Eigen::Vector2d(along_m, 8.0 * std::sin(along_m / 11.0) + 5.0 * std::cos(along_m / 17.0));
   };
-  EXPECT_FALSE(clockOffset(picturesOf(block), pathOf(other, 0.0, 0.12)));
-  EXPECT_FALSE(clockOffset(picturesOf(other), pathOf(block, 0.0, 0.12)));
+  EXPECT_FALSE(clockOffset(picturesOf(block), coursePathOf(other, 0.0, 0.12)));
+  EXPECT_FALSE(clockOffset(picturesOf(other), coursePathOf(block, 0.0, 0.12)));
 }
 
 TEST(ClockOffset, IsNothingBeyondItsReach) {
-  EXPECT_FALSE(clockOffset(picturesOf(block), pathOf(block, 45.0, 0.05)));
-  EXPECT_FALSE(clockOffset(picturesOf(block), pathOf(block, 3600.0, 0.05)));
+  EXPECT_FALSE(clockOffset(picturesOf(block), coursePathOf(block, 45.0, 0.05)));
+  EXPECT_FALSE(clockOffset(picturesOf(block), coursePathOf(block, 3600.0, 0.05)));
 }
 
 TEST(ClockOffset, SeesPicturesThatTurnTheWrongWay) {
   auto mirrored = picturesOf(block);
   for (PictureShift& picture : mirrored) picture.shift.x() *= -1.0;
-  const auto found = clockOffset(mirrored, pathOf(block, 0.0, 0.05));
+  const auto found = clockOffset(mirrored, coursePathOf(block, 0.0, 0.05));
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->width_rad, -kWidth_rad, 0.1);
 }
 
 TEST(ClockOffset, FindsTurnsInPortraitImages) {
-  const auto found = clockOffset(picturesOf(block, kPi / 2.0), pathOf(block, 2.0, 0.02));
+  const auto found = clockOffset(picturesOf(block, kPi / 2.0), coursePathOf(block, 2.0, 0.02));
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->along_rows);
   EXPECT_NEAR(found->offset_s, 2.0, 0.1);
 }
 
 TEST(ClockOffset, IsNothingForFewImages) {
-  EXPECT_FALSE(clockOffset({}, pathOf(block, 0.0, 0.05)));
+  EXPECT_FALSE(clockOffset({}, coursePathOf(block, 0.0, 0.05)));
   EXPECT_FALSE(clockOffset(picturesOf(block), {}));
 }
 

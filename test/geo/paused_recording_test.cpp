@@ -1,8 +1,7 @@
-#include "geo/trajectory_parts.h"
-
 #include <gtest/gtest.h>
 
 #include "test/geo/recorded_round.h"
+#include "visual_localization/geo/trajectory_cleaner.h"
 
 namespace visual_localization {
 namespace {
@@ -10,7 +9,7 @@ namespace {
 constexpr double kRound_s = 400.0;
 
 CleanedTrajectory cleanParts(const std::vector<Fix>& fixes) {
-  return cleanInParts(fixes, LocalFrame(test::kDatum), TrajectoryCleanerConfig());
+  return cleanTrajectory(fixes, LocalFrame(test::kDatum), TrajectoryCleanerConfig());
 }
 
 /// The second half so much later.
@@ -22,7 +21,7 @@ std::vector<Fix> pausedFor(double pause_s) {
   return fixes;
 }
 
-TEST(TrajectoryParts, AreBothKept) {
+TEST(PausedRecording, AreBothKept) {
   for (const double pause_s : {100.0, 3600.0}) {
     const std::vector<Fix> fixes = pausedFor(pause_s);
     const CleanedTrajectory cleaned = cleanParts(fixes);
@@ -38,7 +37,7 @@ TEST(TrajectoryParts, AreBothKept) {
   }
 }
 
-TEST(TrajectoryParts, AreTheWholeWithoutAPause) {
+TEST(PausedRecording, AreTheWholeWithoutAPause) {
   const std::vector<Fix> fixes = test::record(test::block, kRound_s);
   const CleanedTrajectory parts = cleanParts(fixes);
   const CleanedTrajectory whole = test::clean(fixes);
@@ -46,16 +45,16 @@ TEST(TrajectoryParts, AreTheWholeWithoutAPause) {
   EXPECT_EQ(parts.trajectory.points().size(), whole.trajectory.points().size());
 }
 
-TEST(TrajectoryParts, LeaveOutAPartThatIsNoPath) {
+TEST(PausedRecording, APathEndsWhereASingleFixFollowsAPause) {
   std::vector<Fix> fixes = test::record(test::block, kRound_s);
   fixes.push_back(fixes.back());
   fixes.back().stamp_ns = test::stampOf(5000.0);
   const CleanedTrajectory cleaned = cleanParts(fixes);
-  EXPECT_EQ(cleaned.verdicts.back(), FixVerdict::kSpike);
+  EXPECT_FALSE(cleaned.trajectory.at(test::stampOf(4000.0)));
   EXPECT_GT(test::countOf(cleaned, FixVerdict::kKept), fixes.size() * 97 / 100);
 }
 
-TEST(TrajectoryParts, AreRefusedWhenNoneIsAPath) {
+TEST(PausedRecording, AreRefusedWhenNoneIsAPath) {
   std::vector<Fix> fixes = test::record(test::block, 1.0);
   fixes.resize(2);
   fixes[1].stamp_ns += 1'000'000'000'000;
