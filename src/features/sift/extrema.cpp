@@ -199,9 +199,11 @@ HWY_EXPORT(searchImpl);
 
 SiftExtremaSearch::SiftExtremaSearch(const SiftConfig& config) {
   work_.levels = config.octave_layers + 2;
-  // Half of the threshold for interpolated extrema, which are stronger; in whole grey values, as in OpenCV.
+  // Half of the threshold for interpolated extrema, which are stronger; in whole grey values, as in OpenCV, unless that
+  // is none: every pixel of a blank wall would be a candidate.
   constexpr double kShare = 0.5;
-  work_.threshold = static_cast<float>(std::floor(kShare * config.contrast_threshold / config.octave_layers * 255.0));
+  const double grey_values = kShare * config.contrast_threshold / config.octave_layers * 255.0;
+  work_.threshold = static_cast<float>(grey_values < 1.0 ? grey_values : std::floor(grey_values));
 }
 
 void SiftExtremaSearch::begin(int width) {
