@@ -9,7 +9,7 @@
 
 #include "base/text.h"
 #include "node/stamps.h"
-#include "ros/message_readers.h"
+#include "ros/static_transforms.h"
 
 namespace visual_localization {
 namespace {

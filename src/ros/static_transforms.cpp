@@ -46,15 +46,32 @@ std::string withoutSlash(const std::string& frame) {
   return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
 }
 
+bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform) {
+  constexpr std::size_t kLongestName = 255;
+  const std::string& parent = transform.header.frame_id;
+  const std::string& child = transform.child_frame_id;
+  return !parent.empty() && !child.empty() && parent != child && parent.size() <= kLongestName &&
+         child.size() <= kLongestName;
+}
+
+bool StaticTransforms::isFull(const std::string& parent, const std::string& child) {
+  for (const std::string& name : {parent, child}) {
+    if (names_.count(name) != 0) continue;
+    if (names_.size() >= kMostFrames) return true;
+    names_.insert(name);
+  }
+  return false;
+}
+
 void StaticTransforms::add(const tf2_msgs::TFMessage& message) { add(message, true); }
 
 void StaticTransforms::addPublished(const tf2_msgs::TFMessage& message) { add(message, false); }
 
 void StaticTransforms::add(const tf2_msgs::TFMessage& message, bool is_static) {
-  for (const geometry_msgs::TransformStamped& transform : message.transforms) {
-    const std::string parent = withoutSlash(transform.header.frame_id);
-    const std::string child = withoutSlash(transform.child_frame_id);
-    if (parent.empty() || child.empty() || parent == child) continue;
+  for (geometry_msgs::TransformStamped transform : message.transforms) {
+    const std::string parent = transform.header.frame_id = withoutSlash(transform.header.frame_id);
+    const std::string child = transform.child_frame_id = withoutSlash(transform.child_frame_id);
+    if (!joinsTwoFrames(transform) || isFull(parent, child)) continue;
     has_static_ = has_static_ || is_static;
     const std::string name = framed(parent) + " to " + framed(child);
     std::string trouble = troubleOf(transform.transform);

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 #include <Eigen/Geometry>
+#include <geometry_msgs/TransformStamped.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include "visual_localization/geometry/camera_pose.h"
@@ -13,6 +16,12 @@ namespace visual_localization {
 
 /// tf2 knows frames without the slash that tf gave them.
 std::string withoutSlash(const std::string& frame);
+
+/// Of a robot; it has tens or hundreds. Frames beyond are left out: whoever publishes them may never end.
+constexpr std::size_t kMostFrames = 4096;
+
+/// Whether it names two frames, by names of a length that names have.
+bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform);
 
 /// Where the parts of a robot are that do not move, as /tf_static tells, and /tf by what never changes. Unlike a buffer
 /// of tf2 it knows why a frame has no place: nothing that contradicts itself is believed. Not thread-safe.
@@ -40,10 +49,12 @@ class StaticTransforms {
     std::string trouble = {};  ///< why it is not believed; empty: it is
   };
   void add(const tf2_msgs::TFMessage& message, bool is_static);
+  bool isFull(const std::string& parent, const std::string& child);
   std::optional<Eigen::Isometry3d> toRoot(std::string frame, std::string& root) const;
   std::string troubleAbove(const std::string& frame) const;
 
   std::map<std::string, Link> links_;  ///< by child
+  std::set<std::string> names_;
   bool has_static_ = false;
 };
 

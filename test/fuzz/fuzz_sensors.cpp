@@ -11,6 +11,7 @@
 #include "bag/bag_messages.h"
 #include "node/robot_transforms.h"
 #include "ros/message_readers.h"
+#include "ros/static_transforms.h"
 #include "test/fuzz/fuzz_support.h"
 
 namespace visual_localization {

@@ -9,7 +9,7 @@
 #include <tf2/exceptions.h>
 
 #include "node/stamps.h"
-#include "ros/message_readers.h"
+#include "ros/static_transforms.h"
 
 namespace visual_localization {
 namespace {
