@@ -76,9 +76,10 @@ class ProgramsTest(ProgramTest):
         self.assert_refused(result, 2, "--preset: preset 'thesis' is not allowed: must be one of paper")
 
     def test_same_seed_gives_the_same_track_another_seed_another_one(self):
-        first = positions(self.localize('--seed', 5, bag=self.short))
-        self.assertEqual(first, positions(self.localize('--seed', 5, bag=self.short)))
-        self.assertNotEqual(first, positions(self.localize('--seed', 6, bag=self.short)))
+        swarm = ('--tracker', 'dpso', '--pose-source', 'place')  # the Bayes filter draws nothing that moves its pose
+        first = positions(self.localize('--seed', 5, *swarm, bag=self.short))
+        self.assertEqual(first, positions(self.localize('--seed', 5, *swarm, bag=self.short)))
+        self.assertNotEqual(first, positions(self.localize('--seed', 6, *swarm, bag=self.short)))
 
     def test_start_index_wraps_around_the_drive(self):
         rows = self.localize('--start-index', 400, '--config', CONFIG)

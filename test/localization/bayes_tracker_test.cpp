@@ -44,8 +44,12 @@ TEST(BayesTracker, ComparesAsManyAsIsSaid) {
     TrackerInput input = world.from(onCircle(0.94 * step));
     tracker.update(input);
     const std::size_t comparisons = input.scores.comparisons();
-    if (step == 0) EXPECT_EQ(comparisons, 200u);
-    if (step >= 10) EXPECT_LE(comparisons, 40u) << step;
+    if (step == 0) {
+      EXPECT_EQ(comparisons, 200U);
+    }
+    if (step >= 10) {
+      EXPECT_LE(comparisons, 40U) << step;
+    }
   }
 }
 

@@ -248,7 +248,8 @@ TEST_F(RecognisedPlace, TheVelocityAloneDoesNotLeadFarFromTheParticles) {
 TEST_F(DriveWithOdometry, NoReadingsNoDifference) {
   test::StreetMap other;
   const auto image = std::make_shared<GivenImage>(other.map());
-  Localizer without(std::shared_ptr<const TrainingMap>(std::shared_ptr<void>(), &other.map()), {}, image);
+  Localizer without(std::shared_ptr<const TrainingMap>(std::shared_ptr<void>(), &other.map()), test::swarmConfig(),
+                    image);
   localizer_->addOdometry({0, {0.0, 0.0}, 0.0});  // long before the images: of no use
   for (std::size_t i = 2; i <= 20; ++i) {
     const Estimate with = i % 5 == 0 ? seeNothing(i) : see(i);

@@ -179,9 +179,11 @@ TEST(PaperDpso, RecoveryLeavesAnyPerturbationAloneUnlessToldToRaiseIt) {
 
 TEST(PaperDpso, ThePresetIsAConfiguration) {
   LocalizerConfig config = test::swarmConfig();
-  config.tracker = "pf_linear";
+  config.tracker = "bayes";
+  config.seed = 7;
   assignParameters(config, presetValues("paper"));
-  EXPECT_EQ(config.tracker, "pf_linear") << "what it does not name stays";
+  EXPECT_EQ(config.tracker, "dpso") << "the papers have no Bayes filter";
+  EXPECT_EQ(config.seed, 7) << "what it does not name stays";
   EXPECT_EQ(config.dpso.confine, "none");
   EXPECT_EQ(config.dpso.speed_limit, "norm");
   EXPECT_EQ(config.dpso.speed_of, "all");

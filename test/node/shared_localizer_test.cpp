@@ -11,6 +11,7 @@
 
 #include "test/node/small_map.h"
 #include "test/support/stamps.h"
+#include "test/support/swarm_config.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -25,7 +26,7 @@ cv::Mat noise() {
 }
 
 TEST(SharedLocalizer, WithoutMapThereIsNoResult) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   EXPECT_FALSE(localizer.process(kSecond_ns, noise()).has_value());
   EXPECT_FALSE(localizer.relocalizeAnywhere());
   EXPECT_FALSE(localizer.relocalizeAround({0.0, 0.0}, 5.0));
@@ -33,7 +34,7 @@ TEST(SharedLocalizer, WithoutMapThereIsNoResult) {
 }
 
 TEST(SharedLocalizer, WithMapEveryImageHasAResult) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
   const auto result = localizer.process(kSecond_ns, noise());
   ASSERT_TRUE(result.has_value());
@@ -61,7 +62,7 @@ TEST(SharedLocalizer, AMaskHoldsForTheMapThatComesLaterAndForTheNext) {
 }
 
 TEST(SharedLocalizer, AGuessWaitsForTheMap) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   const SharedLocalizer::Guess guess{{2.0, 20.0}, Eigen::Matrix2d::Zero()};
   EXPECT_FALSE(localizer.relocalizeAt(guess));
   localizer.setMap(test::smallMap());
@@ -74,7 +75,7 @@ TEST(SharedLocalizer, AGuessWaitsForTheMap) {
 }
 
 TEST(SharedLocalizer, AGuessThatIsNoneIsRefusedAndNotKept) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(localizer.relocalizeAt({{kNan, 0.0}, Eigen::Matrix2d::Identity()}), std::invalid_argument);
   EXPECT_THROW(localizer.relocalizeAt({{0.0, 0.0}, -Eigen::Matrix2d::Identity()}), std::invalid_argument);
@@ -83,7 +84,7 @@ TEST(SharedLocalizer, AGuessThatIsNoneIsRefusedAndNotKept) {
 
 /// The reason for refusing a disc in the small map; empty when it was searched.
 std::string refusalOfDisc(const Eigen::Vector2d& centre_m, double radius_m) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
   try {
     EXPECT_TRUE(localizer.relocalizeAround(centre_m, radius_m));
@@ -111,7 +112,7 @@ TEST(SharedLocalizer, ADiscMustTouchTheMap) {
 }
 
 TEST(SharedLocalizer, AnUnusableImageChangesNothing) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
   EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat()), std::invalid_argument);
   EXPECT_THROW(localizer.process(kSecond_ns, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
@@ -126,7 +127,7 @@ std::vector<Eigen::Vector2d> cloudOf(const std::optional<SharedLocalizer::Result
 }
 
 TEST(SharedLocalizer, ARepeatedImageGetsTheAnswerItHad) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
   const cv::Mat image = noise();
   localizer.process(kSecond_ns, noise());
@@ -137,7 +138,7 @@ TEST(SharedLocalizer, ARepeatedImageGetsTheAnswerItHad) {
 }
 
 TEST(SharedLocalizer, ARepeatedImageIsLookedAtAnewAfterARelocalization) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
   const cv::Mat image = noise();
   const auto first = localizer.process(kSecond_ns, image);
@@ -147,8 +148,8 @@ TEST(SharedLocalizer, ARepeatedImageIsLookedAtAnewAfterARelocalization) {
 }
 
 TEST(SharedLocalizer, ParametersHoldForThisMapAndForTheNext) {
-  SharedLocalizer localizer{LocalizerConfig{}};
-  LocalizerConfig config;
+  SharedLocalizer localizer{test::swarmConfig()};
+  LocalizerConfig config = test::swarmConfig();
   config.dpso.particles = 40;
   localizer.setMap(test::smallMap());
   localizer.configure(config);
@@ -161,7 +162,7 @@ TEST(SharedLocalizer, ParametersHoldForThisMapAndForTheNext) {
 }
 
 TEST(SharedLocalizer, ParametersAndMapsMayChangeWhileImagesAreProcessed) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
   std::atomic<bool> done{false};
   std::thread replacer([&] {
@@ -182,7 +183,7 @@ TEST(SharedLocalizer, ParametersAndMapsMayChangeWhileImagesAreProcessed) {
 }
 
 TEST(SharedLocalizer, MapsMayBeReplacedWhileImagesAreProcessed) {
-  SharedLocalizer localizer{LocalizerConfig{}};
+  SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
   std::atomic<bool> done{false};
   std::thread replacer([&] {
