@@ -149,7 +149,7 @@ class CameraTest(unittest.TestCase):
                          'there is no pose without news')
         images = self.drive_until_tracking()
         print('TRACKING %d images after the frozen ones' % images)
-        self.assertGreaterEqual(images, 4)
+        self.assertLessEqual(images, 4, 'the filter still knows where the robot was')
         self.check_localised('after the frozen ones', self.drive(5), most_lost=1)
         self.diagnostics.wait_for('images', self.diagnostics.OK, DEADLINE_S)
 
