@@ -212,8 +212,11 @@ std::vector<std::string> disagreementsOf(const MapBuildReport& report, const std
     }
   }
   for (const SessionImages& session : report.session_images) {
-    if (!session.geometry.contradicts_calibration) continue;
-    found.push_back(session.name + ": images, fixes and calibration disagree, so it has places only");
+    if (session.geometry.contradicts_calibration) {
+      found.push_back(session.name + ": images and calibration disagree, so it has places only");
+    } else if (session.geometry.contradicts_fixes) {
+      found.push_back(session.name + ": images and fixes disagree, so it has places only");
+    }
   }
   return found;
 }
