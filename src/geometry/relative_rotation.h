@@ -42,7 +42,7 @@ struct RelativeRotation {
 struct Mounting {
   /// Of the camera, turned against a level one that looks where the robot does.
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d sigma_rad{0.2, 0.5, 0.02};  ///< about the axes of the camera
+  Eigen::Vector3d sigma_rad{0.5, 0.5, 0.02};  ///< about the axes of the camera
 };
 
 /// As somebody said that it is: known better in roll than in pitch, and least in yaw (of the robot).
