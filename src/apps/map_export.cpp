@@ -322,7 +322,7 @@ std::string ColmapModel::image(std::size_t i) {
   const auto session = static_cast<std::size_t>(map_.pose(i).session);
   const auto geometry = map_.geometry(i);
   if (!geometry || !map_.header().sessions[session].camera) return "";
-  const auto sift = map_.sift(i);
+  const auto sift = map_.local(i);
   if (sift->size() != map_.featureCount(i)) {
     throw std::runtime_error("the features of image " + std::to_string(i) + " cannot be read (see --check)");
   }
@@ -351,11 +351,11 @@ std::string ColmapModel::points() {
   return out.str();
 }
 
-void ColmapModel::addFeatures(std::size_t i, const SiftFeatures& sift, const ImageGeometry& geometry,
+void ColmapModel::addFeatures(std::size_t i, const LocalFeatures& sift, const ImageGeometry& geometry,
                               std::ostream& out) {
   auto landmark = geometry.landmarks.begin();
   for (std::size_t f = 0; f < sift.size(); ++f) {
-    const SiftKeypoint& at = sift.keypoints()[f];
+    const Keypoint& at = sift.keypoints()[f];
     const bool seen = landmark != geometry.landmarks.end() && landmark->feature == f;
     out << (f == 0 ? "" : " ") << at.x_px + kColmapPixel << ' ' << at.y_px + kColmapPixel << ' '
         << (seen ? std::to_string(landmark->id) : "-1");
@@ -364,8 +364,7 @@ void ColmapModel::addFeatures(std::size_t i, const SiftFeatures& sift, const Ima
   out << '\n';
 }
 
-void ColmapModel::addSighting(std::size_t i, const SiftKeypoint& at, const CameraPose& pose,
-                              const SeenLandmark& landmark) {
+void ColmapModel::addSighting(std::size_t i, const Keypoint& at, const CameraPose& pose, const SeenLandmark& landmark) {
   Point& point = points_[landmark.id];
   if (point.track.empty()) point.position_m = pose.position_m + landmark.offset_m.cast<double>();
   const CameraModel& camera = *map_.header().sessions[static_cast<std::size_t>(map_.pose(i).session)].camera;

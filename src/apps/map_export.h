@@ -45,8 +45,8 @@ class ColmapModel {
     std::string track;              ///< for each sighting the image and its feature
   };
 
-  void addFeatures(std::size_t i, const SiftFeatures& sift, const ImageGeometry& geometry, std::ostream& out);
-  void addSighting(std::size_t i, const SiftKeypoint& at, const CameraPose& pose, const SeenLandmark& landmark);
+  void addFeatures(std::size_t i, const LocalFeatures& sift, const ImageGeometry& geometry, std::ostream& out);
+  void addSighting(std::size_t i, const Keypoint& at, const CameraPose& pose, const SeenLandmark& landmark);
 
   const TrainingMap& map_;
   std::vector<std::string> folders_;

@@ -99,9 +99,11 @@ void printFile(std::ostream& out, const std::string& path, const TrainingMap& ma
       << key("datum") << std::setprecision(9) << header.datum.latitude_deg << " deg, " << header.datum.longitude_deg
       << " deg, " << header.datum.altitude_m << " m; positions below are metres (east, north) from it\n"
       << key("images") << map.size() << " of " << header.image_size.width << 'x' << header.image_size.height << " px\n"
-      << key("sift") << std::setprecision(6) << header.sift.octave_layers << " layers, contrast "
-      << header.sift.contrast_threshold << ", edge " << header.sift.edge_threshold << ", sigma " << header.sift.sigma_px
-      << " px, at most " << header.sift.mostFeatures() << " features\n";
+      << key("features") << header.kind->name() << ", " << header.kind->form().dimension << " elements";
+  for (const auto& [name, value] : header.kind->parameters()) {
+    out << ", " << name.substr(name.find('/') + 1) << ' ' << parameters::toString(value);
+  }
+  out << '\n';
 }
 
 void printHistory(std::ostream& out, const std::vector<std::string>& history) {

@@ -99,6 +99,13 @@ std::string oneLine(const std::string& text, std::size_t most) {
   return line;
 }
 
+std::string upperCase(std::string text) {
+  for (char& character : text) {
+    if (character >= 'a' && character <= 'z') character = static_cast<char>(character - 'a' + 'A');
+  }
+  return text;
+}
+
 std::string csvQuoted(const std::string& text) { return quoted(csvText(text)); }
 
 std::string csvField(const std::string& text) {

@@ -36,6 +36,9 @@ std::string joined(const Texts& texts, const std::string& separator = ", ") {
   return all;
 }
 
+/// In capital letters, those of ASCII.
+std::string upperCase(std::string text);
+
 /// Foreign text as a field of a CSV file, in quotes (RFC 4180): as oneLine() shows it, and with an apostrophe in front
 /// where a spreadsheet would run it as a formula.
 std::string csvQuoted(const std::string& text);

@@ -95,7 +95,7 @@ class Aligner {
       const TrainingPose at = map_.pose(images_[camera]);
       const auto& model = map_.header().sessions[static_cast<std::size_t>(at.session)].camera;
       if (!model) continue;
-      const auto features = map_.sift(images_[camera]);
+      const auto features = map_.local(images_[camera]);
       verifier.startImage(at.stamp_ns, *features, *model);
       const auto pose = verifier.nearOneOf({*anchor});
       if (!pose) continue;
@@ -233,10 +233,6 @@ auto ageOf(const TrainingMap& map) {
   return std::pair(first_ns, std::move(names));
 }
 
-ParameterValues valuesOf(SiftConfig sift) {
-  return parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
-}
-
 void requireAlike(const NamedMap& first, const NamedMap& other) {
   const MapHeader& a = first.map->header();
   const MapHeader& b = other.map->header();
@@ -245,8 +241,12 @@ void requireAlike(const NamedMap& first, const NamedMap& other) {
     throw MergeError(other.name + ": its images are of " + text(b.image_size) + " pixels, those of " + first.name +
                      " of " + text(a.image_size));
   }
-  const ParameterValues ours = valuesOf(a.sift);
-  for (const auto& [name, value] : valuesOf(b.sift)) {
+  if (a.kind->name() != b.kind->name()) {
+    throw MergeError(other.name + ": its local features are '" + b.kind->name() + "', those of " + first.name + " '" +
+                     a.kind->name() + "'");
+  }
+  const ParameterValues ours = a.kind->parameters();
+  for (const auto& [name, value] : b.kind->parameters()) {
     if (value == ours.at(name)) continue;
     throw MergeError(other.name + ": its features were extracted with '" + name + "' = " + parameters::toString(value) +
                      ", those of " + first.name + " with " + parameters::toString(ours.at(name)));
@@ -291,7 +291,7 @@ class Merger {
  public:
   /// `target`: the path of a map, or a file that stays the caller's.
   template <class Target>
-  Merger(const Target& target, MapHeader header) : writer_(target), header_(std::move(header)) {
+  Merger(const Target& target, MapHeader header) : writer_(target, header.kind), header_(std::move(header)) {
     header_.sessions.clear();
     header_.history.clear();
   }

@@ -185,7 +185,7 @@ void writeSelection(const TrainingMap& map, const std::vector<bool>& keep, const
   if (std::find(keep.begin(), keep.end(), true) == keep.end()) throw MapEditError("no image would be left");
   auto [header, numbers] = remaining(map, keep);
   if (!edit.empty()) header.history.push_back(edit);
-  MapWriter writer(path);
+  MapWriter writer(path, header.kind);
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (keep[i]) {
       TrainingImage image = map.image(i);

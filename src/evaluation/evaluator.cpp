@@ -131,11 +131,11 @@ std::string trackCsvRow(const Estimate& estimate) {
   const std::optional<MetricPose>& metric = estimate.metric;
   out << secondsText(estimate.stamp_ns) << ',' << pose.position_m.x() << ',' << pose.position_m.y() << ','
       << pose.yaw_rad << ',' << pose.geodetic.latitude_deg << ',' << pose.geodetic.longitude_deg << ','
-      << toString(estimate.state) << ',' << estimate.tracked.best.similarity << ','
-      << toString(estimate.evidence.features) << ',' << estimate.comparisons << ',' << estimate.image.extract_ms << ','
-      << estimate.image.match_ms << ',' << estimate.update_ms << ',' << toString(estimate.source) << ','
-      << (metric ? metric->inliers : 0) << ',' << (metric ? metric->reprojection_px : 0.0) << ',' << estimate.sigma_m()
-      << ',' << estimate.sigmaYaw_rad() << ',' << estimate.swept << '\n';
+      << toString(estimate.state) << ',' << estimate.tracked.best.similarity << ',' << estimate.featuresName() << ','
+      << estimate.comparisons << ',' << estimate.image.extract_ms << ',' << estimate.image.match_ms << ','
+      << estimate.update_ms << ',' << toString(estimate.source) << ',' << (metric ? metric->inliers : 0) << ','
+      << (metric ? metric->reprojection_px : 0.0) << ',' << estimate.sigma_m() << ',' << estimate.sigmaYaw_rad() << ','
+      << estimate.swept << '\n';
   return out.str();
 }
 

@@ -281,7 +281,7 @@ std::vector<PairSpec> readPairs(YamlMap& yaml, const std::vector<RoundSpec>& rou
 MapBuilderConfig placesOnly() {
   MapBuilderConfig config;
   config.geometry.enabled = false;
-  config.sift = SiftConfig();
+  config.local.choose(Sift());
   config.prune = true;
   return config;
 }

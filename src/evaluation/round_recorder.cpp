@@ -78,9 +78,12 @@ void forEachImage(const BagReader& bag, const std::string& topic,
 class DriveRecorder {
  public:
   /// `image_size`: of most images. `for_poses`: keeps features that are not pruned.
-  DriveRecorder(const SiftConfig& sift, const LocalizerConfig& config, Pruning pruning, cv::Size image_size,
-                bool for_poses)
-      : sift_(sift), config_(config), by_both_(config.prune && pruning == Pruning::kBoth), for_poses_(for_poses) {
+  DriveRecorder(std::shared_ptr<const LocalFeatureKind> kind, const LocalizerConfig& config, Pruning pruning,
+                cv::Size image_size, bool for_poses)
+      : kind_(std::move(kind)),
+        config_(config),
+        by_both_(config.prune && pruning == Pruning::kBoth),
+        for_poses_(for_poses) {
     config_.prune = config.prune && pruning == Pruning::kPrevious;
     drive_.image_size = image_size;
   }
@@ -89,17 +92,17 @@ class DriveRecorder {
     if (!front_end_) {
       MapHeader like_the_map;
       like_the_map.image_size = drive_.image_size;
-      like_the_map.sift = sift_;
+      like_the_map.kind = kind_;
       front_end_.emplace(frontEndConfigOf(config_, like_the_map));
     }
     front_end_->setImage(stamp_ns, grey);
     const CpuStopwatch sift_watch;
-    DriveImage image{stamp_ns, truth, front_end_->sift(), {}, {}};
+    DriveImage image{stamp_ns, truth, front_end_->local(), {}, {}};
     drive_.sift_ms += sift_watch.elapsed_ms();
     const CpuStopwatch global_watch;
     image.global = front_end_->global();
     drive_.global_ms += global_watch.elapsed_ms();
-    if (for_poses_ || by_both_) image.unpruned = front_end_->unprunedSift();
+    if (for_poses_ || by_both_) image.unpruned = front_end_->unprunedLocal();
     drive_.images.push_back(std::move(image));
   }
 
@@ -119,7 +122,7 @@ class DriveRecorder {
   }
 
  private:
-  SiftConfig sift_;
+  std::shared_ptr<const LocalFeatureKind> kind_;
   LocalizerConfig config_;
   bool by_both_;
   bool for_poses_;
@@ -179,7 +182,7 @@ std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpe
   const Truth truth = truthOf(bag, recording, map.trajectory);
   const std::optional<CameraModel> camera = for_poses ? cameraOf(bag, recording) : std::nullopt;
   const cv::Size usual_size = bag.images(recording.image_topic).usualSize();
-  DriveRecorder recorder(map.sift, front_end, recording.pruning, usual_size, for_poses);
+  DriveRecorder recorder(map.local.chosen().clone(), front_end, recording.pruning, usual_size, for_poses);
   forEachImage(bag, recording.image_topic,
                [&](std::int64_t stamp_ns, const cv::Mat& grey) { recorder.add(stamp_ns, grey, truth(stamp_ns)); });
   auto drive = std::make_shared<Drive>(recorder.finish());

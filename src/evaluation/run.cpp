@@ -167,7 +167,7 @@ namespace {
 struct Verdict {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< in the map frame
   double confidence = 0.0;                               ///< the larger the surer
-  FeatureKind features = FeatureKind::kSift;
+  FeatureKind features = FeatureKind::kLocal;
   std::size_t comparisons = 0;       ///< training images compared
   std::optional<Estimate> estimate;  ///< of a tracker, for tracing
 };
@@ -238,7 +238,7 @@ class RecogniserContestant final : public Contestant {
                        std::shared_ptr<RecordedImage> image)
       : map_(std::move(map)),
         image_(std::move(image)),
-        features_(method.localizer.features == "global" ? FeatureKind::kGlobal : FeatureKind::kSift),
+        features_(method.localizer.features == "global" ? FeatureKind::kGlobal : FeatureKind::kLocal),
         recogniser_(makePlaceRecogniser(method.tracker, method.recogniser, closed)) {}
 
   Verdict process(std::int64_t) override {
@@ -309,7 +309,7 @@ StepRecord stepOf(const Verdict& verdict) {
   StepRecord step;
   step.confidence = static_cast<float>(verdict.confidence);
   step.comparisons = static_cast<std::uint32_t>(verdict.comparisons);
-  step.sift = verdict.features == FeatureKind::kSift;
+  step.sift = verdict.features == FeatureKind::kLocal;
   if (!verdict.estimate) return step;
   step.state = verdict.estimate->state;
   step.source = verdict.estimate->source;

@@ -16,7 +16,7 @@
 #include "base/parallel.h"
 #include "base/text.h"
 #include "base/time.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
 
 namespace visual_localization {
 namespace {
@@ -125,12 +125,12 @@ struct RowTimes {
   double global_ms = 0.0;
 };
 
-RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimilarity& sift,
+RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const LocalSimilarity& sift,
                  const GlobalSimilarity& global, ScoreTable::Entry* row) {
   RowTimes times;
   const CpuStopwatch sift_watch;
   for (std::size_t i = 0; i < map.size(); ++i) {
-    const Score score = sift.compare(image.sift, *map.sift(i));
+    const Score score = sift.compare(image.local, *map.local(i));
     row[i].sift = score.similarity;
     row[i].matches = static_cast<std::uint32_t>(score.matches);
     row[i].scale = static_cast<float>(score.scale);
@@ -143,7 +143,7 @@ RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const SiftSimi
 }
 
 bool isRepetition(const DriveImage& image, const DriveImage& before) {
-  return image.unpruned->descriptors() == before.unpruned->descriptors();
+  return image.unpruned->bytes() == before.unpruned->bytes();
 }
 
 }  // namespace
@@ -152,10 +152,10 @@ void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_rat
   for (std::size_t i = 0; i < images.size(); ++i) {
     DriveImage& image = images[i];
     if (i > 0 && isRepetition(image, images[i - 1])) {
-      image.sift = images[i - 1].sift;
+      image.local = images[i - 1].local;
       continue;
     }
-    std::vector<const SiftFeatures*> neighbours;
+    std::vector<const LocalFeatures*> neighbours;
     const auto add = [&](const DriveImage& other) {
       constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
       const double gap_s = std::abs(secondsBetween(other.stamp_ns, image.stamp_ns));
@@ -165,16 +165,16 @@ void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_rat
     std::size_t next = i + 1;
     while (next < images.size() && isRepetition(images[next], image)) ++next;
     if (next < images.size()) add(images[next]);
-    image.sift = neighbours.empty() ? *image.unpruned : keepSeenIn(*image.unpruned, neighbours, max_angle_ratio);
+    image.local = neighbours.empty() ? *image.unpruned : keepSeenIn(*image.unpruned, neighbours, max_angle_ratio);
   }
 }
 
 ScoreTable::ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads)
     : training_images_(map.size()), entries_(drive.images.size() * map.size()) {
   const SimilarityConfig config;  // what a similarity means is each method's own; the similarity itself is not
-  const SiftSimilarity sift(match, config, map.header().image_size.width);
+  const LocalSimilarity sift(match, config, map.header().image_size.width);
   const GlobalSimilarity global(config);
-  for (const DriveImage& image : drive.images) sift_features_.push_back(image.sift.size());
+  for (const DriveImage& image : drive.images) local_features_.push_back(image.local.size());
   std::vector<RowTimes> times(drive.images.size());
   parallelFor(drive.images.size(), threads, [&](std::size_t i) {
     times[i] = fillRow(drive.images[i], map, sift, global, &entries_[i * training_images_]);
@@ -189,7 +189,7 @@ RecordedImage::RecordedImage(const ScoreTable& table, const std::vector<std::siz
                              const MatchConfig& match, const SimilarityConfig& similarity)
     : table_(table), training_images_(training_images), sift_(match, similarity), global_(similarity) {}
 
-void RecordedImage::show(std::size_t drive_image, bool covered, const SiftFeatures* unpruned) {
+void RecordedImage::show(std::size_t drive_image, bool covered, const LocalFeatures* unpruned) {
   drive_image_ = drive_image;
   covered_ = covered;
   unpruned_ = unpruned;
@@ -198,13 +198,13 @@ void RecordedImage::show(std::size_t drive_image, bool covered, const SiftFeatur
   global_comparisons_ = 0;
 }
 
-const SiftFeatures* RecordedImage::unprunedSift() {
+const LocalFeatures* RecordedImage::unprunedLocal() {
   pose_was_asked_ = true;
   return covered_ ? nullptr : unpruned_;
 }
 
 void RecordedImage::configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) {
-  sift_ = SiftSimilarity(front_end.match, similarity);
+  sift_ = LocalSimilarity(front_end.match, similarity);
   global_ = GlobalSimilarity(similarity);
 }
 
@@ -220,7 +220,7 @@ const ScoreTable::Entry& RecordedImage::entry(std::size_t training_image) const 
 
 Score RecordedImage::compare(FeatureKind kind, std::size_t training_image) {
   const ScoreTable::Entry& known = entry(training_image);
-  if (kind == FeatureKind::kSift) {
+  if (kind == FeatureKind::kLocal) {
     ++sift_comparisons_;
     return sift_.scoreOf(known.sift, known.matches, static_cast<double>(known.scale));
   }
@@ -231,9 +231,9 @@ Score RecordedImage::compare(FeatureKind kind, std::size_t training_image) {
 void RecordedImage::row(FeatureKind kind, std::vector<double>& similarities) {
   similarities.resize(trainingImages());
   for (std::size_t i = 0; i < similarities.size(); ++i) {
-    similarities[i] = kind == FeatureKind::kSift ? entry(i).sift : entry(i).global;
+    similarities[i] = kind == FeatureKind::kLocal ? entry(i).sift : entry(i).global;
   }
-  (kind == FeatureKind::kSift ? sift_comparisons_ : global_comparisons_) += similarities.size();
+  (kind == FeatureKind::kLocal ? sift_comparisons_ : global_comparisons_) += similarities.size();
 }
 
 }  // namespace visual_localization

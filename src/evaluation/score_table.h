@@ -11,7 +11,7 @@
 
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/map/training_map.h"
@@ -36,9 +36,9 @@ Trajectory movedOnto(const Trajectory& positions, const Trajectory& poses);
 struct DriveImage {
   std::int64_t stamp_ns = 0;
   std::optional<TruePose> truth;  ///< absent when it has no true position
-  SiftFeatures sift;              ///< pruned as its round says
+  LocalFeatures local;            ///< pruned as its round says
   GlobalFeatures global;
-  std::optional<SiftFeatures> unpruned;  ///< all its SIFT features; only kept for methods that solve poses
+  std::optional<LocalFeatures> unpruned;  ///< all its SIFT features; only kept for methods that solve poses
 };
 
 /// A recorded round as images to localise.
@@ -80,7 +80,7 @@ class ScoreTable {
     return entries_[drive_image * training_images_ + training_image];
   }
   /// Number of SIFT features of an image of the drive.
-  std::size_t siftFeatures(std::size_t drive_image) const { return sift_features_[drive_image]; }
+  std::size_t siftFeatures(std::size_t drive_image) const { return local_features_[drive_image]; }
   /// Mean processor time of one comparison.
   double siftCompare_ms() const { return sift_compare_ms_; }
   double globalCompare_ms() const { return global_compare_ms_; }
@@ -88,7 +88,7 @@ class ScoreTable {
  private:
   std::size_t training_images_;
   std::vector<Entry> entries_;
-  std::vector<std::size_t> sift_features_;
+  std::vector<std::size_t> local_features_;
   double sift_compare_ms_ = 0.0;
   double global_compare_ms_ = 0.0;
 };
@@ -103,7 +103,7 @@ class RecordedImage final : public QueryImage {
 
   /// The next image. `covered`: nothing can be seen in it. `unpruned`: all its SIFT features, which must outlive it;
   /// null when they were not kept.
-  void show(std::size_t drive_image, bool covered, const SiftFeatures* unpruned = nullptr);
+  void show(std::size_t drive_image, bool covered, const LocalFeatures* unpruned = nullptr);
   /// Similarities to all training images.
   void row(FeatureKind kind, std::vector<double>& similarities);
   std::size_t siftComparisons() const { return sift_comparisons_; }
@@ -116,10 +116,10 @@ class RecordedImage final : public QueryImage {
   /// An image that a slow drive shows again counts as another one.
   bool isRepeated() const override { return false; }
   Score compare(FeatureKind kind, std::size_t training_image) override;
-  std::size_t siftFeatures() override { return covered_ ? 0 : table_.siftFeatures(drive_image_); }
+  std::size_t localFeatures() override { return covered_ ? 0 : table_.siftFeatures(drive_image_); }
   ImageReport report() const override { return {}; }
-  const SiftFeatures* sift() const override { return nullptr; }
-  const SiftFeatures* unprunedSift() override;
+  const LocalFeatures* local() const override { return nullptr; }
+  const LocalFeatures* unprunedLocal() override;
   void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) override;
 
  private:
@@ -128,11 +128,11 @@ class RecordedImage final : public QueryImage {
 
   const ScoreTable& table_;
   const std::vector<std::size_t>& training_images_;
-  SiftSimilarity sift_;
+  LocalSimilarity sift_;
   GlobalSimilarity global_;
   std::size_t drive_image_ = 0;
   bool covered_ = false;
-  const SiftFeatures* unpruned_ = nullptr;
+  const LocalFeatures* unpruned_ = nullptr;
   bool pose_was_asked_ = false;
   std::size_t sift_comparisons_ = 0;
   std::size_t global_comparisons_ = 0;

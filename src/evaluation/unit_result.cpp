@@ -97,7 +97,7 @@ std::string traceRow(const RunRecord& run, std::size_t step) {
   }
   out << ',' << (tuning.recovering ? 1 : 0) << ',' << estimate.tracked.spread_m.x() << ','
       << estimate.tracked.spread_m.y() << ',' << trace.diversity_m << ',' << estimate.tracked.best.similarity << ','
-      << estimate.comparisons << ',' << toString(estimate.evidence.features) << ',';
+      << estimate.comparisons << ',' << estimate.featuresName() << ',';
   if (tuning.speed_mps > 0.0) out << tuning.speed_mps;
   out << ',';
   const auto robot_mps = step > 0 ? robotSpeed_mps(run.trace[step - 1], trace) : std::nullopt;

@@ -45,12 +45,12 @@ class Column {
   std::vector<int> counts_;
 };
 
-void findDisplacements(const SiftFeatures& a, const SiftFeatures& b, double step_px,
+void findDisplacements(const LocalFeatures& a, const LocalFeatures& b, double step_px,
                        const std::vector<FeatureMatch>& matches, std::vector<Displacement>& found) {
   found.clear();
   for (const FeatureMatch& match : matches) {
-    const SiftKeypoint& from = a.keypoints()[match.a];
-    const SiftKeypoint& to = b.keypoints()[match.b];
+    const Keypoint& from = a.keypoints()[match.a];
+    const Keypoint& to = b.keypoints()[match.b];
     const float right_px = to.x_px - from.x_px;
     const double down = static_cast<double>(to.y_px - from.y_px) / step_px;
     if (!std::isfinite(right_px) || !(std::abs(down) < kFarthest * kSteps)) continue;
@@ -63,7 +63,7 @@ void findDisplacements(const SiftFeatures& a, const SiftFeatures& b, double step
 
 }  // namespace
 
-void keepLargestVote(const SiftFeatures& a, const SiftFeatures& b, double image_width_px,
+void keepLargestVote(const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
                      std::vector<FeatureMatch>& matches) {
   static thread_local std::vector<Displacement> displacements;
   static thread_local Column column;

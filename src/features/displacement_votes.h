@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/features/local_features.h"
 
 namespace visual_localization {
 
@@ -11,7 +11,7 @@ namespace visual_localization {
 /// kVoteBoxWidth x kVoteBoxHeight: the picture moved as a whole, as that of a place seen again does and chance does
 /// not. Of boxes with equally many the first one found. In order of a. Displacements down the image count in sixteenths
 /// of the box.
-void keepLargestVote(const SiftFeatures& a, const SiftFeatures& b, double image_width_px,
+void keepLargestVote(const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
                      std::vector<FeatureMatch>& matches);
 
 /// Shares of the image's width: 24 x 16 pixels of 640.

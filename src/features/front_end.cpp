@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/time.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
 
 namespace visual_localization {
 namespace {
@@ -60,18 +60,18 @@ const cv::Mat& withoutMasked(const cv::Mat& grey, const Mask& mask, cv::Mat& buf
   return buffer;
 }
 
-void dropMasked(const Mask& mask, SiftFeatures& features) {
+void dropMasked(const Mask& mask, LocalFeatures& features) {
   if (mask.empty()) return;
   std::vector<std::size_t> used;
   for (std::size_t i = 0; i < features.size(); ++i) {
-    const SiftKeypoint& keypoint = features.keypoints()[i];
+    const Keypoint& keypoint = features.keypoints()[i];
     if (mask.allows(keypoint.x_px, keypoint.y_px)) used.push_back(i);
   }
   if (used.size() < features.size()) features = features.subset(used);
 }
 
 FrontEnd::FrontEnd(const FrontEndConfig& config)
-    : config_(config), sift_extractor_(makeSiftExtractor(config.sift, config.sift_backend)) {}
+    : config_(config), local_extractor_(config.kind->makeExtractor(config.extractor)) {}
 
 void FrontEnd::configure(const FrontEndConfig& config) {
   config_.match = config.match;
@@ -98,19 +98,19 @@ void FrontEnd::takeImage(const cv::Mat& image) {
   std::swap(previous_, current_);
   if (!current_) current_ = Image{};
   image.copyTo(current_->grey);
-  current_->has_sift = false;
+  current_->has_local = false;
   has_pruned_ = false;
   global_.reset();
 }
 
-const SiftFeatures& FrontEnd::sift() {
+const LocalFeatures& FrontEnd::local() {
   if (has_pruned_) return pruned_;
   const Stopwatch stopwatch;
-  const SiftFeatures& all = unprunedSift(*current_);
+  const LocalFeatures& all = unprunedLocal(*current_);
   constexpr std::size_t kLeast = 2;  // an image without features confirms nothing
-  const bool prunable = config_.prune && previousIsClose() && unprunedSift(*previous_).size() >= kLeast;
+  const bool prunable = config_.prune && previousIsClose() && unprunedLocal(*previous_).size() >= kLeast;
   if (prunable) {
-    keepSeenIn(all, previous_->sift, config_.match.max_angle_ratio, pruned_);
+    keepSeenIn(all, previous_->local, config_.match.max_angle_ratio, pruned_);
   } else {
     pruned_ = all;
   }
@@ -127,19 +127,19 @@ const GlobalFeatures& FrontEnd::global() {
   return *global_;
 }
 
-const SiftFeatures& FrontEnd::unprunedSift() {
+const LocalFeatures& FrontEnd::unprunedLocal() {
   const Stopwatch stopwatch;
-  const SiftFeatures& all = unprunedSift(*current_);
+  const LocalFeatures& all = unprunedLocal(*current_);
   extract_ms_ += stopwatch.elapsed_ms();
   return all;
 }
 
-const SiftFeatures& FrontEnd::unprunedSift(Image& image) {
-  if (image.has_sift) return image.sift;
-  sift_extractor_->extract(image.grey, image.sift);
-  dropMasked(config_.mask, image.sift);
-  image.has_sift = true;
-  return image.sift;
+const LocalFeatures& FrontEnd::unprunedLocal(Image& image) {
+  if (image.has_local) return image.local;
+  local_extractor_->extract(image.grey, image.local);
+  dropMasked(config_.mask, image.local);
+  image.has_local = true;
+  return image.local;
 }
 
 bool FrontEnd::previousIsClose() const {

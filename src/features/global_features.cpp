@@ -11,7 +11,7 @@
 
 #include "base/numbers.h"
 #include "features/global_histograms.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 
 namespace visual_localization {
 namespace {

@@ -18,7 +18,7 @@ namespace HWY_NAMESPACE {
 namespace {
 
 #if HWY_TARGET == HWY_SCALAR
-void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+void findNearestImpl(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
   findNearestPlain(a, b, nearest);
 }
 #else
@@ -29,7 +29,7 @@ using Ints = hn::ScalableTag<std::int32_t>;
 using Floats = hn::ScalableTag<float>;
 using Shorts = hn::Repartition<std::int16_t, Ints>;
 
-constexpr std::size_t kBins = SiftFeatures::kDescriptorSize;
+constexpr std::size_t kBins = kPackedBytes;
 
 /// Descriptors of one image side by side, so that one vector instruction takes a step in as many scalar products as
 /// it has lanes: for each tile of that many descriptors, for each group of bins, the groups of all of them.
@@ -55,10 +55,10 @@ HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
 constexpr std::size_t kGroups = kBins / kGroup;
 
 /// `padded`: the number of features, filled up to whole tiles with zeros.
-void pack(const SiftFeatures& features, std::size_t lanes, std::size_t padded, Packed* to) {
+void pack(const LocalFeatures& features, std::size_t lanes, std::size_t padded, Packed* to) {
   static constexpr std::uint8_t kNone[kBins] = {};
   for (std::size_t i = 0; i < padded; ++i) {
-    const std::uint8_t* from = i < features.size() ? features.descriptor(i) : kNone;
+    const std::uint8_t* from = i < features.size() ? features.bytes(i) : kNone;
     Packed* tile = to + i / lanes * lanes * kBins + i % lanes * kGroup;
     for (std::size_t group = 0; group < kGroups; ++group) {
       packGroup(from + group * kGroup, tile + group * lanes * kGroup);
@@ -114,10 +114,12 @@ HWY_INLINE hn::Vec<Ints> total(hn::Vec<Ints> sum, hn::Vec<Ints> odd) {
 
 constexpr std::size_t kRows = 4;  ///< of B at a time: each load of a tile serves so many scalar products
 
+HWY_INLINE hn::Vec<Floats> toFloats(hn::Vec<Ints> sum) { return hn::ConvertTo(Floats(), sum); }
+
 /// Scalar products of kRows rows with `kTiles` tiles, one lane each: those of the first tile, then of the second. Two
 /// tiles at a time keep eight sums going, enough to hide how long one step takes.
 template <std::size_t kTiles>
-HWY_INLINE void multiply(const Row* rows, const Packed* tiles, hn::Vec<Ints>* products) {
+HWY_INLINE void multiply(const Row* rows, const Packed* tiles, std::size_t /*dimension*/, hn::Vec<Floats>* products) {
   const Ints ints;
   const std::size_t step = hn::Lanes(ints) * kGroup;
   const Packed* second = tiles + (kTiles - 1) * kGroups * step;
@@ -138,9 +140,55 @@ HWY_INLINE void multiply(const Row* rows, const Packed* tiles, hn::Vec<Ints>* pr
     t2 = multiplyAdd(r2, second, t2, p2);
     t3 = multiplyAdd(r3, second, t3, p3);
   }
-  products[0] = total(s0, o0), products[1] = total(s1, o1), products[2] = total(s2, o2), products[3] = total(s3, o3);
+  products[0] = toFloats(total(s0, o0)), products[1] = toFloats(total(s1, o1));
+  products[2] = toFloats(total(s2, o2)), products[3] = toFloats(total(s3, o3));
   if (kTiles == 1) return;
-  products[4] = total(t0, p0), products[5] = total(t1, p1), products[6] = total(t2, p2), products[7] = total(t3, p3);
+  products[4] = toFloats(total(t0, p0)), products[5] = toFloats(total(t1, p1));
+  products[6] = toFloats(total(t2, p2)), products[7] = toFloats(total(t3, p3));
+}
+
+/// Descriptors of floats side by side: for each tile of as many as there are lanes, for each element, that of all of
+/// them.
+void pack(const LocalFeatures& features, std::size_t lanes, std::size_t padded, float* to) {
+  const std::size_t dimension = features.form().dimension;
+  for (std::size_t i = 0; i < padded; ++i) {
+    float* tile = to + i / lanes * lanes * dimension + i % lanes;
+    for (std::size_t k = 0; k < dimension; ++k) tile[k * lanes] = i < features.size() ? features.floats(i)[k] : 0.0F;
+  }
+}
+
+struct FloatRow {
+  const float* elements = nullptr;
+  HWY_INLINE void set(const float* descriptor) { elements = descriptor; }
+};
+
+template <std::size_t kTiles>
+HWY_INLINE void multiply(const FloatRow* rows, const float* tiles, std::size_t dimension, hn::Vec<Floats>* products) {
+  const Floats floats;
+  const std::size_t step = hn::Lanes(floats);
+  const float* second = tiles + (kTiles - 1) * dimension * step;
+  hn::Vec<Floats> s0 = hn::Zero(floats), s1 = s0, s2 = s0, s3 = s0, t0 = s0, t1 = s0, t2 = s0, t3 = s0;
+  for (std::size_t k = 0; k < dimension; ++k, tiles += step, second += step) {
+    const auto r0 = hn::Set(floats, rows[0].elements[k]), r1 = hn::Set(floats, rows[1].elements[k]),
+               r2 = hn::Set(floats, rows[2].elements[k]), r3 = hn::Set(floats, rows[3].elements[k]);
+    const auto tile = hn::Load(floats, tiles);
+    s0 = hn::MulAdd(r0, tile, s0), s1 = hn::MulAdd(r1, tile, s1);
+    s2 = hn::MulAdd(r2, tile, s2), s3 = hn::MulAdd(r3, tile, s3);
+    if (kTiles == 1) continue;
+    const auto next = hn::Load(floats, second);
+    t0 = hn::MulAdd(r0, next, t0), t1 = hn::MulAdd(r1, next, t1);
+    t2 = hn::MulAdd(r2, next, t2), t3 = hn::MulAdd(r3, next, t3);
+  }
+  products[0] = s0, products[1] = s1, products[2] = s2, products[3] = s3;
+  if (kTiles == 1) return;
+  products[4] = t0, products[5] = t1, products[6] = t2, products[7] = t3;
+}
+
+HWY_INLINE const std::uint8_t* elementsOf(const LocalFeatures& features, std::size_t i, const Row*) {
+  return features.bytes(i);
+}
+HWY_INLINE const float* elementsOf(const LocalFeatures& features, std::size_t i, const FloatRow*) {
+  return features.floats(i);
 }
 
 /// The two nearest of each lane.
@@ -172,18 +220,23 @@ HWY_INLINE TwoNearest reduce(const Lanes& lanes) {
 }
 
 /// Memory that is kept from call to call.
+template <class Element>
 struct Workspace {
-  hwy::AlignedFreeUniquePtr<Packed[]> packed;
+  hwy::AlignedFreeUniquePtr<Element[]> packed;
   hwy::AlignedFreeUniquePtr<float[]> inverse_norms;
   hwy::AlignedFreeUniquePtr<float[]> best;
   hwy::AlignedFreeUniquePtr<float[]> second;
   hwy::AlignedFreeUniquePtr<std::int32_t[]> index;
   std::size_t capacity = 0;
+  std::size_t elements = 0;
 
-  void reserve(std::size_t count) {
+  void reserve(std::size_t count, std::size_t dimension) {
+    if (count * dimension > elements) {
+      elements = 2 * count * dimension;
+      packed = hwy::AllocateAligned<Element>(elements);
+    }
     if (count <= capacity) return;
     capacity = 2 * count;
-    packed = hwy::AllocateAligned<Packed>(capacity * kBins);
     inverse_norms = hwy::AllocateAligned<float>(capacity);
     best = hwy::AllocateAligned<float>(capacity);
     second = hwy::AllocateAligned<float>(capacity);
@@ -191,13 +244,15 @@ struct Workspace {
   }
 };
 
-void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+template <class RowOf, class Element>
+void findNearestOf(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
   const Floats floats;
   const Ints ints;
   const std::size_t lanes = hn::Lanes(ints);
   const std::size_t padded = (a.size() + lanes - 1) / lanes * lanes;
-  static thread_local Workspace work;
-  work.reserve(padded);
+  const std::size_t dimension = a.form().dimension;
+  static thread_local Workspace<Element> work;
+  work.reserve(padded, dimension);
   pack(a, lanes, padded, work.packed.get());
   for (std::size_t i = 0; i < padded; ++i) {
     work.inverse_norms[i] = i < a.size() ? a.inverseNorm(i) : 0.0F;
@@ -206,20 +261,20 @@ void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescri
   }
   nearest.of_a.resize(a.size());
   nearest.of_b.resize(b.size());
-  Row rows[kRows];
+  RowOf rows[kRows];
   for (std::size_t first = 0; first < b.size(); first += kRows) {
     const std::size_t count = HWY_MIN(kRows, b.size() - first);
-    for (std::size_t r = 0; r < count; ++r) rows[r].set(b.descriptor(first + r));
+    for (std::size_t r = 0; r < count; ++r) rows[r].set(elementsOf(b, first + r, rows));
+    for (std::size_t r = count; r < kRows; ++r) rows[r] = rows[0];
     Lanes of_row[kRows] = {noLanes(), noLanes(), noLanes(), noLanes()};
-    const auto offerTile = [&](std::size_t i, const hn::Vec<Ints>* products) HWY_ATTR {
+    const auto offerTile = [&](std::size_t i, const hn::Vec<Floats>* products) HWY_ATTR {
       const auto inverse_norms = hn::Load(floats, work.inverse_norms.get() + i);
       Lanes of_tile{hn::Load(floats, work.best.get() + i), hn::Load(floats, work.second.get() + i),
                     hn::Load(ints, work.index.get() + i)};
       const auto used = hn::FirstN(floats, a.size() - i);  // the last tile is filled up
       const auto indices = hn::Iota(ints, static_cast<std::int32_t>(i));
       for (std::size_t r = 0; r < count; ++r) {
-        const auto product = hn::Mul(hn::Mul(hn::ConvertTo(floats, products[r]), inverse_norms),
-                                     hn::Set(floats, b.inverseNorm(first + r)));
+        const auto product = hn::Mul(hn::Mul(products[r], inverse_norms), hn::Set(floats, b.inverseNorm(first + r)));
         const auto cosine = hn::IfThenElse(used, product, hn::Set(floats, -1.0F));
         of_row[r].offer(cosine, indices);
         of_tile.offer(cosine, hn::Set(ints, static_cast<std::int32_t>(first + r)));
@@ -228,21 +283,32 @@ void findNearestImpl(const SiftFeatures& a, const SiftFeatures& b, NearestDescri
       hn::Store(of_tile.second, floats, work.second.get() + i);
       hn::Store(of_tile.index, ints, work.index.get() + i);
     };
-    hn::Vec<Ints> products[2 * kRows];
+    hn::Vec<Floats> products[2 * kRows];
     std::size_t i = 0;
     for (; i + lanes < padded; i += 2 * lanes) {
-      multiply<2>(rows, work.packed.get() + i * kBins, products);
+      multiply<2>(rows, work.packed.get() + i * dimension, dimension, products);
       offerTile(i, products);
       offerTile(i + lanes, products + kRows);
     }
     if (i < padded) {
-      multiply<1>(rows, work.packed.get() + i * kBins, products);
+      multiply<1>(rows, work.packed.get() + i * dimension, dimension, products);
       offerTile(i, products);
     }
     for (std::size_t r = 0; r < count; ++r) nearest.of_b[first + r] = reduce(of_row[r]);
   }
   for (std::size_t i = 0; i < a.size(); ++i) {
     nearest.of_a[i] = {work.best[i], work.second[i], static_cast<std::uint32_t>(work.index[i])};
+  }
+}
+
+/// Bytes are multiplied by as many at a time as SIFT has.
+void findNearestImpl(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
+  if (a.form().element == DescriptorElement::kFloat) {
+    findNearestOf<FloatRow, float>(a, b, nearest);
+  } else if (a.form().dimension == kPackedBytes) {
+    findNearestOf<Row, Packed>(a, b, nearest);
+  } else {
+    findNearestPlain(a, b, nearest);
   }
 }
 
@@ -261,7 +327,8 @@ namespace visual_localization {
 
 HWY_EXPORT(findNearestImpl);
 
-void findNearest(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+void findNearest(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
+  requireAlike(a, b);
   HWY_DYNAMIC_DISPATCH(findNearestImpl)(a, b, nearest);
 }
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 
 namespace visual_localization {
 
@@ -23,13 +23,20 @@ struct NearestDescriptors {
   std::vector<TwoNearest> of_b;  ///< in A
 };
 
+/// Dimension of descriptors of bytes, SIFT's, for which vectors are used.
+constexpr std::size_t kPackedBytes = 128;
+
+/// Throws std::invalid_argument unless their descriptors are of one form, or one of them has none.
+void requireAlike(const LocalFeatures& a, const LocalFeatures& b);
+
 /// Compares every descriptor of `a` with every one of `b`, once for both directions. Cosines are
-/// float(<a, b>) * (1 / |a|) * (1 / |b|) with the scalar product in integers, the zero vector orthogonal to
-/// everything: the same number on every CPU. Uses the widest vectors that the CPU has (chosen at run time).
-void findNearest(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest);
+/// float(<a, b>) * (1 / |a|) * (1 / |b|), the zero vector orthogonal to everything. The scalar product of bytes is
+/// taken in integers: the same number on every CPU; that of floats to their rounding. Uses the widest vectors that the
+/// CPU has (chosen at run time). Throws like requireAlike.
+void findNearest(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest);
 
 /// The same without vectors: what findNearest is tested against, and stands in for it where Highway is missing.
-void findNearestPlain(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest);
+void findNearestPlain(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest);
 
 /// Whether the angle to the nearest descriptor is below a share of the angle to the second nearest, from the cosines
 /// of both: acos(best) < max_angle_ratio * acos(second). The angles are taken only when a table of bounds does not

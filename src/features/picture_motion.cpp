@@ -9,7 +9,8 @@
 #include "base/numbers.h"
 #include "base/parallel.h"
 #include "base/time.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
@@ -26,13 +27,13 @@ SiftConfig manyFeatures() {
 }
 
 /// The displacement in pixels that most matches share; nothing when few do.
-std::optional<Eigen::Vector2d> sharedDisplacement(const SiftFeatures& from, const SiftFeatures& to) {
+std::optional<Eigen::Vector2d> sharedDisplacement(const LocalFeatures& from, const LocalFeatures& to) {
   constexpr std::size_t kFewest = 8;
   constexpr double kBox_px = 0.04 * kWidth_px;
   std::vector<Eigen::Vector2d> moves;
   for (const FeatureMatch& match : matchSymmetric(from, to, 1.0)) {
-    const SiftKeypoint& a = from.keypoints()[match.a];
-    const SiftKeypoint& b = to.keypoints()[match.b];
+    const Keypoint& a = from.keypoints()[match.a];
+    const Keypoint& b = to.keypoints()[match.b];
     moves.emplace_back(b.x_px - a.x_px, b.y_px - a.y_px);
   }
   std::vector<double> right;
@@ -60,7 +61,7 @@ std::optional<Eigen::Vector2d> sharedDisplacement(const SiftFeatures& from, cons
 struct PictureMotion::Waiting {
   std::int64_t stamp_ns = 0;
   cv::Mat small;
-  SiftFeatures features = {};
+  LocalFeatures features = {};
 };
 
 PictureMotion::PictureMotion(std::size_t threads) : threads_(std::max<std::size_t>(1, threads)) {

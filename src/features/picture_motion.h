@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "geo/clock_offset.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 
 namespace visual_localization {
 
@@ -31,11 +31,11 @@ class PictureMotion {
   void extractWaiting();
 
   std::size_t threads_;
-  std::vector<std::unique_ptr<SiftExtractor>> extractors_;
+  std::vector<std::unique_ptr<LocalExtractor>> extractors_;
   std::vector<Waiting> waiting_;
   std::optional<std::int64_t> last_ns_;
   std::int64_t before_ns_ = 0;
-  std::optional<SiftFeatures> before_;
+  std::optional<LocalFeatures> before_;
   std::vector<PictureShift> shifts_;
 };
 

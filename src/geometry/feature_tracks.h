@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/camera_pose.h"
 

@@ -8,8 +8,8 @@
 
 #include "base/numbers.h"
 #include "visual_localization/camera/camera_model.h"
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/features/local_features.h"
 
 namespace visual_localization {
 
@@ -67,10 +67,10 @@ inline void setCamera(const CameraModel& camera, KeypointRays& rays) {
 }
 
 /// A small feature is found to `sigma_px`, a large one, whose octave has larger pixels, less exactly.
-inline KeypointRays raysOf(const SiftFeatures& features, const CameraModel& camera, double sigma_px) {
+inline KeypointRays raysOf(const LocalFeatures& features, const CameraModel& camera, double sigma_px) {
   constexpr double kSmall_px = 6.0;
   KeypointRays rays;
-  for (const SiftKeypoint& keypoint : features.keypoints()) {
+  for (const Keypoint& keypoint : features.keypoints()) {
     const double growth = std::hypot(1.0, keypoint.size_px / kSmall_px);
     rays.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
     rays.sigmas_px.push_back(static_cast<float>(sigma_px * growth));

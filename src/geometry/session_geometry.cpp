@@ -73,14 +73,16 @@ class PairMatcher {
   }
 
   struct View {
-    std::shared_ptr<const SiftFeatures> features;
+    std::shared_ptr<const LocalFeatures> features;
+    const LocalFeatureKind* kind;
     const KeypointRays* rays;
     double focal_px;
   };
 
  private:
   void verify(const View& a, const View& b, Pair& pair) const {
-    const auto matches = matchSymmetric(*a.features, *b.features, config_.match_ratio);
+    std::vector<FeatureMatch> matches;
+    a.kind->correspond(*a.features, *b.features, config_.match_ratio, matches);
     const std::uint32_t apart = pair.matches.b - pair.matches.a;
     const double turn_rad =
         apart <= static_cast<std::uint32_t>(config_.pair_span) ? kMaxTurn_rad * apart : kMaxRevisitTurn_rad;
@@ -143,7 +145,7 @@ class SessionAdjuster {
     }
     std::vector<RelativeRotation> relative;
     const auto view = [&](std::uint32_t i) {
-      return PairMatcher::View{session_.features(i), &rays[i], session_.camera->intrinsics().fx};
+      return PairMatcher::View{session_.features(i), session_.kind.get(), &rays[i], session_.camera->intrinsics().fx};
     };
     matcher_.match(pairs(), view, [&](const Pair& pair) {
       const auto& [a, b, inliers] = pair.matches;
@@ -231,7 +233,8 @@ class SessionTier {
 
   PairMatcher::View view(std::uint32_t image) const {
     const std::uint32_t session = together_.sessionOf(image);
-    return {together_.session(session).features(image - together_.begin(session)), &together_.rays(image),
+    const UnadjustedSession& of = together_.session(session);
+    return {of.features(image - together_.begin(session)), of.kind.get(), &together_.rays(image),
             together_.focal_px(image)};
   }
 

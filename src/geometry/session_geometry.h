@@ -12,7 +12,8 @@
 #include <opencv2/core.hpp>
 
 #include "visual_localization/camera/camera_model.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/geometry/image_geometry.h"
@@ -32,7 +33,8 @@ struct MapFix {
 /// A session before its adjustment.
 struct UnadjustedSession {
   std::vector<TrajectoryPoint> images;  ///< where the cleaned path has the antenna, in order of time
-  std::function<std::shared_ptr<const SiftFeatures>(std::size_t)> features;  ///< of an image
+  std::function<std::shared_ptr<const LocalFeatures>(std::size_t)> features;  ///< of an image
+  std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>();    ///< of these features
   const CameraModel* camera = nullptr;
   SensorMount mount;
   std::vector<MapFix> fixes;  ///< in order of time

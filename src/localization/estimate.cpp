@@ -73,6 +73,10 @@ double Estimate::sigma_m() const { return metric ? metric->sigma_m() : largerSig
 
 double Estimate::sigmaYaw_rad() const { return metric ? metric->sigmaYaw_rad() : std::sqrt(pose.yaw_variance_rad2); }
 
+std::string Estimate::featuresName() const {
+  return evidence.features == FeatureKind::kLocal ? image.local_features : "GLOBAL";
+}
+
 std::string Estimate::cameraTrouble() const {
   if (!camera_contradicted) return "";
   std::ostringstream text;

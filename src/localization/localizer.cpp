@@ -69,7 +69,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   // Geometry looks where the motion leads. Without success the tracker proposes, and geometry disposes.
   std::optional<MetricPose> metric = poseNearPrediction(stamp_ns);
   // Similarities to the training images are computed on demand, each at most once.
-  scores_.startImage(metric ? FeatureKind::kSift : choice_.next(),
+  scores_.startImage(metric ? FeatureKind::kLocal : choice_.next(),
                      [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
   sweep_.startImage();
   const TrackerEstimate tracked = track(stamp_ns, metric);
@@ -157,7 +157,7 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
   Evidence evidence;
   if (isMetric() && !verifier_->focal().contradicts()) evidence.verified = metric && metric->confirmed;
   evidence.features = scores_.kind();
-  const bool sift = evidence.features == FeatureKind::kSift;
+  const bool sift = evidence.features == FeatureKind::kLocal;
   evidence.probability = probabilityOf(tracked);
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
@@ -165,20 +165,20 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
     evidence.place_ratio = sweep_.ratio(scores_, tracked.position_m, state.max_distance_m);
   }
   evidence.blind =
-      sift ? image_->siftFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
+      sift ? image_->localFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
   return evidence;
 }
 
 /// Whether landmarks can verify the pose of the current image.
 bool Localizer::isMetric() const {
-  return config_.metric.pose_source == "metric" && camera_ && map_->hasGeometry() && image_->unprunedSift() != nullptr;
+  return config_.metric.pose_source == "metric" && camera_ && map_->hasGeometry() && image_->unprunedLocal() != nullptr;
 }
 
 std::optional<MetricPose> Localizer::poseNearPrediction(std::int64_t stamp_ns) {
   geometry_ms_ = 0.0;
   if (!isMetric()) return std::nullopt;
   const Stopwatch stopwatch;
-  verifier_->startImage(stamp_ns, *image_->unprunedSift(), *camera_, mount_);
+  verifier_->startImage(stamp_ns, *image_->unprunedLocal(), *camera_, mount_);
   std::optional<MetricPose> pose = verifier_->nearPrediction();
   geometry_ms_ = stopwatch.elapsed_ms();
   return pose;
@@ -227,14 +227,14 @@ void Localizer::witness(const Travel& travel, const std::optional<MetricPose>& m
   if (tracker_->belief() != nullptr || config_.state.witness != "probability") return;
   witness_->predict(travel);
   if (metric) return witness_->update(witness_->around(metric->base.translation().head<2>()));
-  if (scores_.kind() != FeatureKind::kSift) return;
+  if (scores_.kind() != FeatureKind::kLocal) return;
   witness_->update(witness_->likelihoodBeside(scores_.compared()));
 }
 
 /// Around the estimate; by global features thresholds decide, as by choice.
 std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) const {
   constexpr double kPlaces = 3.0;  // where training images are far apart
-  if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kSift) return std::nullopt;
+  if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kLocal) return std::nullopt;
   const PlaceFilter& filter = tracker_->belief() != nullptr ? *tracker_->belief() : *witness_;
   return filter.within(tracked.position_m, std::max(config_.state.max_distance_m, kPlaces * filter.spacing_m()));
 }
@@ -310,7 +310,7 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
 }
 
 Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool recognised) {
-  const bool by_size = config_.estimate == "interpolated" && scores_.kind() == FeatureKind::kSift;
+  const bool by_size = config_.estimate == "interpolated" && scores_.kind() == FeatureKind::kLocal;
   return recognised && by_size ? interpolateOnPath(*map_, scores_, tracked.best_image) : tracked.position_m;
 }
 

@@ -1,10 +1,12 @@
 #include "visual_localization/localization/localizer_config.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "base/text.h"
 #include "localization/paper_yaml.h"
 #include "parameters/yaml_map.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
@@ -19,12 +21,18 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
                   "Bayes filter "
                   "over the training images"},
                  tracker, {"dpso", "dpso_multi", "pf_gaussian", "pf_linear", "bayes"});
-  visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
-                 features, {"sift", "global", "hybrid"});
+  std::vector<std::string> names = localFeatureNames();
+  names.insert(names.end(), {"global", "hybrid"});
+  visitor.choice({"features", "",
+                  "what images are compared by: the map's kind of local features, global features, or hybrid: global "
+                  "features, local ones when the cloud spreads"},
+                 features, names);
+  visitor.text({"model", "", "ONNX file of learned features, the one that the map was built with", kAtStartOnly},
+               model);
   visitor.choice(
       {"estimate", "",
        "position without landmarks: that of the best particle, as in the papers (image), or on the path of the "
-       "most similar training image, by how large things look (interpolated; SIFT only)"},
+       "most similar training image, by how large things look (interpolated; local features only)"},
       estimate, {"image", "interpolated"});
   visitor.choice(
       {"sift_backend", "", "extractor of SIFT features, native or OpenCV's; their maps are compatible", kAtStartOnly},
@@ -64,8 +72,14 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
 }
 
 FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map) {
-  FrontEndConfig front_end{map.image_size,         map.sift,           config.match, config.prune,
-                           config.max_image_gap_s, config.sift_backend};
+  const std::vector<std::string> allowed{map.kind->name(), "global", "hybrid"};
+  if (std::find(allowed.begin(), allowed.end(), config.features) == allowed.end()) {
+    throw ParameterError("parameter 'features' = '" + config.features + "' is not allowed with this map, whose local " +
+                         "features are '" + map.kind->name() + "': must be one of " + joined(allowed));
+  }
+  FrontEndConfig front_end{map.image_size,         map.kind,
+                           config.match,           config.prune,
+                           config.max_image_gap_s, {config.sift_backend, config.model}};
   if (!map.sessions.empty()) front_end.mask = map.sessions.front().mask;  // until somebody gives another camera's
   return front_end;
 }

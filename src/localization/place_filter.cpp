@@ -45,8 +45,11 @@ double gaussian(double deviation, double sigma) { return std::exp(-0.5 * deviati
 void BayesConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"bayes/anywhere", "1", "probability that the next image is from anywhere in the map (kidnapping)"},
                anywhere, 1e-6, 0.5);
-  visitor.real({"bayes/exponent", "1", "matches plus one are raised to this to become a likelihood"}, exponent, 0.1,
-               20.0);
+  visitor.real(
+      {"bayes/exponent", "1",
+       "matches plus one are raised to this to become a likelihood; 0: what suits the kind of features (SIFT 3, "
+       "learned 2)"},
+      exponent, 0.0, 20.0);
   visitor.real({"bayes/uniform", "1", "share of the likelihood that is the same for all training images"}, uniform,
                1e-6, 1.0);
   visitor.integer(
@@ -134,7 +137,8 @@ PlaceFilter::Arrival& PlaceFilter::arrivalAt(std::size_t image) {
 double PlaceFilter::likelihoodOf(const Score& score) const {
   constexpr double kLeast = 1e-9;
   if (score.matches == 0 && score.weight > 0.0) return std::pow(std::max(kLeast, score.weight), independence_);
-  return std::pow(static_cast<double>(score.matches) + 1.0, independence_ * config_.exponent);
+  const double exponent = config_.exponent > 0.0 ? config_.exponent : map_.header().kind->likelihoodExponent();
+  return std::pow(static_cast<double>(score.matches) + 1.0, independence_ * exponent);
 }
 
 PlaceLikelihood PlaceFilter::likelihoodBeside(const std::vector<Scores::Compared>& compared) {

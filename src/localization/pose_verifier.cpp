@@ -84,7 +84,7 @@ void PoseVerifier::reset() {
   moving_gain_ = 0.0;
 }
 
-void PoseVerifier::startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
+void PoseVerifier::startImage(std::int64_t stamp_ns, const LocalFeatures& features, const CameraModel& camera,
                               const SensorMount& mount) {
   predictor_.startImage(stamp_ns);
   focal_.startImage();
@@ -210,10 +210,10 @@ const std::vector<PoseVerifier::Match>& PoseVerifier::matchesWith(std::size_t tr
 void PoseVerifier::match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches) {
   indices_.clear();
   for (const SeenLandmark& landmark : geometry.landmarks) indices_.push_back(landmark.feature);
-  const std::shared_ptr<const SiftFeatures> features = map_.sift(training_image);
+  const std::shared_ptr<const LocalFeatures> features = map_.local(training_image);
   if (!indices_.empty() && indices_.back() >= features->size()) return;  // they could not be read
   features->subset(indices_, landmarks_);
-  matchSymmetric(*features_, landmarks_, config_.match_ratio, found_);
+  map_.header().kind->correspond(*features_, landmarks_, config_.match_ratio, found_);
   const int session = map_.pose(training_image).session;
   for (const FeatureMatch& pair : found_) {
     if (!rays_.normalised[pair.a].allFinite()) continue;
@@ -236,7 +236,7 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
     MatchedLandmarks matched{image, {}};
     std::size_t agreeing = 0;
     for (const Match& match : matchesWith(image)) {
-      const SiftKeypoint& keypoint = features_->keypoints()[match.feature];
+      const Keypoint& keypoint = features_->keypoints()[match.feature];
       const bool inlier = std::binary_search(inliers.begin(), inliers.end(), Pair(match.landmark, match.feature));
       matched.landmarks.push_back({{keypoint.x_px, keypoint.y_px}, match.training_feature, inlier});
       agreeing += inlier ? 1 : 0;

@@ -92,7 +92,7 @@ class PoseVerifier {
   void resetCamera() { focal_.reset(); }
   /// The next image. Its features, not pruned, must live until the one after it.
   /// `mount`: where the robot carries the camera.
-  void startImage(std::int64_t stamp_ns, const SiftFeatures& features, const CameraModel& camera,
+  void startImage(std::int64_t stamp_ns, const LocalFeatures& features, const CameraModel& camera,
                   const SensorMount& mount = {});
 
   /// The pose of the image if it is where the motion leads; nothing when too few landmarks agree there.
@@ -145,13 +145,13 @@ class PoseVerifier {
   MotionEvidence moving_;             ///< of the images before
   double moving_gain_ = 0.0;          ///< of the pose last solved in the image
   std::size_t inliers_together_ = 0;  ///< of verified poses that follow each other
-  const SiftFeatures* features_ = nullptr;
+  const LocalFeatures* features_ = nullptr;
   KeypointRays rays_;  ///< of the features
   double focal_px_ = 0.0;
   SensorMount mount_;
   std::vector<Compared> compared_;
   MatchedLandmarks matched_;
-  SiftFeatures landmarks_;  ///< of a training image: its features that show one
+  LocalFeatures landmarks_;  ///< of a training image: its features that show one
   std::vector<std::size_t> indices_;
   std::vector<FeatureMatch> found_;
 };

@@ -6,12 +6,11 @@
 #include <utility>
 
 #include "base/numbers.h"
+#include "base/text.h"
 #include "base/time.h"
 #include "visual_localization/localization/particles.h"
 
 namespace visual_localization {
-
-std::string toString(FeatureKind kind) { return kind == FeatureKind::kSift ? "SIFT" : "GLOBAL"; }
 
 void SimilarityConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"similarity/sift_recognised", "1",
@@ -26,22 +25,24 @@ void SimilarityConfig::declare(ParameterVisitor& visitor) {
                global_exponent, 1.0, 1000.0);
 }
 
-SiftSimilarity::SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px)
-    : match_(match),
-      recognised_(config.recognised(FeatureKind::kSift, match)),
+LocalSimilarity::LocalSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px,
+                                 std::shared_ptr<const LocalFeatureKind> kind)
+    : kind_(std::move(kind)),
+      match_(match),
+      recognised_(config.recognised(FeatureKind::kLocal, match)),
       exponent_(match.isByVotes() ? config.votes_exponent : 1.0),
       image_width_px_(image_width_px) {}
 
-Score SiftSimilarity::compare(const SiftFeatures& current, const SiftFeatures& training) const {
+Score LocalSimilarity::compare(const LocalFeatures& current, const LocalFeatures& training) const {
   if (current.size() < 2 || training.size() < 2) return {};
   static thread_local std::vector<FeatureMatch> matches;
-  matchBy(match_, current, training, image_width_px_, matches);
+  kind_->match(match_, current, training, image_width_px_, matches);
   const std::size_t possible = match_.isOneWay() ? current.size() : std::min(current.size(), training.size());
   return scoreOf(static_cast<double>(matches.size()) / static_cast<double>(possible), matches.size(),
                  medianScale(current, training, matches));
 }
 
-Score SiftSimilarity::scoreOf(double similarity, std::size_t matches, double scale) const {
+Score LocalSimilarity::scoreOf(double similarity, std::size_t matches, double scale) const {
   return {similarity, std::pow(similarity, exponent_), matches, similarity >= recognised_, scale};
 }
 
@@ -70,47 +71,48 @@ void HybridConfig::declare(ParameterVisitor& visitor) {
 FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& config)
     : hybrid_(features == "hybrid"),
       config_(config),
-      first_(features == "global" ? FeatureKind::kGlobal : FeatureKind::kSift),
+      first_(features == "global" ? FeatureKind::kGlobal : FeatureKind::kLocal),
       next_(first_) {}
 
 void FeatureChoice::configure(const std::string& features, const HybridConfig& config) {
   FeatureChoice changed(features, config);
   if (changed.hybrid_ == hybrid_ && changed.first_ == first_) {
     changed.next_ = next_;
-    changed.since_sift_ = since_sift_;
+    changed.since_local_ = since_local_;
   }
   *this = changed;
 }
 
 void FeatureChoice::reset() {
   next_ = first_;
-  since_sift_ = 0;
+  since_local_ = 0;
 }
 
 void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool confirmed, bool doubtful) {
   if (!hybrid_) return;
-  since_sift_ = next_ == FeatureKind::kSift ? 0 : since_sift_ + 1;
-  if (isSiftDue(confirmed) || (doubtful && config_.sift_in_doubt)) {
-    next_ = FeatureKind::kSift;
+  since_local_ = next_ == FeatureKind::kLocal ? 0 : since_local_ + 1;
+  if (isLocalDue(confirmed) || (doubtful && config_.sift_in_doubt)) {
+    next_ = FeatureKind::kLocal;
     return;
   }
   const double largest_m = spread_m.maxCoeff();
-  if (next_ == FeatureKind::kSift && largest_m < config_.sift_below_m) {
+  if (next_ == FeatureKind::kLocal && largest_m < config_.sift_below_m) {
     next_ = FeatureKind::kGlobal;
   } else if (next_ == FeatureKind::kGlobal && largest_m > config_.global_above_m) {
-    next_ = FeatureKind::kSift;
+    next_ = FeatureKind::kLocal;
   }
 }
 
-bool FeatureChoice::isSiftDue(bool confirmed) const {
+bool FeatureChoice::isLocalDue(bool confirmed) const {
   if (config_.sift_every == 0) return false;
-  return since_sift_ + 1 >= config_.sift_every || (next_ == FeatureKind::kSift && !confirmed);
+  return since_local_ + 1 >= config_.sift_every || (next_ == FeatureKind::kLocal && !confirmed);
 }
 
 LiveImage::LiveImage(const TrainingMap& map, const FrontEndConfig& front_end, const SimilarityConfig& similarity)
     : map_(map),
+      name_(upperCase(map.header().kind->name())),
       front_end_(front_end),
-      sift_similarity_(front_end.match, similarity, map.header().image_size.width),
+      local_similarity_(front_end.match, similarity, map.header().image_size.width, map.header().kind),
       global_similarity_(similarity) {}
 
 void LiveImage::set(std::int64_t stamp_ns, const cv::Mat& grey) {
@@ -120,10 +122,10 @@ void LiveImage::set(std::int64_t stamp_ns, const cv::Mat& grey) {
 
 Score LiveImage::compare(FeatureKind kind, std::size_t training_image) {
   // What the map must read from its file counts as comparing: without the comparison there would be no need.
-  if (kind == FeatureKind::kSift) {
-    const SiftFeatures& current = front_end_.sift();
+  if (kind == FeatureKind::kLocal) {
+    const LocalFeatures& current = front_end_.local();
     const Stopwatch stopwatch;
-    const Score score = sift_similarity_.compare(current, *map_.sift(training_image));
+    const Score score = local_similarity_.compare(current, *map_.local(training_image));
     match_ms_ += stopwatch.elapsed_ms();
     return score;
   }
@@ -135,13 +137,13 @@ Score LiveImage::compare(FeatureKind kind, std::size_t training_image) {
 }
 
 ImageReport LiveImage::report() const {
-  return {front_end_.statistics(), front_end_.siftExtracted(), sift() == nullptr ? 0 : sift()->size(),
+  return {front_end_.statistics(), name_,    front_end_.localExtracted(), local() == nullptr ? 0 : local()->size(),
           front_end_.extract_ms(), match_ms_};
 }
 
 void LiveImage::configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) {
   front_end_.configure(front_end);
-  sift_similarity_ = SiftSimilarity(front_end.match, similarity, map_.header().image_size.width);
+  local_similarity_ = LocalSimilarity(front_end.match, similarity, map_.header().image_size.width, map_.header().kind);
   global_similarity_ = GlobalSimilarity(similarity);
 }
 
@@ -157,14 +159,14 @@ Scores::Cache::Entry& Scores::Cache::at(FeatureKind kind, std::size_t training_i
 void Scores::startImage(FeatureKind kind, Compare compare) {
   kind_ = kind;
   compare_ = std::move(compare);
-  sift_.clear();
+  local_.clear();
   global_.clear();
   comparisons_ = 0;
   counted_ = 0;
 }
 
 Score Scores::operator[](std::size_t training_image) {
-  Cache& cache = kind_ == FeatureKind::kSift ? sift_ : global_;
+  Cache& cache = kind_ == FeatureKind::kLocal ? local_ : global_;
   Cache::Entry& entry = cache.at(kind_, training_image, compare_);
   if (!entry.counted) ++comparisons_;
   entry.counted = true;
@@ -177,7 +179,7 @@ Score Scores::global(std::size_t training_image) {
 
 std::vector<Scores::Compared> Scores::compared() const {
   std::vector<Compared> compared;
-  for (const Cache::Entry& entry : (kind_ == FeatureKind::kSift ? sift_ : global_).entries()) {
+  for (const Cache::Entry& entry : (kind_ == FeatureKind::kLocal ? local_ : global_).entries()) {
     if (entry.counted) compared.push_back({entry.training_image, entry.score});
   }
   return compared;
@@ -185,7 +187,7 @@ std::vector<Scores::Compared> Scores::compared() const {
 
 std::vector<std::size_t> Scores::mostSimilar() const {
   std::vector<std::pair<double, std::size_t>> order;
-  for (const Cache::Entry& entry : (kind_ == FeatureKind::kSift ? sift_ : global_).entries()) {
+  for (const Cache::Entry& entry : (kind_ == FeatureKind::kLocal ? local_ : global_).entries()) {
     if (entry.counted) order.emplace_back(-entry.score.similarity, entry.training_image);
   }
   std::sort(order.begin(), order.end());
@@ -195,7 +197,7 @@ std::vector<std::size_t> Scores::mostSimilar() const {
 }
 
 void Scores::count(const std::vector<std::size_t>& training_images) {
-  const std::vector<std::size_t> known = kind_ == FeatureKind::kSift ? mostSimilar() : std::vector<std::size_t>();
+  const std::vector<std::size_t> known = kind_ == FeatureKind::kLocal ? mostSimilar() : std::vector<std::size_t>();
   counted_ = 0;
   for (const std::size_t image : training_images) {
     if (std::find(known.begin(), known.end(), image) == known.end()) ++counted_;

@@ -149,7 +149,7 @@ LocalizationState StateAssessor::update(std::int64_t stamp_ns, const TrackerEsti
   ever_confirmed_ = ever_confirmed_ || certain;
   // Matched local features are of a mapped place, even while the position is not certain.
   const bool sees_map =
-      evidence.features == FeatureKind::kSift && (evidence.probability ? estimate.best.recognised : lastConfirms());
+      evidence.features == FeatureKind::kLocal && (evidence.probability ? estimate.best.recognised : lastConfirms());
   if (certain) unconfirmed_ = 0;
   if (!certain && !evidence.blind && !sees_map) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
   const bool decided = evidence.verified || evidence.probability;

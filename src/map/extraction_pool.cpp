@@ -103,10 +103,10 @@ std::vector<std::size_t> PruningNeighbours::of(std::size_t image) const {
   return neighbours;
 }
 
-ExtractionPool::ExtractionPool(const SiftConfig& sift, const std::string& sift_backend, int preview_width_px,
+ExtractionPool::ExtractionPool(const LocalFeatureKind& kind, const ExtractorChoice& choice, int preview_width_px,
                                std::size_t threads)
     : preview_width_px_(preview_width_px), workers_(std::max<std::size_t>(1, threads)) {
-  for (Worker& worker : workers_) worker.sift = makeSiftExtractor(sift, sift_backend);
+  for (Worker& worker : workers_) worker.local = kind.makeExtractor(choice);
 }
 
 ExtractionPool::~ExtractionPool() = default;
@@ -115,7 +115,7 @@ TrainingImage ExtractionPool::extract(const RawImage& image, Worker& worker) con
   const GreyLevels levels =
       greyLevelsOf(image.grey, image.mask);  // named: GCC 13 and later take the result for a part of it
   const cv::Mat& grey = withUsualContrast(image.grey, levels, worker.spread);
-  SiftFeatures features = worker.sift->extract(grey);
+  LocalFeatures features = worker.local->extract(grey);
   dropMasked(image.mask, features);
   return {image.pose, std::move(features), worker.global.extract(withoutMasked(grey, image.mask, worker.masked)),
           previewOf(image.grey, preview_width_px_)};

@@ -12,7 +12,8 @@
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 
@@ -22,10 +23,10 @@ namespace visual_localization {
 class ImageSpool {
  public:
   /// `beside`: the temporary file is made beside this one; empty: in memory. Throws FileError or MapStoreError.
-  explicit ImageSpool(const std::string& beside) {
+  ImageSpool(const std::string& beside, std::shared_ptr<const LocalFeatureKind> kind) {
     if (beside.empty()) return;
     file_ = std::make_unique<PartialFile>(beside);
-    writer_ = std::make_unique<MapWriter>(*file_);
+    writer_ = std::make_unique<MapWriter>(*file_, std::move(kind));
   }
 
   /// Throws MapStoreError, for instance when the disk is full.
@@ -81,7 +82,8 @@ struct RawImage {
 class ExtractionPool {
  public:
   /// `preview_width_px`: of the stored previews; 0 = none. `threads`: at least 1.
-  ExtractionPool(const SiftConfig& sift, const std::string& sift_backend, int preview_width_px, std::size_t threads);
+  ExtractionPool(const LocalFeatureKind& kind, const ExtractorChoice& choice, int preview_width_px,
+                 std::size_t threads);
   ~ExtractionPool();
 
   /// In the order of `images`, features not pruned. Throws like requireExtractable.
@@ -90,7 +92,7 @@ class ExtractionPool {
  private:
   /// What one thread works with.
   struct Worker {
-    std::unique_ptr<SiftExtractor> sift;
+    std::unique_ptr<LocalExtractor> local;
     GlobalExtractor global;
     cv::Mat spread;  ///< a dull image with the usual contrast
     cv::Mat masked;  ///< that without what the mask hides

@@ -11,10 +11,7 @@ namespace {
 
 constexpr const char* kOfOneImage = " WHERE image = ?";
 
-std::size_t bytesOf(const SiftFeatures& features) {
-  return sizeof(SiftFeatures) +
-         features.size() * (sizeof(SiftKeypoint) + SiftFeatures::kDescriptorSize + sizeof(float));
-}
+std::size_t bytesOf(const LocalFeatures& features) { return features.memory_bytes(); }
 
 std::size_t bytesOf(const GlobalFeatures&) { return sizeof(GlobalFeatures); }
 
@@ -23,19 +20,19 @@ std::size_t bytesOf(const std::optional<ImageGeometry>& geometry) {
 }
 
 /// What is kept of an image, by the number of its key.
-enum Kind : std::uint64_t { kSift, kGlobal, kGeometry, kKinds };
+enum Kind : std::uint64_t { kLocal, kGlobal, kGeometry, kKinds };
 
 std::uint64_t keyOf(std::size_t image, Kind kind) { return kKinds * image + kind; }
 
 }  // namespace
 
 MemoryFeatureStore::MemoryFeatureStore(std::vector<TrainingImage>&& images) {
-  sift_.reserve(images.size());
+  local_.reserve(images.size());
   global_.reserve(images.size());
   previews_.reserve(images.size());
   geometry_.resize(images.size());
   for (TrainingImage& image : images) {
-    sift_.push_back(std::move(image.sift));
+    local_.push_back(std::move(image.local));
     global_.push_back(image.global);
     previews_.push_back(std::move(image.preview_jpeg));
     if (!image.geometry) continue;
@@ -51,7 +48,7 @@ FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, 
       cache_bytes_(cache_bytes),
       warn_(std::move(warn)),
       database_(std::move(database)),
-      sift_rows_(database_, std::string(map_rows::kSelectSift) + kOfOneImage),
+      local_rows_(database_, std::string(map_rows::kSelectLocal) + kOfOneImage),
       global_rows_(database_, std::string(map_rows::kSelectGlobal) + kOfOneImage),
       preview_rows_(database_, std::string(map_rows::kSelectPreview) + kOfOneImage),
       cache_(cache_bytes) {
@@ -60,10 +57,10 @@ FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, 
     geometry_rows_.emplace(database_, std::string(map_rows::kSelectGeometry) + kOfOneImage);
 }
 
-std::shared_ptr<const SiftFeatures> FileFeatureStore::sift(std::size_t image) const {
-  return get<SiftFeatures>(keyOf(image, kSift), [&] {
-    return read(image, sift_rows_, "features", [&](const sqlite::Statement& row) {
-      return map_rows::siftOf(row, stored_.seeds[image], stored_.feature_counts[image]);
+std::shared_ptr<const LocalFeatures> FileFeatureStore::local(std::size_t image) const {
+  return get<LocalFeatures>(keyOf(image, kLocal), [&] {
+    return read(image, local_rows_, "features", [&](const sqlite::Statement& row) {
+      return map_rows::localOf(row, stored_.seeds[image], stored_.feature_counts[image], *stored_.kind);
     });
   });
 }

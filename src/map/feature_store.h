@@ -15,7 +15,9 @@
 
 #include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/training_map.h"
 
@@ -27,7 +29,7 @@ class FeatureStore {
  public:
   virtual ~FeatureStore() = default;
   /// SIFT features of a training image, after pruning; never null. `image` is below the size of the map.
-  virtual std::shared_ptr<const SiftFeatures> sift(std::size_t image) const = 0;
+  virtual std::shared_ptr<const LocalFeatures> local(std::size_t image) const = 0;
   /// Global features of a training image; never null.
   virtual std::shared_ptr<const GlobalFeatures> global(std::size_t image) const = 0;
   /// Small grey JPEG for people; may be empty.
@@ -47,7 +49,7 @@ class MemoryFeatureStore final : public FeatureStore {
   /// Takes what the images looked like; of `images` only the poses are left.
   explicit MemoryFeatureStore(std::vector<TrainingImage>&& images);
 
-  std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override { return unowned(sift_[image]); }
+  std::shared_ptr<const LocalFeatures> local(std::size_t image) const override { return unowned(local_[image]); }
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override { return unowned(global_[image]); }
   std::vector<std::uint8_t> preview(std::size_t image) const override { return previews_[image]; }
   std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override {
@@ -63,7 +65,7 @@ class MemoryFeatureStore final : public FeatureStore {
     return {std::shared_ptr<const T>(), &value};
   }
 
-  std::vector<SiftFeatures> sift_;
+  std::vector<LocalFeatures> local_;
   std::vector<GlobalFeatures> global_;
   std::vector<std::vector<std::uint8_t>> previews_;
   std::vector<std::unique_ptr<const ImageGeometry>> geometry_;  ///< null where there is none
@@ -120,9 +122,10 @@ class FeatureCache {
 
 /// What is known of a map's images without reading what they looked like.
 struct StoredRows {
-  std::vector<std::uint32_t> feature_counts;  ///< of each image
-  std::vector<std::uint32_t> seeds;           ///< of its checksums: map_schema::rowSeed()
-  std::size_t geometry_count = 0;             ///< images that have one
+  std::vector<std::uint32_t> feature_counts;                                ///< of each image
+  std::vector<std::uint32_t> seeds;                                         ///< of its checksums: map_schema::rowSeed()
+  std::size_t geometry_count = 0;                                           ///< images that have one
+  std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>();  ///< of the local features
 };
 
 /// Reads what an image looked like from the map's file when it is first needed, verifies it, and keeps what was used
@@ -137,7 +140,7 @@ class FileFeatureStore final : public FeatureStore {
   /// `path`: to be named in the warning. `cache_bytes`: what may be kept; 0 keeps nothing.
   FileFeatureStore(sqlite::Database database, std::string path, StoredRows stored, std::size_t cache_bytes, Warn warn);
 
-  std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override;
+  std::shared_ptr<const LocalFeatures> local(std::size_t image) const override;
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
   std::vector<std::uint8_t> preview(std::size_t image) const override;
   std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override;
@@ -160,7 +163,7 @@ class FileFeatureStore final : public FeatureStore {
   const Warn warn_;
   mutable std::mutex reading_;  ///< held while the file is read
   sqlite::Database database_;
-  mutable sqlite::Statement sift_rows_;
+  mutable sqlite::Statement local_rows_;
   mutable sqlite::Statement global_rows_;
   mutable sqlite::Statement preview_rows_;
   mutable std::optional<sqlite::Statement> geometry_rows_;  ///< none where there is nothing to read

@@ -11,9 +11,10 @@
 #include "map/extraction_pool.h"
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
+#include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/front_end.h"
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
@@ -22,6 +23,12 @@ namespace visual_localization {
 namespace {
 
 constexpr std::size_t kWaitingPerThread = 4;  ///< images: so that no thread waits long for the slowest
+
+/// With what the extractor's model says of the features.
+MapBuilderConfig adopted(MapBuilderConfig config) {
+  config.local.chosen().adopt(config.extractor);
+  return config;
+}
 
 bool isOfShape(cv::Size recorded, cv::Size wanted) {
   constexpr double kRounding = 0.02;
@@ -36,15 +43,15 @@ cv::Size requireBounded(const std::string& session, cv::Size size) {
 }
 
 /// The unpruned features of the images that tell what is noise in image `i`.
-std::vector<std::shared_ptr<const SiftFeatures>> neighboursOf(std::size_t i, const PruningNeighbours& neighbours,
-                                                              const TrainingMap& unpruned) {
-  std::vector<std::shared_ptr<const SiftFeatures>> features;
-  for (const std::size_t neighbour : neighbours.of(i)) features.push_back(unpruned.sift(neighbour));
+std::vector<std::shared_ptr<const LocalFeatures>> neighboursOf(std::size_t i, const PruningNeighbours& neighbours,
+                                                               const TrainingMap& unpruned) {
+  std::vector<std::shared_ptr<const LocalFeatures>> features;
+  for (const std::size_t neighbour : neighbours.of(i)) features.push_back(unpruned.local(neighbour));
   return features;
 }
 
-std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<const SiftFeatures>>& owned) {
-  std::vector<const SiftFeatures*> pointers;
+std::vector<const LocalFeatures*> pointersTo(const std::vector<std::shared_ptr<const LocalFeatures>>& owned) {
+  std::vector<const LocalFeatures*> pointers;
   for (const auto& features : owned) pointers.push_back(features.get());
   return pointers;
 }
@@ -53,13 +60,13 @@ std::vector<const SiftFeatures*> pointersTo(const std::vector<std::shared_ptr<co
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources,
                        const std::optional<MapBase>& base)
-    : config_(requireValid(config)),
+    : config_(adopted(requireValid(config))),
       resources_(resources),
-      extraction_(std::make_unique<ExtractionPool>(config_.sift, config_.sift_backend, config_.preview_width_px,
+      extraction_(std::make_unique<ExtractionPool>(config_.local.chosen(), config_.extractor, config_.preview_width_px,
                                                    resources.threads)),
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
-      spool_(std::make_unique<ImageSpool>(resources.spool_beside)) {
-  header_.sift = config_.sift;
+      spool_(std::make_unique<ImageSpool>(resources.spool_beside, config_.local.chosen().clone())) {
+  header_.kind = config_.local.chosen().clone();
   if (!base) return;
   frame_ = LocalFrame(base->datum);
   header_.image_size = report_.image_size = base->image_size;
@@ -168,7 +175,7 @@ void MapBuilder::fitCamera() {
 
 void MapBuilder::extractWaiting() {
   for (const TrainingImage& image : extraction_->extract(waiting_)) {
-    report_.features_extracted += image.sift.size();
+    report_.features_extracted += image.local.size();
     spool_->append(image);
   }
   waiting_.clear();
@@ -196,7 +203,7 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   report_.features_kept = 0;
   const auto pruned = [&](std::size_t i, TrainingImage& image) {
     prune(i, *unpruned, neighbours, image);
-    report_.features_kept += image.sift.size();
+    report_.features_kept += image.local.size();
     if (progress) progress(i + 1, unpruned->size());
   };
   report_.images_thinned += writeThinned(*unpruned, header_.sessions, std::move(geometries), config_, pruned, sink);
@@ -230,7 +237,7 @@ void MapBuilder::prune(std::size_t i, const TrainingMap& unpruned, const Pruning
   if (!config_.prune) return;
   const auto neighbours = neighboursOf(i, neighbours_of, unpruned);
   if (neighbours.empty()) return;
-  keepFeatures(seenIn(image.sift, pointersTo(neighbours), config_.match.max_angle_ratio), image);
+  keepFeatures(seenIn(image.local, pointersTo(neighbours), config_.match.max_angle_ratio), image);
 }
 
 std::shared_ptr<const TrainingMap> MapBuilder::build(const Progress& progress) {
@@ -240,12 +247,12 @@ std::shared_ptr<const TrainingMap> MapBuilder::build(const Progress& progress) {
 }
 
 void MapBuilder::save(const std::string& path, const Progress& progress) {
-  MapWriter writer(path);
+  MapWriter writer(path, header_.kind);
   write(writer, progress);
 }
 
 void MapBuilder::save(const PartialFile& file, const Progress& progress) {
-  MapWriter writer(file);
+  MapWriter writer(file, header_.kind);
   write(writer, progress);
 }
 
@@ -289,7 +296,8 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"map/preview_width", "px", "width of the stored previews; 0 stores none"}, preview_width_px, 0, 640);
   visitor.choice(
       {"map/sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any localizer"},
-      sift_backend, siftBackends());
+      extractor.sift_backend, siftBackends());
+  visitor.text({"map/model", "", "ONNX file of learned features"}, extractor.model);
   visitor.text({"robot/base_frame", "", "frame of the robot in /tf_static"}, base_frame);
   visitor.text({"robot/camera", "m, rad",
                 "x y z yaw pitch roll of the camera (x ahead) on the robot; empty: from /tf_static, or the robot is "
@@ -300,7 +308,7 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
                 "frame of the receiver whose fixes count, where several share a topic; empty: the one with most fixes"},
                fix_frame);
   requireMountTexts(visitor, camera_mount, antenna_mount);
-  sift.declare(visitor);
+  local.declare(visitor);
   match.declare(visitor);
   trajectory.declare(visitor);
   geometry.declare(visitor);

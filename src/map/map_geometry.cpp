@@ -207,7 +207,8 @@ UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::siz
   for (std::size_t i = begin; i < end; ++i) {
     session.images.push_back({map.pose(i).stamp_ns, map.position_m(i), map.yaw_rad(i)});
   }
-  session.features = [&map, begin](std::size_t i) { return map.sift(begin + i); };
+  session.features = [&map, begin](std::size_t i) { return map.local(begin + i); };
+  session.kind = map.header().kind;
   session.camera = of.camera ? &*of.camera : nullptr;
   session.mount = of.mount.value_or(SensorMount());
   session.fixes = fixes;
@@ -275,7 +276,7 @@ void requireUsable(const ImageGeometry& geometry, std::size_t feature_count) {
 }
 
 void keepFeatures(const std::vector<std::size_t>& kept, TrainingImage& image) {
-  image.sift = image.sift.subset(kept);
+  image.local = image.local.subset(kept);
   if (!image.geometry) return;
   std::vector<SeenLandmark> landmarks;
   for (SeenLandmark landmark : image.geometry->landmarks) {

@@ -1,4 +1,5 @@
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -16,6 +17,8 @@ constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
 constexpr const char* kPublished = "/published_camera/";
 constexpr const char* kMount = "/mount/";  ///< likewise
 constexpr const char* kMask = "/mask";
+constexpr const char* kKind = "features/kind";
+constexpr const char* kDimension = "features/dimension";  ///< of a descriptor
 constexpr const char* kGeometryCount = "geometry/images";
 constexpr const char* kHistory = "history/";  ///< before the number of the edit
 
@@ -53,10 +56,12 @@ bool takeFlag(ParameterValues& meta, const std::string& key) {
   throw std::runtime_error("meta value '" + key + "' = " + std::to_string(flag) + " is not 0 or 1");
 }
 
-/// Before kSinceUpright features have the orientation and the distance of the papers.
-SiftConfig takeSift(ParameterValues& meta, int version) {
-  SiftConfig sift;
-  ParameterValues values = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
+/// The kind of local features and its parameters. Before kSinceKinds all are SIFT; before kSinceUpright they have the
+/// orientation and the distance of the papers.
+std::shared_ptr<const LocalFeatureKind> takeKind(ParameterValues& meta, int version) {
+  std::unique_ptr<LocalFeatureKind> kind = std::make_unique<Sift>();
+  if (version >= kSinceKinds) kind = makeLocalFeatureKind(take<std::string>(meta, kKind));
+  ParameterValues values = kind->parameters();
   for (auto& [name, value] : values) {
     if (std::holds_alternative<bool>(value)) {
       if (version >= kSinceUpright) value = takeFlag(meta, name);
@@ -67,8 +72,12 @@ SiftConfig takeSift(ParameterValues& meta, int version) {
     value = found->second;
     meta.erase(found);
   }
-  assignParameters(sift, values);
-  return sift;
+  parameters::assign([&kind](ParameterVisitor& visitor) { kind->declareStored(visitor); }, values);
+  const auto wrong = parameters::violations([&kind](ParameterVisitor& visitor) { kind->declareStored(visitor); });
+  if (!wrong.empty()) throw ParameterError(wrong.front());
+  const auto dimension = static_cast<std::int64_t>(kind->form().dimension);
+  if (version < kSinceKinds || take<std::int64_t>(meta, kDimension) == dimension) return kind;
+  throw std::runtime_error("its features '" + kind->name() + "' are not of dimension " + std::to_string(dimension));
 }
 
 std::string sessionKey(std::size_t session) { return "session/" + std::to_string(session); }
@@ -225,11 +234,12 @@ void addCamera(const std::optional<CameraModel>& camera, const std::string& grou
 }  // namespace
 
 ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
-  SiftConfig sift = header.sift;
-  ParameterValues meta = parameters::values([&sift](ParameterVisitor& visitor) { sift.declare(visitor); });
+  ParameterValues meta = header.kind->parameters();
   for (auto& [name, value] : meta) {
     if (const bool* flag = std::get_if<bool>(&value)) value = std::int64_t{*flag};
   }
+  meta[kKind] = header.kind->name();
+  meta[kDimension] = static_cast<std::int64_t>(header.kind->form().dimension);
   meta["datum/latitude_deg"] = header.datum.latitude_deg;
   meta["datum/longitude_deg"] = header.datum.longitude_deg;
   meta["datum/altitude_m"] = header.datum.altitude_m;
@@ -273,7 +283,7 @@ MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
   header.datum.altitude_m = take<double>(meta, "datum/altitude_m");
   header.image_size = takeImageSize(meta);
   take<std::string>(meta, "package_version");
-  header.sift = takeSift(meta, version);
+  header.kind = takeKind(meta, version);
   header.sessions = takeSessions(meta, version, header.image_size, masks);
   if (version >= kSinceHistory) header.history = takeHistory(meta);
   if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");

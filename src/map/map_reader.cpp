@@ -194,11 +194,11 @@ class GeometryRows {
   std::size_t found_ = 0;
 };
 
-std::uint64_t storedBytes(const TrainingImage& image) {
-  const std::size_t landmark_bytes = map_schema::landmarkBytes(image.sift.size());
+std::uint64_t storedBytes(const TrainingImage& image, const LocalFeatureKind& kind) {
+  const std::size_t landmark_bytes = map_schema::landmarkBytes(image.local.size());
   const std::size_t of_geometry =
       image.geometry ? map_schema::kPoseBytes + image.geometry->landmarks.size() * landmark_bytes : 0;
-  return of_geometry + image.sift.size() * (map_schema::kKeypointBytes + SiftFeatures::kDescriptorSize) +
+  return of_geometry + image.local.size() * (map_schema::kKeypointBytes + kind.stored_bytes()) +
          2 * map_schema::kHistogramBytes + image.preview_jpeg.size();
 }
 
@@ -207,24 +207,25 @@ void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::f
   const sqlite::Database& database = map.database;
   const TrainingPoses& poses = opened.poses;
   const std::string in_order = " ORDER BY image";
-  Statement sift(database, map_rows::kSelectSift + in_order);
+  const LocalFeatureKind& kind = *opened.header.kind;
+  Statement local(database, map_rows::kSelectLocal + in_order);
   Statement global(database, map_rows::kSelectGlobal + in_order);
   Statement preview(database, map_rows::kSelectPreview + in_order);
   GeometryRows geometry(map);
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    stepTo(i, sift, "features");
+    stepTo(i, local, "features");
     stepTo(i, global, "global features");
     stepTo(i, preview, "bytes of the preview");
     const std::int64_t seed = opened.row_seeds[i];
     TrainingImage image{{poses.stamps_ns[i], poses.sessions[i], poses.positions_m[i], poses.yaws_rad[i]},
-                        map_rows::siftOf(sift, seed, poses.feature_counts[i]),
+                        map_rows::localOf(local, seed, poses.feature_counts[i], kind),
                         map_rows::globalOf(global, seed),
                         map_rows::previewOf(preview, seed),
                         geometry.of(i, seed, poses.feature_counts[i])};
-    opened.budget.spend(storedBytes(image));
+    opened.budget.spend(storedBytes(image, kind));
     use(std::move(image));
   }
-  if (sift.step() || global.step() || preview.step()) {
+  if (local.step() || global.step() || preview.step()) {
     throw Refusal("is damaged: it has features or previews without an image");
   }
   geometry.requireEnd(opened.geometry_count);
@@ -266,7 +267,8 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
   return withMapFile(path, [&](map_rows::MapDatabase&& map, std::int64_t size) {
     Opened opened = readPosesAndHeader(map, size);
     if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(map, std::move(opened));
-    StoredRows rows{opened.poses.feature_counts, std::move(opened.row_seeds), opened.geometry_count};
+    StoredRows rows{opened.poses.feature_counts, std::move(opened.row_seeds), opened.geometry_count,
+                    opened.header.kind};
     auto store = std::make_unique<FileFeatureStore>(std::move(map.database), path, std::move(rows), loading.cache_bytes,
                                                     loading.warn);
     return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.poses), std::move(store));

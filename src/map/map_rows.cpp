@@ -131,7 +131,7 @@ void Budget::spend(std::uint64_t bytes) {
   left_ -= bytes;
 }
 
-SiftFeatures siftOf(const Statement& row, std::int64_t seed, std::size_t count) {
+LocalFeatures localOf(const Statement& row, std::int64_t seed, std::size_t count, const LocalFeatureKind& kind) {
   const Bytes keypoints = row.blob(1);
   const Bytes descriptors = row.blob(2);
   requireChecksum(map_schema::rowChecksum(seed, {keypoints, descriptors}), row, 3, "features");
@@ -139,7 +139,7 @@ SiftFeatures siftOf(const Statement& row, std::int64_t seed, std::size_t count) 
   requireCount(keypoints.size / map_schema::kKeypointBytes, count, row);
   // An address of null plus nothing is not a range, so the empty case goes its own way.
   if (descriptors.size == 0 && keypoints.size == 0) return {};
-  return SiftFeatures(map_schema::unpackKeypoints(keypoints), {descriptors.data, descriptors.data + descriptors.size});
+  return kind.unpack(map_schema::unpackKeypoints(keypoints), descriptors.data, descriptors.size);
 }
 
 GlobalFeatures globalOf(const Statement& row, std::int64_t seed) {

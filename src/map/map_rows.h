@@ -9,7 +9,8 @@
 #include "map/map_schema.h"
 #include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/geometry/image_geometry.h"
 
 /// The parts of reading a map file that the whole map and a single image share.
@@ -49,7 +50,7 @@ class Budget {
 };
 
 /// Statements that read the wide tables; the column of the image comes first.
-constexpr const char* kSelectSift = "SELECT image, keypoints, descriptors, crc32 FROM features";
+constexpr const char* kSelectLocal = "SELECT image, keypoints, descriptors, crc32 FROM features";
 constexpr const char* kSelectGlobal = "SELECT image, wgoh, wgii, crc32 FROM globals";
 constexpr const char* kSelectPreview = "SELECT image, jpeg, crc32 FROM previews";
 /// Since kSinceLandmarks; an image without geometry has no row.
@@ -58,7 +59,7 @@ constexpr const char* kSelectGeometry = "SELECT image, pose, points, crc32 FROM 
 // What is in the current row of such a statement. Each throws Refusal when it does not agree with its checksum, which
 // begins with `seed` (map_schema::rowSeed), and sqlite::Error or std::exception when it is not even of the right form.
 /// Throws Refusal, too, when they are not `count`: what the table of images says, and others rely on.
-SiftFeatures siftOf(const sqlite::Statement& row, std::int64_t seed, std::size_t count);
+LocalFeatures localOf(const sqlite::Statement& row, std::int64_t seed, std::size_t count, const LocalFeatureKind& kind);
 GlobalFeatures globalOf(const sqlite::Statement& row, std::int64_t seed);
 std::vector<std::uint8_t> previewOf(const sqlite::Statement& row, std::int64_t seed);
 /// `feature_count`: SIFT features of the image.

@@ -166,10 +166,10 @@ Mask unpackMask(sqlite::Bytes bytes, const cv::Size& size) {
   return Mask(grey);
 }
 
-std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints) {
+std::vector<std::uint8_t> packKeypoints(const Keypoints& keypoints) {
   std::vector<std::uint8_t> bytes(keypoints.size() * kKeypointBytes);
   std::uint8_t* to = bytes.data();
-  for (const SiftKeypoint& keypoint : keypoints) {
+  for (const Keypoint& keypoint : keypoints) {
     for (const float value : {keypoint.x_px, keypoint.y_px, keypoint.size_px, keypoint.angle_deg}) {
       putReal<float>(value, to);
       to += sizeof(float);
@@ -178,15 +178,18 @@ std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoin
   return bytes;
 }
 
-std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes) {
-  std::vector<SiftKeypoint> keypoints(bytes.size / kKeypointBytes);
-  const std::uint8_t* from = bytes.data;
-  for (SiftKeypoint& keypoint : keypoints) {
-    keypoint = {getReal<float>(from), getReal<float>(from + 4), getReal<float>(from + 8), getReal<float>(from + 12)};
+Keypoints unpackKeypoints(sqlite::Bytes bytes) {
+  const std::size_t count = bytes.size / kKeypointBytes;
+  Keypoints keypoints;
+  keypoints.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint8_t* from = bytes.data + i * kKeypointBytes;
+    const Keypoint keypoint{getReal<float>(from), getReal<float>(from + 4), getReal<float>(from + 8),
+                            getReal<float>(from + 12)};
     for (const float value : {keypoint.x_px, keypoint.y_px, keypoint.size_px, keypoint.angle_deg}) {
       if (!std::isfinite(value)) throw std::runtime_error("a keypoint is not finite");
     }
-    from += kKeypointBytes;
+    keypoints.push_back(keypoint);
   }
   return keypoints;
 }

@@ -11,7 +11,7 @@
 
 #include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
@@ -23,8 +23,8 @@ namespace visual_localization::map_schema {
 /// "vlmp" in the file's header (PRAGMA application_id): tells a map from any other SQLite file.
 constexpr std::int64_t kApplicationId = 0x766C6D70;
 constexpr std::int64_t kMaxImages = 100'000'000;
-constexpr std::int64_t kMaxFeaturesPerImage =
-    SiftConfig::kMostFeatures;  ///< the time to match two images grows with its square
+constexpr std::int64_t kMaxFeaturesPerImage = 20000;  ///< the time to match two images grows with its square
+constexpr std::int64_t kMaxDescriptorBytes = 1024;    ///< of one descriptor in a file
 constexpr std::size_t kMaxSessions = 10'000;
 constexpr std::size_t kMaxNameBytes = 1000;      ///< of a session; each image that is exported has one
 constexpr std::size_t kMaxMetaValues = 400'000;  ///< a session has about 30
@@ -32,7 +32,7 @@ constexpr std::size_t kHistogramBytes = GlobalFeatures::kSize * sizeof(float);
 constexpr std::size_t kKeypointBytes = 16;
 /// Of the largest row that may be read: the features of one image. Its landmarks are smaller.
 constexpr std::int64_t kMaxRowBytes =
-    kMaxFeaturesPerImage * static_cast<std::int64_t>(kKeypointBytes + SiftFeatures::kDescriptorSize) + 4096;
+    kMaxFeaturesPerImage * (static_cast<std::int64_t>(kKeypointBytes) + kMaxDescriptorBytes) + 4096;
 
 /// From this version on sessions have a camera and a mask.
 constexpr int kSinceCameras = 4;
@@ -45,6 +45,8 @@ constexpr int kSinceHistory = 6;
 /// Upright and Hellinger features, and as many values to say so.
 constexpr int kSinceUpright = 7;
 
+/// From this version on a map says which kind of local features it holds.
+constexpr int kSinceKinds = 8;
 /// From this version on a session's camera may differ from the calibration that was published for it.
 constexpr int kSincePublished = 7;
 
@@ -107,9 +109,9 @@ std::vector<std::uint8_t> packMask(const Mask& mask);
 Mask unpackMask(sqlite::Bytes bytes, const cv::Size& size);
 
 /// Four little-endian 32-bit floats a keypoint: x, y, size, angle.
-std::vector<std::uint8_t> packKeypoints(const std::vector<SiftKeypoint>& keypoints);
+std::vector<std::uint8_t> packKeypoints(const Keypoints& keypoints);
 /// Inverse of packKeypoints(). Throws std::runtime_error when a value is not finite.
-std::vector<SiftKeypoint> unpackKeypoints(sqlite::Bytes bytes);
+Keypoints unpackKeypoints(sqlite::Bytes bytes);
 
 /// 128 little-endian 32-bit floats.
 std::vector<std::uint8_t> packHistogram(const GlobalFeatures::Histogram& histogram);

@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "base/files.h"
@@ -24,7 +25,7 @@ Bytes bytesOf(const std::vector<std::uint8_t>& bytes) { return {bytes.data(), by
 std::optional<map_schema::PackedGeometry> packedGeometry(std::int64_t id, const TrainingImage& image) {
   if (!image.geometry) return std::nullopt;
   try {
-    return map_schema::packGeometry(*image.geometry, image.sift.size());
+    return map_schema::packGeometry(*image.geometry, image.local.size());
   } catch (const std::runtime_error& error) {
     throw sqlite::Error("image " + std::to_string(id) + ": " + error.what());
   }
@@ -58,18 +59,20 @@ auto withPath(const std::string& path, Write write) {
 /// The open file and what has been written to it.
 class MapWriter::Tables {
  public:
-  explicit Tables(const PartialFile& file)
-      : database_(createTables(file.path())), looks_(std::make_unique<Looks>(database_)) {}
+  Tables(const PartialFile& file, Kind kind)
+      : kind_(std::move(kind)), database_(createTables(file.path())), looks_(std::make_unique<Looks>(database_)) {}
 
   void append(const TrainingImage& image) {
     requireStorable(image);
-    poses_.add(image, image.sift.size());
-    looks_->write(map_schema::rowOf(poses_, poses_.size() - 1), image);
+    poses_.add(image, image.local.size());
+    looks_->write(map_schema::rowOf(poses_, poses_.size() - 1), image, *kind_);
     if (image.geometry) ++geometry_count_;
   }
 
   void finish(const MapHeader& header) {
     // What is written can be opened.
+    if (header.kind->name() != kind_->name())
+      throw sqlite::Error("its local features are not '" + header.kind->name() + "'");
     if (const auto reason = whyTooLarge(header.image_size)) throw sqlite::Error("its images are too large: " + *reason);
     // Behind each other in the file, because they are read together when the map is opened.
     for (std::size_t i = 0; i < poses_.size(); ++i) writePose(i);
@@ -91,12 +94,13 @@ class MapWriter::Tables {
           previews_(database, "INSERT INTO previews VALUES(?,?,?)"),
           landmarks_(database, "INSERT INTO landmarks VALUES(?,?,?,?)") {}
 
-    void write(const ImageRow& row, const TrainingImage& image) {
+    void write(const ImageRow& row, const TrainingImage& image, const LocalFeatureKind& kind) {
       const std::optional<map_schema::PackedGeometry> geometry = packedGeometry(row.id, image);
-      const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(image.sift.keypoints());
+      const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(image.local.keypoints());
       const std::vector<std::uint8_t> wgoh = map_schema::packHistogram(image.global.wgoh);
       const std::vector<std::uint8_t> wgii = map_schema::packHistogram(image.global.wgii);
-      writeRow(features_, row, {bytesOf(keypoints), bytesOf(image.sift.descriptors())});
+      const std::vector<std::uint8_t> descriptors = kind.pack(image.local);
+      writeRow(features_, row, {bytesOf(keypoints), bytesOf(descriptors)});
       writeRow(globals_, row, {bytesOf(wgoh), bytesOf(wgii)});
       writeRow(previews_, row, {bytesOf(image.preview_jpeg)});
       if (geometry) writeRow(landmarks_, row, {bytesOf(geometry->pose), bytesOf(geometry->points)});
@@ -118,8 +122,8 @@ class MapWriter::Tables {
   };
 
   void requireStorable(const TrainingImage& image) const {
-    if (image.sift.size() <= static_cast<std::size_t>(map_schema::kMaxFeaturesPerImage)) return;
-    throw sqlite::Error("image " + std::to_string(poses_.size()) + " has " + std::to_string(image.sift.size()) +
+    if (image.local.size() <= static_cast<std::size_t>(map_schema::kMaxFeaturesPerImage)) return;
+    throw sqlite::Error("image " + std::to_string(poses_.size()) + " has " + std::to_string(image.local.size()) +
                         " features, the limit is " + std::to_string(map_schema::kMaxFeaturesPerImage));
   }
 
@@ -170,6 +174,7 @@ class MapWriter::Tables {
     }
   }
 
+  Kind kind_;
   sqlite::Database database_;
   std::unique_ptr<Looks> looks_;
   std::unique_ptr<Statement> pose_row_;
@@ -182,13 +187,13 @@ MapLoading strictLoading(std::size_t cache_bytes) {
   return {cache_bytes, [](const std::string& reason) { throw MapStoreError(reason); }};
 }
 
-MapWriter::MapWriter(const std::string& path)
+MapWriter::MapWriter(const std::string& path, Kind kind)
     : path_(path),
       file_(withPath(path, [&path] { return std::make_unique<PartialFile>(path); })),
-      tables_(withPath(path, [this] { return std::make_unique<Tables>(*file_); })) {}
+      tables_(withPath(path, [&] { return std::make_unique<Tables>(*file_, std::move(kind)); })) {}
 
-MapWriter::MapWriter(const PartialFile& file)
-    : path_(file.path()), tables_(withPath(path_, [&file] { return std::make_unique<Tables>(file); })) {}
+MapWriter::MapWriter(const PartialFile& file, Kind kind)
+    : path_(file.path()), tables_(withPath(path_, [&] { return std::make_unique<Tables>(file, std::move(kind)); })) {}
 
 MapWriter::~MapWriter() = default;
 
@@ -204,7 +209,7 @@ void MapWriter::finish(const MapHeader& header) {
 }
 
 void saveMap(const TrainingMap& map, const std::string& path) {
-  MapWriter writer(path);
+  MapWriter writer(path, map.header().kind);
   for (std::size_t i = 0; i < map.size(); ++i) writer.append(map.image(i));
   writer.finish(map.header());
 }

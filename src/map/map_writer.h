@@ -4,6 +4,8 @@
 #include <memory>
 #include <string>
 
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
 
@@ -19,10 +21,11 @@ MapLoading strictLoading(std::size_t cache_bytes);
 /// file, filled in one transaction under a temporary name beside its own: without finish() nothing has happened.
 class MapWriter {
  public:
-  /// Throws MapStoreError when the file cannot be made.
-  explicit MapWriter(const std::string& path);
+  using Kind = std::shared_ptr<const LocalFeatureKind>;
+  /// `kind`: of the local features, which the header must name too. Throws MapStoreError when the file cannot be made.
+  explicit MapWriter(const std::string& path, Kind kind = std::make_shared<Sift>());
   /// Into a file that stays the caller's: nothing is put in place. Throws MapStoreError.
-  explicit MapWriter(const PartialFile& file);
+  explicit MapWriter(const PartialFile& file, Kind kind = std::make_shared<Sift>());
   ~MapWriter();
   MapWriter(const MapWriter&) = delete;
   MapWriter& operator=(const MapWriter&) = delete;

@@ -64,7 +64,7 @@ const std::vector<TrainingImage>& checked(const std::vector<TrainingImage>& imag
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (!images[i].geometry) continue;
     try {
-      requireUsable(*images[i].geometry, images[i].sift.size());
+      requireUsable(*images[i].geometry, images[i].local.size());
     } catch (const std::runtime_error& error) {
       refuse(i, error.what());
     }
@@ -102,7 +102,7 @@ void TrainingPoses::add(const TrainingPose& pose, std::size_t feature_count) {
 TrainingPoses posesOf(const std::vector<TrainingImage>& images) {
   TrainingPoses poses;
   poses.reserve(images.size());
-  for (const TrainingImage& image : images) poses.add(image, image.sift.size());
+  for (const TrainingImage& image : images) poses.add(image, image.local.size());
   return poses;
 }
 
@@ -124,7 +124,7 @@ TrainingMap::TrainingMap(MapHeader header, TrainingPoses poses, std::unique_ptr<
 
 TrainingMap::~TrainingMap() = default;
 
-std::shared_ptr<const SiftFeatures> TrainingMap::sift(std::size_t i) const { return store_->sift(i); }
+std::shared_ptr<const LocalFeatures> TrainingMap::local(std::size_t i) const { return store_->local(i); }
 
 std::shared_ptr<const GlobalFeatures> TrainingMap::global(std::size_t i) const { return store_->global(i); }
 
@@ -142,10 +142,10 @@ TrainingPose TrainingMap::pose(std::size_t i) const {
 
 TrainingImage TrainingMap::image(std::size_t i) const {
   const TrainingPose taken_at = pose(i);  // GCC 9 and 10 crash at an unnamed one
-  TrainingImage image{taken_at, *store_->sift(i), *store_->global(i), store_->preview(i)};
+  TrainingImage image{taken_at, *store_->local(i), *store_->global(i), store_->preview(i)};
   const std::shared_ptr<const ImageGeometry> geometry = store_->geometry(i);
   // Features that cannot be read count as none, and landmarks belong to features.
-  if (geometry && image.sift.size() == featureCount(i)) image.geometry = *geometry;
+  if (geometry && image.local.size() == featureCount(i)) image.geometry = *geometry;
   return image;
 }
 

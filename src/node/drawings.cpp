@@ -87,14 +87,14 @@ class ImagePair {
   cv::Mat canvas_;
 };
 
-cv::Point2f positionOf(const SiftKeypoint& keypoint) { return {keypoint.x_px, keypoint.y_px}; }
+cv::Point2f positionOf(const Keypoint& keypoint) { return {keypoint.x_px, keypoint.y_px}; }
 
 }  // namespace
 
-cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
+cv::Mat drawMatches(const cv::Mat& grey, const LocalFeatures& sift, const TrainingMap& map, std::size_t training,
                     const MatchConfig& match) {
   ImagePair images(grey, map, training);
-  const std::shared_ptr<const SiftFeatures> training_sift = map.sift(training);
+  const std::shared_ptr<const LocalFeatures> training_sift = map.local(training);
   std::vector<FeatureMatch> matches;
   matchBy(match, sift, *training_sift, map.header().image_size.width, matches);
   std::size_t line = 0;
@@ -107,7 +107,7 @@ cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const Trainin
 
 cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, const TrainingMap& map) {
   ImagePair images(grey, map, matched.training_image);
-  const std::shared_ptr<const SiftFeatures> training_sift = map.sift(matched.training_image);
+  const std::shared_ptr<const LocalFeatures> training_sift = map.local(matched.training_image);
   for (const bool inlier : {false, true}) {  // what counts lies on top
     for (const MatchedLandmark& landmark : matched.landmarks) {
       if (landmark.inlier != inlier || landmark.training_feature >= training_sift->size()) continue;

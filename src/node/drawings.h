@@ -8,8 +8,8 @@
 #include <opencv2/core.hpp>
 #include <visual_localization/LocalizationStatus.h>
 
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/map/training_map.h"
 
@@ -19,7 +19,7 @@ namespace visual_localization {
 /// localizer compares them by. `grey`: 8-bit, one channel, any size; `sift`: its features in pixels of the map's image
 /// size. The map keeps only a small preview of a training image, which is enlarged; without one the right half stays
 /// dark. Returns an 8-bit BGR image.
-cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
+cv::Mat drawMatches(const cv::Mat& grey, const LocalFeatures& sift, const TrainingMap& map, std::size_t training,
                     const MatchConfig& match);
 
 /// The same with the landmarks of a metric pose beside the training image that shares most of them: green those that

@@ -31,7 +31,7 @@ std::string brightness(const ImageStatistics& image) {
 }
 
 std::string features(const Estimate& estimate) {
-  if (estimate.evidence.features != FeatureKind::kSift) return "Hardly any structure in the image";
+  if (estimate.evidence.features != FeatureKind::kLocal) return "Hardly any structure in the image";
   const std::string kept = std::to_string(estimate.image.features_kept);
   if (estimate.image.features_kept == estimate.image.features_extracted) return kept + " features in the image";
   return kept + " of " + std::to_string(estimate.image.features_extracted) +

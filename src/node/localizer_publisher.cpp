@@ -341,7 +341,7 @@ void LocalizerPublisher::publishMatches(const LocalizedImage& image) {
   const SharedLocalizer::Result& result = image.result;
   const cv::Mat canvas =
       result.landmarks.landmarks.empty()
-          ? drawMatches(image.grey, result.sift, *result.map, result.estimate.tracked.best_image, result.match)
+          ? drawMatches(image.grey, result.local, *result.map, result.estimate.tracked.best_image, result.match)
           : drawLandmarks(image.grey, result.landmarks, *result.map);
   matches_.publish(cv_bridge::CvImage(image.header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
 }

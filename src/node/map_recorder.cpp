@@ -22,6 +22,7 @@
 #include "node/node_config.h"
 #include "node/stamps.h"
 #include "ros/message_readers.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"

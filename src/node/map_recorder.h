@@ -28,7 +28,7 @@
 #include "ros/static_transforms.h"
 #include "visual_localization/WriteMap.h"
 #include "visual_localization/features/front_end.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/map/map_builder.h"
 #include "visual_localization/map/training_map.h"
@@ -197,7 +197,7 @@ class MapRecorder {
   std::optional<std::string> fix_frame_;
   std::size_t published_ = 0;
   // What has its own lock, or does not change.
-  std::unique_ptr<SiftExtractor> extractor_;
+  std::unique_ptr<LocalExtractor> extractor_;
   LatestQueue<ReceivedImage> queue_;
   std::thread looker_;
   std::vector<ros::Subscriber> subscribers_;

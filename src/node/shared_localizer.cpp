@@ -97,7 +97,7 @@ std::optional<SharedLocalizer::Result> SharedLocalizer::process(std::int64_t sta
   const Estimate estimate = localizer_->process(stamp_ns, grey);
   return Result{estimate,
                 localizer_->particles(),
-                localizer_->lastSift(),
+                localizer_->lastLocal(),
                 config_.match,
                 localizer_->lastLandmarks(),
                 localizer_->camera(),

@@ -13,7 +13,7 @@
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {
@@ -31,7 +31,7 @@ class SharedLocalizer {
   struct Result {
     Estimate estimate;
     std::vector<Particle> particles;
-    SiftFeatures sift;                  ///< of the image, after pruning; empty when they were not needed
+    LocalFeatures local;                ///< of the image, after pruning; empty when they were not needed
     MatchConfig match;                  ///< the rule that SIFT features are matched by
     MatchedLandmarks landmarks;         ///< see Localizer::lastLandmarks
     std::optional<CameraModel> camera;  ///< see Localizer::camera

@@ -349,13 +349,13 @@ class Search {
   }
 
   double globally(const GlobalFeatures& a, const GlobalFeatures& b) const { return global_.compare(a, b).similarity; }
-  double bySift(std::size_t a, std::size_t b) const { return sift_.compare(*map_.sift(a), *map_.sift(b)).similarity; }
+  double bySift(std::size_t a, std::size_t b) const { return sift_.compare(*map_.local(a), *map_.local(b)).similarity; }
 
   /// The feature counts of the map save reading what is too much; the features themselves are what counts.
   bool takeWork(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far) {
     const auto said = [this](std::size_t i) { return map_.featureCount(i); };
     if (workOf(image, near, far, said) > work_left_) return false;
-    const std::uint64_t work = workOf(image, near, far, [this](std::size_t i) { return map_.sift(i)->size(); });
+    const std::uint64_t work = workOf(image, near, far, [this](std::size_t i) { return map_.local(i)->size(); });
     if (work > work_left_) return false;
     work_left_ -= work;
     return true;
@@ -388,7 +388,7 @@ class Search {
   const TrainingMap& map_;
   AmbiguityConfig config_;
   GlobalSimilarity global_;
-  SiftSimilarity sift_;
+  LocalSimilarity sift_;
   std::uint64_t work_left_;
   std::vector<std::shared_ptr<const GlobalFeatures>> globals_;  ///< of every stride_-th image
   std::vector<Neighbour> neighbours_;

@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include "visual_localization/base/progress.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/map/training_map.h"
 

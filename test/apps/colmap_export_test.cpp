@@ -45,11 +45,11 @@ std::vector<TrainingImage> seenImages(const CameraModel& camera) {
     TrainingImage& image = images[i];
     image.stamp_ns = 1'000'000'000 * static_cast<std::int64_t>(i + 1) + 7;
     image.session = i < 2 ? 0 : 1;
-    image.sift = test::randomFeatures(3, random);
+    image.local = test::randomFeatures(3, random);
     if (i == 4) continue;  // not adjusted
     ImageGeometry geometry;
     geometry.camera = {levelCamera(0.05 * static_cast<double>(i)), {static_cast<double>(i), 0.1, 1.0}};
-    std::vector<SiftKeypoint> keypoints = image.sift.keypoints();
+    std::vector<Keypoint> keypoints = image.local.keypoints().list();
     for (std::uint32_t k = 0; k < 2; ++k) {
       const Eigen::Vector2d seen_px = camera.project(geometry.camera.toCamera(landmarks[k]));
       keypoints[k + 1].x_px = static_cast<float>(seen_px.x() + kOffsets_px[i]);
@@ -57,7 +57,7 @@ std::vector<TrainingImage> seenImages(const CameraModel& camera) {
       const Eigen::Vector3f offset_m = (landmarks[k] - geometry.camera.position_m).cast<float>();
       geometry.landmarks.push_back({k + 1, 40 + k, offset_m, 0.1F, 0.1F});
     }
-    image.sift = SiftFeatures(keypoints, image.sift.descriptors());
+    image.local = LocalFeatures(keypoints, image.local.bytes());
     image.geometry = geometry;
   }
   return images;
@@ -119,8 +119,8 @@ TEST(ColmapExport, ImagesHaveNamesWithoutSpacesAndAllTheirFeatures) {
   for (std::size_t i = 0; i < 4; ++i) {
     const std::vector<std::string>& features = lines[2 * i + 1];
     ASSERT_EQ(features.size(), 9U);
-    EXPECT_EQ(std::stof(features[0]), map.sift(i)->keypoints()[0].x_px + 0.5F);
-    EXPECT_EQ(std::stof(features[1]), map.sift(i)->keypoints()[0].y_px + 0.5F);
+    EXPECT_EQ(std::stof(features[0]), map.local(i)->keypoints()[0].x_px + 0.5F);
+    EXPECT_EQ(std::stof(features[1]), map.local(i)->keypoints()[0].y_px + 0.5F);
     EXPECT_EQ(features[2] + ' ' + features[5] + ' ' + features[8], "-1 40 41");
   }
 }

@@ -61,17 +61,17 @@ class StreetImage final : public test::FakeImage {
     global_ = streets_.global(at);
   }
   Score compare(FeatureKind kind, std::size_t i) override {
-    return kind == FeatureKind::kSift ? by_sift_.compare(sift_, *map_.sift(i))
-                                      : by_global_.compare(global_, *map_.global(i));
+    return kind == FeatureKind::kLocal ? by_sift_.compare(sift_, *map_.local(i))
+                                       : by_global_.compare(global_, *map_.global(i));
   }
-  std::size_t siftFeatures() override { return sift_.size(); }
+  std::size_t localFeatures() override { return sift_.size(); }
 
  private:
   const StreetMap& streets_;
   const TrainingMap& map_;
-  SiftFeatures sift_;
+  LocalFeatures sift_;
   GlobalFeatures global_;
-  SiftSimilarity by_sift_{MatchConfig(), SimilarityConfig()};
+  LocalSimilarity by_sift_{MatchConfig(), SimilarityConfig()};
   GlobalSimilarity by_global_{SimilarityConfig()};
 };
 

@@ -9,7 +9,8 @@
 
 #include "features/nearest_descriptors.h"
 #include "test/benchmark/descriptor_sets.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/localization/scores.h"
 
 namespace visual_localization::benchmarks {
@@ -18,21 +19,21 @@ namespace {
 constexpr double kRatio = 0.6;
 
 struct Pair {
-  SiftFeatures a;
-  SiftFeatures b;
+  LocalFeatures a;
+  LocalFeatures b;
 };
 
 Pair pairOf(const benchmark::State& state) {
   const auto count = static_cast<std::size_t>(state.range(0));
-  SiftFeatures a = randomDescriptors(count, 1);
-  SiftFeatures b = overlappingDescriptors(a, count, 0.3, 2);
+  LocalFeatures a = randomDescriptors(count, 1);
+  LocalFeatures b = overlappingDescriptors(a, count, 0.3, 2);
   return {std::move(a), std::move(b)};
 }
 
 /// As float rows, which OpenCV's matchers want.
-cv::Mat floatRows(const SiftFeatures& features) {
-  cv::Mat bytes(static_cast<int>(features.size()), static_cast<int>(SiftFeatures::kDescriptorSize), CV_8UC1,
-                const_cast<std::uint8_t*>(features.descriptors().data()));
+cv::Mat floatRows(const LocalFeatures& features) {
+  cv::Mat bytes(static_cast<int>(features.size()), static_cast<int>(kSiftDimension), CV_8UC1,
+                const_cast<std::uint8_t*>(features.bytes().data()));
   cv::Mat rows;
   bytes.convertTo(rows, CV_32F);
   return rows;
@@ -41,8 +42,7 @@ cv::Mat floatRows(const SiftFeatures& features) {
 /// Multiply-accumulates a second; 128 for each pair of descriptors, once for both directions.
 void countMacs(benchmark::State& state) {
   const auto pairs = static_cast<double>(state.range(0) * state.range(0));
-  state.counters["MAC/s"] =
-      benchmark::Counter(pairs * SiftFeatures::kDescriptorSize, benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["MAC/s"] = benchmark::Counter(pairs * kSiftDimension, benchmark::Counter::kIsIterationInvariantRate);
 }
 
 void symmetricMatch(benchmark::State& state) {
@@ -53,7 +53,7 @@ void symmetricMatch(benchmark::State& state) {
 
 void similarity(benchmark::State& state) {
   const Pair pair = pairOf(state);
-  const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
+  const LocalSimilarity sift{MatchConfig(), SimilarityConfig()};
   for (auto _ : state) benchmark::DoNotOptimize(sift.compare(pair.a, pair.b));
   countMacs(state);
 }
@@ -61,7 +61,7 @@ void similarity(benchmark::State& state) {
 /// Mutual nearest neighbours and votes for a common displacement.
 void votes(benchmark::State& state) {
   const Pair pair = pairOf(state);
-  const SiftSimilarity sift{{kRatio, "votes"}, SimilarityConfig()};
+  const LocalSimilarity sift{{kRatio, "votes"}, SimilarityConfig()};
   for (auto _ : state) benchmark::DoNotOptimize(sift.compare(pair.a, pair.b));
   countMacs(state);
 }
@@ -131,7 +131,7 @@ void opencvFlann(benchmark::State& state) { opencvMatch(state, cv::FlannBasedMat
 void eigenProduct(benchmark::State& state) {
   using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Pair pair = pairOf(state);
-  const auto unitRows = [](const SiftFeatures& features) {
+  const auto unitRows = [](const LocalFeatures& features) {
     const cv::Mat rows = floatRows(features);
     Rows result = Eigen::Map<const Rows>(rows.ptr<float>(), rows.rows, rows.cols);
     result.rowwise().normalize();

@@ -10,6 +10,7 @@
 
 #include "evaluation/round_recorder.h"
 #include "visual_localization/bag/bag_reader.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/localization/localizer.h"
 
 namespace visual_localization {

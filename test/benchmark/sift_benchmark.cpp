@@ -17,7 +17,8 @@
 #include "features/sift/descriptor.h"
 #include "features/sift/extrema.h"
 #include "features/sift/scale_space.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
@@ -154,7 +155,7 @@ void orientation(benchmark::State& state, const NamedImages& set) {
 void description(benchmark::State& state, const NamedImages& set) {
   const Prepared prepared(set.images.front());
   SiftDescriber describer;
-  std::uint8_t descriptor[SiftFeatures::kDescriptorSize];
+  std::uint8_t descriptor[kSiftDimension];
   for (auto _ : state) {
     for (const SiftPoint& point : prepared.oriented) {
       describer.describe(prepared.levelOf(point), point, descriptor);

@@ -14,6 +14,7 @@
 
 #include "base/numbers.h"
 #include "features/global_histograms.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::benchmark {
@@ -54,7 +55,7 @@ class StreetMap {
   TrainingImage image(std::size_t i) const {
     TrainingImage image;
     static_cast<TrainingPose&>(image) = place(i);
-    image.sift = view(i, 0);
+    image.local = view(i, 0);
     image.global = global(i);
     return image;
   }
@@ -66,7 +67,7 @@ class StreetMap {
     TrainingImage image;
     static_cast<TrainingPose&>(image) = place(i);
     image.stamp_ns += static_cast<std::int64_t>(visit) * kVisit_ns;
-    image.sift = view(i, visit);
+    image.local = view(i, visit);
     image.global = global(i);
     ImageGeometry geometry;
     geometry.camera = cameraAt(i);
@@ -104,9 +105,9 @@ class StreetMap {
   }
 
   /// What a camera sees at the place of image `i`: the noise differs from visit to visit.
-  SiftFeatures view(std::size_t i, std::uint64_t visit) const {
-    std::vector<SiftKeypoint> keypoints(features_);
-    std::vector<std::uint8_t> descriptors(features_ * SiftFeatures::kDescriptorSize);
+  LocalFeatures view(std::size_t i, std::uint64_t visit) const {
+    std::vector<Keypoint> keypoints(features_);
+    std::vector<std::uint8_t> descriptors(features_ * kSiftDimension);
     for (std::size_t f = 0; f < features_; ++f) {
       const std::uint64_t landmark = i * new_features_ + f;
       const std::uint64_t place = mix(landmark ^ seed_);
@@ -118,9 +119,9 @@ class StreetMap {
         keypoints[f].x_px = static_cast<float>(pixel->x() + share(noise) - 0.5);
         keypoints[f].y_px = static_cast<float>(pixel->y() + share(noise >> 16U) - 0.5);
       }
-      describe(landmark, mix(i + (visit << 40U)), &descriptors[f * SiftFeatures::kDescriptorSize]);
+      describe(landmark, mix(i + (visit << 40U)), &descriptors[f * kSiftDimension]);
     }
-    return SiftFeatures(std::move(keypoints), std::move(descriptors));
+    return LocalFeatures(std::move(keypoints), std::move(descriptors));
   }
 
   /// Changes slowly along a street.
@@ -181,7 +182,7 @@ class StreetMap {
   void describe(std::uint64_t landmark, std::uint64_t visit, std::uint8_t* descriptor) const {
     std::uint64_t bits = 0;
     std::uint64_t noise = 0;
-    for (std::size_t b = 0; b < SiftFeatures::kDescriptorSize; ++b) {
+    for (std::size_t b = 0; b < kSiftDimension; ++b) {
       if (b % 8 == 0) {
         bits = mix(16 * landmark + b / 8 + seed_);
         noise = mix(bits ^ visit);

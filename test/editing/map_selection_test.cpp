@@ -35,7 +35,7 @@ TEST_F(MapSelection, KeepsWhatIsChosenToTheLastBit) {
     EXPECT_EQ(some->pose(k).stamp_ns, map_.pose(i).stamp_ns);
     EXPECT_EQ(some->pose(k).session, map_.pose(i).session);
     EXPECT_EQ(some->position_m(k), map_.position_m(i));
-    EXPECT_EQ(some->sift(k)->descriptors(), map_.sift(i)->descriptors());
+    EXPECT_EQ(some->local(k)->bytes(), map_.local(i)->bytes());
     EXPECT_TRUE(test::same(some->image(k).geometry, map_.image(i).geometry));
     ++k;
   }

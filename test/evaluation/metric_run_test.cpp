@@ -24,7 +24,7 @@ class RecordedStreet {
       image.stamp_ns = map_->pose(i).stamp_ns;
       image.truth = TruePose{map_->frame().toGeodetic(pose.position_m.head<2>()), pose.yaw_rad()};
       image.unpruned = test::viewOf(world_, camera_, pose, test::kKeypointSigma_px, random_).features;
-      image.sift = *image.unpruned;
+      image.local = *image.unpruned;
       drive_.images.push_back(image);
       truth_.push_back(
           TruePose{map_->frame().toGeodetic(poses_[i].camera.position_m.head<2>()), poses_[i].camera.yaw_rad()});

@@ -14,9 +14,9 @@ constexpr double kRatio = 0.6;
 constexpr double kLongestGap_s = 5.0;
 
 /// What is seen of the world, thing by thing.
-SiftFeatures view(const std::vector<std::uint32_t>& things) {
+LocalFeatures view(const std::vector<std::uint32_t>& things) {
   Descriptors descriptors;
-  for (const std::uint32_t thing : things) descriptors.push_back(test::randomFeatures(1, thing).descriptors());
+  for (const std::uint32_t thing : things) descriptors.push_back(test::randomFeatures(1, thing).bytes());
   return test::featuresOf(descriptors);
 }
 
@@ -28,7 +28,7 @@ DriveImage imageOf(double seconds, const std::vector<std::uint32_t>& things) {
 }
 
 void expectKept(const DriveImage& image, const std::vector<std::uint32_t>& things) {
-  EXPECT_EQ(image.sift.descriptors(), view(things).descriptors());
+  EXPECT_EQ(image.local.bytes(), view(things).bytes());
 }
 
 TEST(PruningByBothNeighbours, KeepsWhatEitherNeighbourShows) {
@@ -60,7 +60,7 @@ TEST(PruningByBothNeighbours, AnImageThatShowsNothingIsNoNeighbour) {
   std::vector<DriveImage> images{imageOf(0.0, {}), imageOf(1.0, {1, 4, 5}), imageOf(2.0, {9}), imageOf(3.0, {4, 6, 7}),
                                  imageOf(4.0, {4, 8, 9})};
   pruneByBothNeighbours(images, kRatio, kLongestGap_s);
-  EXPECT_TRUE(images[0].sift.empty());
+  EXPECT_TRUE(images[0].local.empty());
   expectKept(images[1], {1, 4, 5});
   expectKept(images[3], {4});
 }

@@ -50,11 +50,11 @@ class SyntheticRounds {
     drive->image_size = places->header().image_size;
     for (std::uint32_t i = 0; i < images; ++i) {
       trained.push_back(places->image(i));
-      trained.back().sift = randomFeatures(12, i);
+      trained.back().local = randomFeatures(12, i);
       DriveImage image;
       image.stamp_ns = trained.back().stamp_ns;
       image.truth = TruePose{places->frame().toGeodetic(trained.back().position_m)};
-      image.sift = randomFeatures(12, i);
+      image.local = randomFeatures(12, i);
       drive->images.push_back(image);
     }
     map_ = std::make_shared<TrainingMap>(places->header(), std::move(trained));

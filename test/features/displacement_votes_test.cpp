@@ -16,22 +16,22 @@ namespace {
 
 using test::randomFeatures;
 
-SiftFeatures movedTo(const SiftFeatures& features, std::vector<SiftKeypoint> keypoints) {
-  return SiftFeatures(std::move(keypoints), features.descriptors());
+LocalFeatures movedTo(const LocalFeatures& features, Keypoints keypoints) {
+  return LocalFeatures(std::move(keypoints), features.bytes());
 }
 
 /// `count` features anywhere in an image of 640 x 480 pixels.
-SiftFeatures scattered(std::size_t count, std::uint32_t seed) {
+LocalFeatures scattered(std::size_t count, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> x(0.0F, 640.0F);
   std::uniform_real_distribution<float> y(0.0F, 480.0F);
-  std::vector<SiftKeypoint> keypoints(count);
-  for (SiftKeypoint& keypoint : keypoints) keypoint = {x(random), y(random), 4.0F, 0.0F};
+  std::vector<Keypoint> keypoints(count);
+  for (Keypoint& keypoint : keypoints) keypoint = {x(random), y(random), 4.0F, 0.0F};
   return movedTo(randomFeatures(count, seed), std::move(keypoints));
 }
 
-SiftFeatures shifted(const SiftFeatures& features, std::size_t count, float right_px, float down_px) {
-  std::vector<SiftKeypoint> keypoints = features.keypoints();
+LocalFeatures shifted(const LocalFeatures& features, std::size_t count, float right_px, float down_px) {
+  std::vector<Keypoint> keypoints = features.keypoints().list();
   for (std::size_t i = 0; i < count; ++i) {
     keypoints[i].x_px += right_px;
     keypoints[i].y_px += down_px;
@@ -45,14 +45,14 @@ std::vector<FeatureMatch> oneToOne(std::size_t count) {
   return matches;
 }
 
-std::size_t votes(const SiftFeatures& a, const SiftFeatures& b, std::vector<FeatureMatch> matches,
+std::size_t votes(const LocalFeatures& a, const LocalFeatures& b, std::vector<FeatureMatch> matches,
                   double width_px = 640.0) {
   keepLargestVote(a, b, width_px, matches);
   return matches.size();
 }
 
 /// By trying the box at every pair of displacements.
-std::size_t votesByTrying(const SiftFeatures& a, const SiftFeatures& b) {
+std::size_t votesByTrying(const LocalFeatures& a, const LocalFeatures& b) {
   std::size_t most = 0;
   const auto right = [&](std::size_t i) { return b.keypoints()[i].x_px - a.keypoints()[i].x_px; };
   const auto down = [&](std::size_t i) { return std::lrint(b.keypoints()[i].y_px - a.keypoints()[i].y_px); };
@@ -69,8 +69,8 @@ std::size_t votesByTrying(const SiftFeatures& a, const SiftFeatures& b) {
 }
 
 TEST(DisplacementVotes, KeepWhatMovedAlike) {
-  const SiftFeatures a = scattered(60, 1);
-  const SiftFeatures b = shifted(shifted(a, 60, 300.0F, -200.0F), 40, -250.0F, 170.0F);  // the first 40: by 50, -30
+  const LocalFeatures a = scattered(60, 1);
+  const LocalFeatures b = shifted(shifted(a, 60, 300.0F, -200.0F), 40, -250.0F, 170.0F);  // the first 40: by 50, -30
   std::vector<FeatureMatch> matches = oneToOne(60);
   keepLargestVote(a, b, 640.0, matches);
   ASSERT_EQ(matches.size(), 40u);
@@ -79,31 +79,31 @@ TEST(DisplacementVotes, KeepWhatMovedAlike) {
 
 TEST(DisplacementVotes, AreAsManyAsTryingEveryBoxFinds) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
-    const SiftFeatures a = scattered(60, seed);
-    const SiftFeatures b = movedTo(a, scattered(60, seed + 100).keypoints());
-    const SiftFeatures c = shifted(b, 0, 0.0F, 0.0F);
+    const LocalFeatures a = scattered(60, seed);
+    const LocalFeatures b = movedTo(a, scattered(60, seed + 100).keypoints());
+    const LocalFeatures c = shifted(b, 0, 0.0F, 0.0F);
     EXPECT_EQ(votes(a, c, oneToOne(60)), votesByTrying(a, c)) << seed;
   }
 }
 
 TEST(DisplacementVotes, AreTheSameBothWays) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
-    const SiftFeatures a = scattered(80, seed);
-    const SiftFeatures b = movedTo(a, scattered(80, seed + 100).keypoints());
+    const LocalFeatures a = scattered(80, seed);
+    const LocalFeatures b = movedTo(a, scattered(80, seed + 100).keypoints());
     EXPECT_EQ(votes(a, b, oneToOne(80)), votes(b, a, oneToOne(80)));
   }
 }
 
 TEST(DisplacementVotes, TheBoxGrowsWithTheImage) {
-  const SiftFeatures a = scattered(20, 3);
-  const SiftFeatures b = shifted(a, 10, 20.0F, 0.0F);
+  const LocalFeatures a = scattered(20, 3);
+  const LocalFeatures b = shifted(a, 10, 20.0F, 0.0F);
   EXPECT_EQ(votes(a, b, oneToOne(20)), 20u);         // 24 pixels of 640
   EXPECT_EQ(votes(a, b, oneToOne(20), 320.0), 10u);  // 12 of 320
 }
 
 TEST(DisplacementVotes, SurviveWhatAMapMayClaim) {
-  const SiftFeatures a = scattered(4, 5);
-  std::vector<SiftKeypoint> keypoints = a.keypoints();
+  const LocalFeatures a = scattered(4, 5);
+  std::vector<Keypoint> keypoints = a.keypoints().list();
   keypoints[0].x_px = std::numeric_limits<float>::quiet_NaN();
   keypoints[1].y_px = std::numeric_limits<float>::infinity();
   keypoints[2].y_px = 1e30F;
@@ -112,7 +112,7 @@ TEST(DisplacementVotes, SurviveWhatAMapMayClaim) {
 }
 
 TEST(MatchMutual, AsksForNoDistinctNeighbour) {
-  const SiftFeatures a = randomFeatures(30, 7);
+  const LocalFeatures a = randomFeatures(30, 7);
   std::vector<std::size_t> twice;
   for (std::size_t i = 0; i < 30; ++i) twice.insert(twice.end(), {i, i});
   std::vector<FeatureMatch> matches;

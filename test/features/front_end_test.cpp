@@ -8,6 +8,7 @@
 
 #include "map/extraction_pool.h"
 #include "test/localization/wall_street.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/localization/scores.h"
 
 namespace visual_localization {
@@ -18,7 +19,7 @@ using test::kSecond;
 class FrontEndTest : public test::WallStreet {
  protected:
   static FrontEnd makeFrontEnd(bool prune = true) { return FrontEnd(configOf(prune)); }
-  static FrontEndConfig configOf(bool prune = true) { return {{320, 240}, {}, {}, prune, 5.0}; }
+  static FrontEndConfig configOf(bool prune = true) { return {{320, 240}, std::make_shared<Sift>(), {}, prune, 5.0}; }
 };
 
 TEST_F(FrontEndTest, OnlyAnImageThatFollowsIsPruned) {
@@ -26,7 +27,7 @@ TEST_F(FrontEndTest, OnlyAnImageThatFollowsIsPruned) {
   double along_m = 10.0;
   const auto pruned = [&](std::int64_t stamp_ns) {
     front_end.setImage(stamp_ns, viewAt(along_m += 0.6));
-    return front_end.sift().size() < front_end.siftExtracted();
+    return front_end.local().size() < front_end.localExtracted();
   };
   EXPECT_FALSE(pruned(0)) << "the first image has none before it";
   EXPECT_TRUE(pruned(1 * kSecond));
@@ -43,16 +44,16 @@ TEST_F(FrontEndTest, ExtractsOnlyWhatIsAskedFor) {
   for (int i = 0; i < 3; ++i) {
     front_end.setImage(i * kSecond, viewAt(10.0 + i));
     EXPECT_EQ(front_end.global().wgoh, GlobalExtractor().extract(viewAt(10.0 + i)).wgoh);
-    EXPECT_FALSE(front_end.siftIfExtracted());
-    EXPECT_EQ(front_end.siftExtracted(), 0U);
+    EXPECT_FALSE(front_end.localIfExtracted());
+    EXPECT_EQ(front_end.localExtracted(), 0U);
   }
-  const SiftFeatures& sift = front_end.sift();
-  ASSERT_TRUE(front_end.siftIfExtracted());
-  EXPECT_EQ(front_end.siftIfExtracted()->descriptors(), sift.descriptors());
-  EXPECT_GT(front_end.siftExtracted(), sift.size());
+  const LocalFeatures& sift = front_end.local();
+  ASSERT_TRUE(front_end.localIfExtracted());
+  EXPECT_EQ(front_end.localIfExtracted()->bytes(), sift.bytes());
+  EXPECT_GT(front_end.localExtracted(), sift.size());
   front_end.setImage(3 * kSecond, viewAt(13.0));
-  EXPECT_FALSE(front_end.siftIfExtracted()) << "a new image forgets the features of the last one";
-  EXPECT_EQ(front_end.siftExtracted(), 0U);
+  EXPECT_FALSE(front_end.localIfExtracted()) << "a new image forgets the features of the last one";
+  EXPECT_EQ(front_end.localExtracted(), 0U);
 }
 
 TEST_F(FrontEndTest, AfterGlobalFeaturesSiftIsPrunedByTheImageBeforeAllTheSame) {
@@ -61,11 +62,11 @@ TEST_F(FrontEndTest, AfterGlobalFeaturesSiftIsPrunedByTheImageBeforeAllTheSame) 
   for (int i = 0; i < 4; ++i) {
     always.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
     switching.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
-    always.sift();
+    always.local();
     if (i < 3) switching.global();
   }
-  EXPECT_EQ(switching.sift().descriptors(), always.sift().descriptors());
-  EXPECT_LT(switching.sift().size(), switching.siftExtracted());
+  EXPECT_EQ(switching.local().bytes(), always.local().bytes());
+  EXPECT_LT(switching.local().size(), switching.localExtracted());
 }
 
 TEST_F(FrontEndTest, KeepsThePreviousImageWhenTheCamerasBufferIsUsedAgain) {
@@ -79,8 +80,8 @@ TEST_F(FrontEndTest, KeepsThePreviousImageWhenTheCamerasBufferIsUsedAgain) {
     shared_buffer.setImage(i * kSecond, buffer);
     buffer.setTo(0);
   }
-  EXPECT_GT(own_buffers.sift().size(), 50U);
-  EXPECT_EQ(shared_buffer.sift().descriptors(), own_buffers.sift().descriptors());
+  EXPECT_GT(own_buffers.local().size(), 50U);
+  EXPECT_EQ(shared_buffer.local().bytes(), own_buffers.local().bytes());
   EXPECT_EQ(shared_buffer.global().wgii, own_buffers.global().wgii);
 }
 
@@ -93,17 +94,17 @@ TEST_F(FrontEndTest, AnImageThatRepeatsTheOneBeforeIsThatOneSeenLonger) {
     each->setImage(kSecond, viewAt(10.6));
     EXPECT_FALSE(each->isRepeated());
   }
-  const SiftFeatures before = front_end.sift();
+  const LocalFeatures before = front_end.local();
   for (int i = 2; i < 4; ++i) {
     front_end.setImage(i * kSecond, viewAt(10.6));
     EXPECT_TRUE(front_end.isRepeated());
-    EXPECT_EQ(front_end.sift().descriptors(), before.descriptors()) << "not pruned by itself";
+    EXPECT_EQ(front_end.local().bytes(), before.bytes()) << "not pruned by itself";
   }
   cv::Mat other_bit = viewAt(10.6);
   other_bit.at<std::uint8_t>(239, 319) ^= 1;
   for (FrontEnd* each : {&front_end, &undisturbed}) each->setImage(4 * kSecond, other_bit);
   EXPECT_FALSE(front_end.isRepeated());
-  EXPECT_EQ(front_end.sift().descriptors(), undisturbed.sift().descriptors());
+  EXPECT_EQ(front_end.local().bytes(), undisturbed.local().bytes());
 }
 
 TEST_F(FrontEndTest, AnImageOfAnotherSizeIsARepetitionWhenItIsResizedToTheSame) {
@@ -122,12 +123,12 @@ TEST_F(FrontEndTest, AnImageOfAnotherSizeIsARepetitionWhenItIsResizedToTheSame) 
 TEST_F(FrontEndTest, ADullImageShowsWhatABrightOneDoes) {
   FrontEnd front_end = makeFrontEnd();
   front_end.setImage(0, viewAt(10.0));
-  const std::size_t bright = front_end.sift().size();
+  const std::size_t bright = front_end.local().size();
   cv::Mat dull;
   viewAt(10.0).convertTo(dull, CV_8U, 0.15, 30.0);
   for (int i = 1; i < 3; ++i) {
     front_end.setImage(i * 100 * kSecond, dull);
-    EXPECT_GT(static_cast<double>(front_end.sift().size()), 0.8 * static_cast<double>(bright));
+    EXPECT_GT(static_cast<double>(front_end.local().size()), 0.8 * static_cast<double>(bright));
     EXPECT_LT(front_end.statistics().contrast, 15.0) << "as it was";
     EXPECT_EQ(front_end.isRepeated(), i == 2);
   }
@@ -139,9 +140,9 @@ TEST_F(FrontEndTest, ADullImageIsTheSameInTraining) {
     viewAt(10.0).convertTo(dull, CV_8U, gain, 20.0);
     FrontEnd front_end = makeFrontEnd();
     front_end.setImage(0, dull);
-    ExtractionPool pool(SiftConfig(), kNativeSift, 0, 1);
+    ExtractionPool pool(Sift(), {}, 0, 1);
     const std::vector<TrainingImage> training = pool.extract({RawImage{TrainingPose(), dull}});
-    EXPECT_EQ(front_end.sift().descriptors(), training.front().sift.descriptors()) << gain;
+    EXPECT_EQ(front_end.local().bytes(), training.front().local.bytes()) << gain;
     EXPECT_EQ(front_end.global().wgii, training.front().global.wgii) << gain;
   }
 }
@@ -149,18 +150,18 @@ TEST_F(FrontEndTest, ADullImageIsTheSameInTraining) {
 TEST_F(FrontEndTest, AnImageThatStaysIsPrunedAsTheNewParametersSay) {
   FrontEnd front_end = makeFrontEnd();
   for (int i = 0; i < 2; ++i) front_end.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
-  const std::size_t pruned = front_end.sift().size();
-  EXPECT_LT(pruned, front_end.siftExtracted());
+  const std::size_t pruned = front_end.local().size();
+  EXPECT_LT(pruned, front_end.localExtracted());
   front_end.configure(configOf(false));
   front_end.setImage(2 * kSecond, viewAt(10.5));
   ASSERT_TRUE(front_end.isRepeated());
-  EXPECT_EQ(front_end.sift().size(), front_end.siftExtracted());
+  EXPECT_EQ(front_end.local().size(), front_end.localExtracted());
 }
 
 TEST_F(FrontEndTest, NoiseIsNotSpread) {
   FrontEnd front_end = makeFrontEnd();
   front_end.setImage(0, noisy(cv::Mat(240, 320, CV_8UC1, cv::Scalar(20)), 1, 2.0));
-  EXPECT_LT(front_end.sift().size(), 10U);
+  EXPECT_LT(front_end.local().size(), 10U);
 }
 
 TEST_F(FrontEndTest, SaysWhatTheImageIsLike) {
@@ -179,8 +180,8 @@ TEST_F(FrontEndTest, WithoutPruningAllFeaturesAreKept) {
   FrontEnd front_end = makeFrontEnd(false);
   for (int i = 0; i < 3; ++i) {
     front_end.setImage(i * kSecond, viewAt(10.0 + 0.5 * i));
-    EXPECT_GT(front_end.sift().size(), 50U);
-    EXPECT_EQ(front_end.sift().size(), front_end.siftExtracted());
+    EXPECT_GT(front_end.local().size(), 50U);
+    EXPECT_EQ(front_end.local().size(), front_end.localExtracted());
   }
 }
 
@@ -192,20 +193,20 @@ TEST_F(FrontEndTest, BothKindsSeeTheImageInTheMapsSize) {
   cv::resize(large, small, cv::Size(320, 240), 0, 0, cv::INTER_AREA);
   front_end.setImage(0, large);
   EXPECT_EQ(front_end.global().wgoh, GlobalExtractor().extract(small).wgoh);
-  EXPECT_EQ(front_end.sift().descriptors(), makeSiftExtractor(SiftConfig())->extract(small).descriptors());
+  EXPECT_EQ(front_end.local().bytes(), makeSiftExtractor(SiftConfig())->extract(small).bytes());
 }
 
 TEST_F(FrontEndTest, ARefusedImageChangesNothing) {
   FrontEnd front_end = makeFrontEnd();
   front_end.setImage(0, viewAt(10.0));
   front_end.setImage(kSecond, viewAt(10.5));
-  const SiftFeatures before = front_end.sift();
+  const LocalFeatures before = front_end.local();
   EXPECT_THROW(front_end.setImage(2 * kSecond, cv::Mat(240, 320, CV_8UC3)), std::invalid_argument);
-  EXPECT_EQ(front_end.sift().descriptors(), before.descriptors());
+  EXPECT_EQ(front_end.local().bytes(), before.bytes());
   FrontEnd undisturbed = makeFrontEnd();
   undisturbed.setImage(kSecond, viewAt(10.5));
   for (FrontEnd* each : {&front_end, &undisturbed}) each->setImage(3 * kSecond, viewAt(11.0));
-  EXPECT_EQ(front_end.sift().descriptors(), undisturbed.sift().descriptors());
+  EXPECT_EQ(front_end.local().bytes(), undisturbed.local().bytes());
 }
 
 TEST_F(FrontEndTest, TheTimeCountsWhatWasExtracted) {
@@ -217,10 +218,10 @@ TEST_F(FrontEndTest, TheTimeCountsWhatWasExtracted) {
   EXPECT_GT(global_ms, none_ms);
   front_end.global();
   EXPECT_EQ(front_end.extract_ms(), global_ms);
-  front_end.sift();
+  front_end.local();
   const double both_ms = front_end.extract_ms();
   EXPECT_GT(both_ms, global_ms);
-  front_end.sift();
+  front_end.local();
   EXPECT_EQ(front_end.extract_ms(), both_ms);
 }
 
@@ -239,12 +240,12 @@ TEST_F(FrontEndTest, FeaturesUnderTheMaskAreNotUsed) {
   all.setImage(0, viewAt(10.0));
   masked.setImage(0, viewAt(10.0));
   std::vector<std::size_t> right;
-  for (std::size_t i = 0; i < all.sift().size(); ++i) {
-    if (std::lround(all.sift().keypoints()[i].x_px) >= 160) right.push_back(i);
+  for (std::size_t i = 0; i < all.local().size(); ++i) {
+    if (std::lround(all.local().keypoints()[i].x_px) >= 160) right.push_back(i);
   }
   ASSERT_GT(right.size(), 10U);
-  ASSERT_LT(right.size(), all.sift().size());
-  EXPECT_EQ(masked.sift().descriptors(), all.sift().subset(right).descriptors());
+  ASSERT_LT(right.size(), all.local().size());
+  EXPECT_EQ(masked.local().bytes(), all.local().subset(right).bytes());
 }
 
 TEST_F(FrontEndTest, WhatTheMaskHidesChangesNothing) {
@@ -266,9 +267,9 @@ TEST_F(FrontEndTest, AMapIsMadeUnderTheSameMask) {
   config.mask = rightHalf();
   FrontEnd live(config);
   live.setImage(0, viewAt(10.0));
-  ExtractionPool pool({}, kNativeSift, 0, 1);
+  ExtractionPool pool(Sift(), {}, 0, 1);
   const TrainingImage training = pool.extract({{{}, viewAt(10.0), rightHalf()}}).front();
-  EXPECT_EQ(training.sift.descriptors(), live.sift().descriptors());
+  EXPECT_EQ(training.local.bytes(), live.local().bytes());
   EXPECT_EQ(training.global.wgoh, live.global().wgoh);
 }
 
@@ -277,11 +278,11 @@ TEST_F(FrontEndTest, AnotherMaskHoldsFromTheNextImageOn) {
   FrontEndConfig config = configOf(false);
   config.mask = rightHalf();
   front_end.setImage(0, viewAt(10.0));
-  const std::size_t all = front_end.sift().size();
+  const std::size_t all = front_end.local().size();
   front_end.configure(config);
   front_end.setImage(kSecond, viewAt(10.6));
-  EXPECT_LT(front_end.sift().size(), all);
-  for (const SiftKeypoint& keypoint : front_end.sift().keypoints()) EXPECT_GE(keypoint.x_px, 159.0F);
+  EXPECT_LT(front_end.local().size(), all);
+  for (const Keypoint& keypoint : front_end.local().keypoints()) EXPECT_GE(keypoint.x_px, 159.0F);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include "features/sift/native_sift_extractor.h"
 #include "test/support/allocation_counter.h"
 #include "test/support/synthetic.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
@@ -11,7 +12,7 @@ TEST(NativeSift, AllocatesNothingOnceItHasSeenSuchImages) {
   const cv::Mat wall = test::wall(400, 240, 9);
   const cv::Mat images[] = {test::viewOf(wall, 0), test::viewOf(wall, 40), test::viewOf(wall, 80)};
   NativeSiftExtractor extractor{SiftConfig()};
-  SiftFeatures features;
+  LocalFeatures features;
   for (int round = 0; round < 2; ++round) {  // there are two sets of buffers: the result's and the next result's
     for (const cv::Mat& image : images) extractor.extract(image, features);
   }

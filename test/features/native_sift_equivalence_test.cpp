@@ -10,7 +10,8 @@
 
 #include "features/sift/native_sift_extractor.h"
 #include "test/support/synthetic.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
@@ -34,20 +35,20 @@ struct Agreement {
   double same_descriptor = 0.0;  ///< share of those whose descriptors, of length 512, are less apart than allowed
 };
 
-Agreement agreement(const SiftFeatures& of, const SiftFeatures& with, double apart) {
+Agreement agreement(const LocalFeatures& of, const LocalFeatures& with, double apart) {
   std::size_t keypoints = 0;
   std::size_t descriptors = 0;
   for (std::size_t i = 0; i < of.size(); ++i) {
-    const SiftKeypoint& a = of.keypoints()[i];
+    const Keypoint& a = of.keypoints()[i];
     double nearest = HUGE_VAL;
     for (std::size_t j = 0; j < with.size(); ++j) {
-      const SiftKeypoint& b = with.keypoints()[j];
+      const Keypoint& b = with.keypoints()[j];
       if (std::hypot(a.x_px - b.x_px, a.y_px - b.y_px) > 0.5F) continue;
       if (std::abs(std::log(a.size_px / b.size_px)) > std::log(1.1F)) continue;
       if (std::abs(std::remainder(a.angle_deg - b.angle_deg, 360.0F)) > 5.0F) continue;
       double squared = 0.0;
-      for (std::size_t k = 0; k < SiftFeatures::kDescriptorSize; ++k) {
-        const double difference = of.descriptor(i)[k] - with.descriptor(j)[k];
+      for (std::size_t k = 0; k < kSiftDimension; ++k) {
+        const double difference = of.bytes(i)[k] - with.bytes(j)[k];
         squared += difference * difference;
       }
       nearest = std::min(nearest, std::sqrt(squared));
@@ -61,7 +62,7 @@ Agreement agreement(const SiftFeatures& of, const SiftFeatures& with, double apa
   return {share(keypoints, of.size()), share(descriptors, keypoints)};
 }
 
-void expectAgreement(const SiftFeatures& a, const SiftFeatures& b, double least, double apart) {
+void expectAgreement(const LocalFeatures& a, const LocalFeatures& b, double least, double apart) {
   const double count = static_cast<double>(a.size());
   EXPECT_NEAR(static_cast<double>(b.size()), count, 2.0 + (1.0 - least) * count);
   const double slack = count < 50.0 ? 2.0 / std::max(count, 2.0) : 0.0;
@@ -117,14 +118,14 @@ TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsForEveryConfiguration) {
 TEST(NativeSiftEquivalence, UprightFeaturesAreOneForEachPlaceAndScale) {
   const cv::Mat image = textured(320, 240, 6);
   SiftConfig config;
-  const SiftFeatures turned = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures turned = makeSiftExtractor(config, kNativeSift)->extract(image);
   config.upright = true;
-  const SiftFeatures upright = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures upright = makeSiftExtractor(config, kNativeSift)->extract(image);
   EXPECT_LT(upright.size(), turned.size());
   for (std::size_t i = 0; i < upright.size(); ++i) {
-    const SiftKeypoint& point = upright.keypoints()[i];
+    const Keypoint& point = upright.keypoints()[i];
     EXPECT_EQ(point.angle_deg, 0.0F);
-    EXPECT_TRUE(std::any_of(turned.keypoints().begin(), turned.keypoints().end(), [&](const SiftKeypoint& other) {
+    EXPECT_TRUE(std::any_of(turned.keypoints().begin(), turned.keypoints().end(), [&](const Keypoint& other) {
       return other.x_px == point.x_px && other.y_px == point.y_px && other.size_px == point.size_px;
     }));
   }
@@ -133,19 +134,19 @@ TEST(NativeSiftEquivalence, UprightFeaturesAreOneForEachPlaceAndScale) {
 TEST(NativeSiftEquivalence, HellingerDescriptorsAreTheRootsOfTheOthers) {
   const cv::Mat image = textured(320, 240, 6);
   SiftConfig config;
-  const SiftFeatures plain = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures plain = makeSiftExtractor(config, kNativeSift)->extract(image);
   config.hellinger = true;
-  const SiftFeatures rooted = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures rooted = makeSiftExtractor(config, kNativeSift)->extract(image);
   ASSERT_EQ(rooted.size(), plain.size());
   for (std::size_t i = 0; i < plain.size(); ++i) {
     double sum = 0.0;
-    for (std::size_t k = 0; k < SiftFeatures::kDescriptorSize; ++k) sum += plain.descriptor(i)[k];
-    for (std::size_t k = 0; k < SiftFeatures::kDescriptorSize; ++k) {
-      const double before = plain.descriptor(i)[k];
+    for (std::size_t k = 0; k < kSiftDimension; ++k) sum += plain.bytes(i)[k];
+    for (std::size_t k = 0; k < kSiftDimension; ++k) {
+      const double before = plain.bytes(i)[k];
       const auto rootOf = [sum](double bin) { return 512.0 * std::sqrt(std::max(0.0, bin) / sum); };
       // The bytes of the others are rounded, by up to a half; so is their sum.
-      EXPECT_GE(rooted.descriptor(i)[k], 0.98 * rootOf(before - 0.51) - 1.0);
-      EXPECT_LE(rooted.descriptor(i)[k], 1.02 * rootOf(before + 0.51) + 1.0);
+      EXPECT_GE(rooted.bytes(i)[k], 0.98 * rootOf(before - 0.51) - 1.0);
+      EXPECT_LE(rooted.bytes(i)[k], 1.02 * rootOf(before + 0.51) + 1.0);
     }
     EXPECT_NEAR(rooted.inverseNorm(i), 1.0 / 512.0, 0.02 / 512.0);
   }
@@ -170,7 +171,7 @@ TEST(NativeSiftEquivalence, EveryKindOfVectorFindsTheSame) {
   const cv::Mat image = textured(203, 151, 7);
   const auto extractor = makeSiftExtractor(SiftConfig(), kNativeSift);
   use(0);
-  const SiftFeatures widest = extractor->extract(image);
+  const LocalFeatures widest = extractor->extract(image);
   ASSERT_GT(widest.size(), 100U);
   const std::int64_t supported = hwy::SupportedTargets();
   std::size_t tried = 0;
@@ -187,7 +188,7 @@ TEST(NativeSiftEquivalence, EveryKindOfVectorFindsTheSame) {
 }
 
 TEST(SiftBackend, IsChosenByName) {
-  const auto isNative = [](const std::unique_ptr<SiftExtractor>& extractor) {
+  const auto isNative = [](const std::unique_ptr<LocalExtractor>& extractor) {
     return dynamic_cast<const NativeSiftExtractor*>(extractor.get()) != nullptr;
   };
   EXPECT_TRUE(isNative(makeSiftExtractor(SiftConfig())));

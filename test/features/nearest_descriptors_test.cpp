@@ -6,18 +6,19 @@
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
 
-SiftFeatures withDescriptors(const std::vector<std::vector<std::uint8_t>>& descriptors) {
+LocalFeatures withDescriptors(const std::vector<std::vector<std::uint8_t>>& descriptors) {
   return test::featuresOf(descriptors);
 }
 
 /// Bins up to `largest`, and every `duplicate_every`-th descriptor equal to the one before.
-SiftFeatures randomDescriptors(std::size_t count, int largest, std::size_t duplicate_every, std::mt19937& random) {
+LocalFeatures randomDescriptors(std::size_t count, int largest, std::size_t duplicate_every, std::mt19937& random) {
   std::uniform_int_distribution<int> bin(0, largest);
-  std::vector<std::vector<std::uint8_t>> descriptors(count, std::vector<std::uint8_t>(SiftFeatures::kDescriptorSize));
+  std::vector<std::vector<std::uint8_t>> descriptors(count, std::vector<std::uint8_t>(kSiftDimension));
   for (std::size_t i = 0; i < count; ++i) {
     for (std::uint8_t& value : descriptors[i]) value = static_cast<std::uint8_t>(bin(random));
     if (i % duplicate_every == duplicate_every - 1) descriptors[i] = descriptors[i - 1];
@@ -34,7 +35,7 @@ void expectEqual(const std::vector<TwoNearest>& actual, const std::vector<TwoNea
   }
 }
 
-void expectLikePlain(const SiftFeatures& a, const SiftFeatures& b) {
+void expectLikePlain(const LocalFeatures& a, const LocalFeatures& b) {
   NearestDescriptors fast;
   NearestDescriptors plain;
   findNearest(a, b, fast);
@@ -56,18 +57,18 @@ TEST(NearestDescriptors, AreThoseOfThePlainLoopForEverySize) {
 TEST(NearestDescriptors, AreThoseOfThePlainLoopAmongManyEquals) {
   std::mt19937 random(2);
   for (int round = 0; round < 20; ++round) {
-    const SiftFeatures a = randomDescriptors(40, 1, 2, random);
+    const LocalFeatures a = randomDescriptors(40, 1, 2, random);
     expectLikePlain(a, randomDescriptors(50, 1, 3, random));
     expectLikePlain(a, a);
   }
 }
 
 TEST(NearestDescriptors, ExtremesDoNotOverflow) {
-  const std::vector<std::uint8_t> zero(SiftFeatures::kDescriptorSize, 0);
-  const std::vector<std::uint8_t> full(SiftFeatures::kDescriptorSize, 255);
+  const std::vector<std::uint8_t> zero(kSiftDimension, 0);
+  const std::vector<std::uint8_t> full(kSiftDimension, 255);
   std::vector<std::uint8_t> half = zero;
   std::fill_n(half.begin(), 64, std::uint8_t{255});
-  const SiftFeatures all = withDescriptors({zero, full, half, zero, full});
+  const LocalFeatures all = withDescriptors({zero, full, half, zero, full});
   expectLikePlain(all, all);
   expectLikePlain(withDescriptors({zero, zero, zero}), all);
   expectLikePlain(all, withDescriptors({zero, zero}));
@@ -81,7 +82,7 @@ TEST(NearestDescriptors, ExtremesDoNotOverflow) {
 
 TEST(NearestDescriptors, NothingHasNoNeighbours) {
   NearestDescriptors nearest;
-  findNearest({}, withDescriptors({std::vector<std::uint8_t>(SiftFeatures::kDescriptorSize, 1)}), nearest);
+  findNearest({}, withDescriptors({std::vector<std::uint8_t>(kSiftDimension, 1)}), nearest);
   EXPECT_TRUE(nearest.of_a.empty());
   ASSERT_EQ(nearest.of_b.size(), 1U);
   EXPECT_EQ(nearest.of_b[0].best, -1.0F);

@@ -83,8 +83,8 @@ void use(const TrainingMap& map) {
   for (std::size_t i = 0; i < map.size() && i < kMost; ++i) {
     const TrainingImage image = map.image(i);
     if (map.nearest(image.position_m).image >= map.size()) fuzz::fail("an image that there is not");
-    if (image.sift.keypoints().size() != image.sift.size()) fuzz::fail("features do not fit together");
-    if (image.geometry) requireFitting(*image.geometry, image.sift.size());
+    if (image.local.keypoints().size() != image.local.size()) fuzz::fail("features do not fit together");
+    if (image.geometry) requireFitting(*image.geometry, image.local.size());
   }
   for (const Session& session : map.header().sessions) {
     if (session.mount) requireMount(*session.mount);

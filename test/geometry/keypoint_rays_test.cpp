@@ -4,12 +4,13 @@
 
 #include "geometry/rays.h"
 #include "test/support/landmark_world.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
 
-SiftFeatures featuresAt(const std::vector<SiftKeypoint>& keypoints) {
-  return SiftFeatures(keypoints, std::vector<std::uint8_t>(keypoints.size() * SiftFeatures::kDescriptorSize, 1));
+LocalFeatures featuresAt(const Keypoints& keypoints) {
+  return LocalFeatures(keypoints, std::vector<std::uint8_t>(keypoints.size() * kSiftDimension, 1));
 }
 
 TEST(KeypointRays, LookToWhereTheCameraProjectsFrom) {
@@ -22,14 +23,14 @@ TEST(KeypointRays, LookToWhereTheCameraProjectsFrom) {
 }
 
 TEST(KeypointRays, OfLargeFeaturesAreLessExact) {
-  const SiftFeatures features = featuresAt({{300.0F, 200.0F, 0.0F, 0.0F}, {300.0F, 200.0F, 60.0F, 0.0F}});
+  const LocalFeatures features = featuresAt({{300.0F, 200.0F, 0.0F, 0.0F}, {300.0F, 200.0F, 60.0F, 0.0F}});
   const KeypointRays rays = raysOf(features, test::streetCamera(), 0.3);
   EXPECT_NEAR(rays.sigmas[0], 0.3 / 450.0, 1e-9);
   EXPECT_NEAR(rays.sigmas[1] / rays.sigmas[0], std::hypot(1.0, 10.0), 1e-6);
 }
 
 TEST(KeypointRays, OfNothingAreNone) {
-  const KeypointRays rays = raysOf(SiftFeatures(), test::streetCamera(), 0.3);
+  const KeypointRays rays = raysOf(LocalFeatures(), test::streetCamera(), 0.3);
   EXPECT_TRUE(rays.normalised.empty());
   EXPECT_TRUE(rays.sigmas.empty());
 }

@@ -36,7 +36,7 @@ TEST(SelfCalibration, SaysNothingOnAStraightStreet) {
 
 TEST(SelfCalibration, SaysNothingOfImagesWithoutFeatures) {
   test::RecordedDrive drive = test::recorded({}, 51);
-  for (auto& view : drive.views) view = std::make_shared<const SiftFeatures>();
+  for (auto& view : drive.views) view = std::make_shared<const LocalFeatures>();
   EXPECT_FALSE(calibrateByImages(drive.unadjusted(), drive.camera.size(), {}, 1));
 }
 

@@ -63,7 +63,7 @@ TEST(SessionGeometry, OfARobotThatTurnsOnTheSpotIsNone) {
 
 TEST(SessionGeometry, WithoutTextureIsNone) {
   RecordedDrive drive = recorded({}, 10);
-  for (auto& view : drive.views) view = std::make_shared<const SiftFeatures>();
+  for (auto& view : drive.views) view = std::make_shared<const LocalFeatures>();
   const SessionGeometry geometry = adjusted(drive);
   EXPECT_EQ(geometry.images.size(), drive.truth.size());
   EXPECT_EQ(imagesIn(geometry), 0U);
@@ -76,7 +76,7 @@ TEST(SessionGeometry, HasAHoleWhereNothingIsToBeSeen) {
   test::StreetDrive street;
   street.turn_rad = 0.0;
   RecordedDrive drive = recorded(street, 11);
-  for (std::size_t i = 20; i < 25; ++i) drive.views[i] = std::make_shared<const SiftFeatures>();
+  for (std::size_t i = 20; i < 25; ++i) drive.views[i] = std::make_shared<const LocalFeatures>();
   const SessionGeometry geometry = adjusted(drive);
   EXPECT_EQ(imagesIn(geometry), drive.truth.size() - 5);
   for (std::size_t i = 20; i < 25; ++i) EXPECT_FALSE(geometry.images[i]) << i;

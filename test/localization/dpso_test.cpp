@@ -138,7 +138,7 @@ TEST(Dpso, ASingleFalseMatchDoesNotHideHowFarTheSearchReaches) {
   Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
   const TrackerInput input = world.inTheDark();
   bool given = false;
-  input.scores.startImage(FeatureKind::kSift, [&given](FeatureKind, std::size_t) {
+  input.scores.startImage(FeatureKind::kLocal, [&given](FeatureKind, std::size_t) {
     return std::exchange(given, true) ? Score{} : World::scoreAt(0.01);
   });
   const TrackerEstimate estimate = tracker.update(input);

@@ -8,7 +8,7 @@
 namespace visual_localization {
 namespace {
 
-constexpr FeatureKind kSift = FeatureKind::kSift;
+constexpr FeatureKind kSift = FeatureKind::kLocal;
 constexpr FeatureKind kGlobal = FeatureKind::kGlobal;
 
 FeatureKind after(FeatureChoice& choice, double sigma_x, double sigma_y) {

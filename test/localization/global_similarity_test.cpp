@@ -64,11 +64,11 @@ TEST(GlobalSimilarity, IsRecognisedFromTheThresholdOn) {
   EXPECT_FALSE(similarity.scoreOf(std::nextafter(0.75, 0.0)).recognised);
 }
 
-TEST(SiftSimilarity, AKnownSimilarityMeansTheSameAsAComparedOne) {
+TEST(LocalSimilarity, AKnownSimilarityMeansTheSameAsAComparedOne) {
   SimilarityConfig config;
   config.sift_recognised = 0.25;
   config.global_recognised = 0.9;  // none of its business
-  const SiftSimilarity similarity(MatchConfig(), config);
+  const LocalSimilarity similarity(MatchConfig(), config);
   const Score good = similarity.scoreOf(0.25, 12, 1.5);
   EXPECT_EQ(good.similarity, 0.25);
   EXPECT_EQ(good.weight, 0.25);

@@ -105,7 +105,7 @@ TEST(GuidedRecovery, OnlyQuantumParticlesGoWhereTheImageLooksAlike) {
   Dpso swarm = makeSwarm(world, "guided");
   const std::vector<Particle> before = swarm.particles();
   const TrackerInput input = world.inTheDark();
-  input.scores.startImage(FeatureKind::kSift, [](FeatureKind kind, std::size_t image) {
+  input.scores.startImage(FeatureKind::kLocal, [](FeatureKind kind, std::size_t image) {
     return kind == FeatureKind::kGlobal && image == 77 ? World::scoreAt(1.0) : Score{};
   });
   swarm.update(input);

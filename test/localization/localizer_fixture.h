@@ -24,7 +24,7 @@ class SeenFrom final : public FakeImage {
   explicit SeenFrom(std::shared_ptr<const TrainingMap> map) : map_(std::move(map)) {}
 
   bool isRepeated() const override { return repeated; }
-  std::size_t siftFeatures() override { return features; }
+  std::size_t localFeatures() override { return features; }
   ImageReport report() const override {
     ImageReport report;
     report.features_kept = features;
@@ -36,7 +36,7 @@ class SeenFrom final : public FakeImage {
   Score compare(FeatureKind kind, std::size_t i) override {
     if (fails) throw std::runtime_error("a camera that fails");
     ++compared;
-    const double width_m = kind == FeatureKind::kSift ? 2.0 : 10.0;
+    const double width_m = kind == FeatureKind::kLocal ? 2.0 : 10.0;
     const double offset = (map_->position_m(i) - position_m).norm() / width_m;
     const double height = map_->pose(i).session == 0 ? best : best_of_others;
     const double similarity = height * std::exp(-0.5 * offset * offset);

@@ -57,10 +57,10 @@ TEST_P(EveryCombination, TracksACameraAlongTheStreet) {
   for (int i = 0; i < 45; ++i) {
     const double along_m = 0.6 * i + 0.3;
     estimate = localizer.process(i * kSecond, viewAt(along_m));
-    const bool sift = estimate.evidence.features == FeatureKind::kSift;
+    const bool sift = estimate.evidence.features == FeatureKind::kLocal;
     by_sift += sift ? 1 : 0;
     EXPECT_EQ(estimate.image.features_extracted > 0, sift) << "global features need no SIFT";
-    EXPECT_EQ(localizer.lastSift().size(), estimate.image.features_kept);
+    EXPECT_EQ(localizer.lastLocal().size(), estimate.image.features_kept);
     EXPECT_EQ(estimate.tracked.best.matches > 0, sift);
     if (i >= 15) error_sum_m += (estimate.pose.position_m - Eigen::Vector2d(along_m, 0.0)).norm();
   }
@@ -131,15 +131,15 @@ TEST_F(LocalizerTest, HybridBeginsWithSiftWheneverThePositionIsUnknown) {
     return localizer.process(shown * kSecond, noisy(viewAt(12.0), shown));
   };
   for (const bool with_prior : {false, true}) {
-    EXPECT_EQ(next().evidence.features, FeatureKind::kSift);
+    EXPECT_EQ(next().evidence.features, FeatureKind::kLocal);
     Estimate estimate;
     for (int i = 0; i < 9; ++i) estimate = next();  // the next one is looked after by SIFT
     EXPECT_EQ(estimate.evidence.features, FeatureKind::kGlobal);
     EXPECT_EQ(estimate.image.features_extracted, 0U);
-    EXPECT_TRUE(localizer.lastSift().empty());
+    EXPECT_TRUE(localizer.lastLocal().empty());
     with_prior ? localizer.relocalize(around({12.0, 0.0}, 1.0)) : localizer.relocalize();
   }
-  EXPECT_EQ(next().evidence.features, FeatureKind::kSift);
+  EXPECT_EQ(next().evidence.features, FeatureKind::kLocal);
 }
 
 /// An image that is as much like every training image, and counts what it is asked for.
@@ -150,7 +150,7 @@ class CountingImage final : public test::FakeImage {
     by_sift = by_global = 0;
   }
   Score compare(FeatureKind kind, std::size_t) override {
-    ++(kind == FeatureKind::kSift ? by_sift : by_global);
+    ++(kind == FeatureKind::kLocal ? by_sift : by_global);
     return {similarity_, similarity_, 50, similarity_ > 0.5};
   }
   std::size_t by_sift = 0;
@@ -245,35 +245,35 @@ TEST_F(LocalizerTest, ALiveImageIsRecognisedByThePresentThreshold) {
   const FrontEndConfig front_end = frontEndConfigOf(test::swarmConfig(), map()->header());
   LiveImage image(*map(), front_end, SimilarityConfig());
   image.set(0, viewAt(12.0));
-  ASSERT_TRUE(image.compare(FeatureKind::kSift, 20).recognised);
+  ASSERT_TRUE(image.compare(FeatureKind::kLocal, 20).recognised);
   SimilarityConfig strict;
   strict.sift_recognised = strict.global_recognised = 1.0;
   image.configure(front_end, strict);
   image.set(1, viewAt(12.3));
-  const Score score = image.compare(FeatureKind::kSift, 20);
+  const Score score = image.compare(FeatureKind::kLocal, 20);
   EXPECT_GT(score.matches, 0U);
   EXPECT_FALSE(score.recognised);
 }
 
 TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
-  const SiftSimilarity sift{MatchConfig(), SimilarityConfig()};
+  const LocalSimilarity sift{MatchConfig(), SimilarityConfig()};
   LiveImage image(*map(), frontEndConfigOf(test::swarmConfig(), map()->header()), SimilarityConfig());
   image.set(0, viewAt(12.0 + 1e-9));
-  EXPECT_FALSE(image.sift()) << "nothing was asked for yet";
+  EXPECT_FALSE(image.local()) << "nothing was asked for yet";
   EXPECT_EQ(image.report().features_kept, 0U);
 
   const Score by_global = image.compare(FeatureKind::kGlobal, 20);
-  EXPECT_FALSE(image.sift()) << "global features need no SIFT";
+  EXPECT_FALSE(image.local()) << "global features need no SIFT";
   EXPECT_EQ(by_global.similarity, 1.0);  // training image 20 was taken here
   EXPECT_EQ(by_global.matches, 0U);
   EXPECT_LT(image.compare(FeatureKind::kGlobal, 40).similarity, 0.9);
   const double global_ms = image.report().match_ms;
   EXPECT_GT(global_ms, 0.0);
 
-  const Score by_sift = image.compare(FeatureKind::kSift, 20);
-  EXPECT_EQ(by_sift.similarity, sift.compare(*image.sift(), map()->image(20).sift).similarity);
+  const Score by_sift = image.compare(FeatureKind::kLocal, 20);
+  EXPECT_EQ(by_sift.similarity, sift.compare(*image.local(), map()->image(20).local).similarity);
   EXPECT_GT(by_sift.matches, 50U);
-  EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kSift, 50).matches);
+  EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kLocal, 50).matches);
   EXPECT_GT(image.report().match_ms, global_ms);
 }
 
@@ -298,18 +298,18 @@ TEST_F(LocalizerTest, FeaturesUnderTheMaskOfMapOrDriveAreNotUsed) {
   config.features = "sift";
   Localizer localizer(std::make_shared<TrainingMap>(header, std::vector<TrainingImage>{map()->image(0)}), config);
   localizer.process(0, viewAt(0.3));
-  const SiftFeatures left_half = localizer.lastSift();
+  const LocalFeatures left_half = localizer.lastLocal();
   ASSERT_FALSE(left_half.empty());
-  for (const SiftKeypoint& keypoint : left_half.keypoints()) EXPECT_LE(keypoint.x_px, 160.0F);
+  for (const Keypoint& keypoint : left_half.keypoints()) EXPECT_LE(keypoint.x_px, 160.0F);
   cv::Mat right;
   cv::flip(left, right, 1);
   cv::resize(right, right, {640, 480}, 0.0, 0.0, cv::INTER_NEAREST);
   localizer.setMask(Mask(right));
   for (const double along_m : {5.3, 8.3}) {
     localizer.process(static_cast<std::int64_t>(along_m) * kSecond, viewAt(along_m));
-    const SiftFeatures right_half = localizer.lastSift();
+    const LocalFeatures right_half = localizer.lastLocal();
     ASSERT_FALSE(right_half.empty());
-    for (const SiftKeypoint& keypoint : right_half.keypoints()) EXPECT_GE(keypoint.x_px, 159.0F);
+    for (const Keypoint& keypoint : right_half.keypoints()) EXPECT_GE(keypoint.x_px, 159.0F);
     localizer.configure(config);  // which does not forget it
   }
 }

@@ -26,7 +26,7 @@ class MadeUpSweep {
   template <class Weigh>
   void startImage(Weigh weigh) {
     compared.clear();
-    scores_.startImage(FeatureKind::kSift, [this, weigh](FeatureKind kind, std::size_t i) {
+    scores_.startImage(FeatureKind::kLocal, [this, weigh](FeatureKind kind, std::size_t i) {
       EXPECT_EQ(kind, FeatureKind::kGlobal);
       EXPECT_EQ(compared.count(i), 0U) << "each at most once";
       compared.insert(i);
@@ -223,7 +223,7 @@ class TwoAlike {
 
   void startImage(std::size_t first, double like_first, std::size_t second, double like_second) {
     asked.clear();
-    scores_.startImage(FeatureKind::kSift, [=](FeatureKind kind, std::size_t i) {
+    scores_.startImage(FeatureKind::kLocal, [=](FeatureKind kind, std::size_t i) {
       EXPECT_EQ(kind, FeatureKind::kGlobal);
       asked.insert(i);
       const double similarity = i == first ? like_first : i == second ? like_second : 0.1;
@@ -278,7 +278,7 @@ TEST(PlaceRatio, AnImageHereIsNoRivalHoweverManyAreNearer) {
 
 TEST_F(PlaceRatioTest, NothingAlikeAnywhereIsNoReasonToDoubt) {
   Scores scores(map_->size());
-  scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{}; });
+  scores.startImage(FeatureKind::kLocal, [](FeatureKind, std::size_t) { return Score{}; });
   EXPECT_EQ(MapSweep(*map_, 1000, kAll).ratio(scores, at(0), 5.0), 1.0);
 }
 

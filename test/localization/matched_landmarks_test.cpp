@@ -16,7 +16,8 @@
 #include "localization/pose_verifier.h"
 #include "map/feature_store.h"
 #include "test/support/landmark_world.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/localization/estimate.h"
 
 namespace visual_localization {
@@ -28,13 +29,12 @@ class MatchedLandmarksTest : public testing::Test {
   static constexpr std::size_t kImage = 14;
 
   /// Every fourth feature lies where it should not.
-  SiftFeatures seenWithStrangers() {
-    const SiftFeatures seen = test::viewOf(world_, camera_, poses_[kImage].camera, 0.3, random_).features;
-    std::vector<SiftKeypoint> keypoints = seen.keypoints();
+  LocalFeatures seenWithStrangers() {
+    const LocalFeatures seen = test::viewOf(world_, camera_, poses_[kImage].camera, 0.3, random_).features;
+    std::vector<Keypoint> keypoints = seen.keypoints().list();
     for (std::size_t i = 0; i < keypoints.size(); i += 4) keypoints[i].x_px = 640.0F - keypoints[i].x_px;
-    std::vector<std::uint8_t> descriptors(seen.descriptor(0),
-                                          seen.descriptor(0) + seen.size() * SiftFeatures::kDescriptorSize);
-    return SiftFeatures(std::move(keypoints), std::move(descriptors));
+    std::vector<std::uint8_t> descriptors(seen.bytes(0), seen.bytes(0) + seen.size() * kSiftDimension);
+    return LocalFeatures(std::move(keypoints), std::move(descriptors));
   }
 
   CameraModel camera_ = test::streetCamera();
@@ -42,7 +42,7 @@ class MatchedLandmarksTest : public testing::Test {
   std::vector<test::DrivenPose> poses_ = test::drive({});
   std::vector<test::WorldPoint> world_ = test::pointsAlong(poses_, 6.0, random_);
   std::shared_ptr<const TrainingMap> map_ = test::mapOf(test::record(poses_, world_, 0.1, random_));
-  SiftFeatures seen_ = seenWithStrangers();
+  LocalFeatures seen_ = seenWithStrangers();
   SessionChoice sessions_{*map_, true};
   PoseVerifier verifier_{*map_, {}, sessions_};
 };
@@ -52,7 +52,7 @@ TEST_F(MatchedLandmarksTest, AgreeWhereTheProjectionIsAndDisagreeElsewhere) {
   const std::optional<MetricPose> pose = verifier_.nearOneOf({kImage});
   ASSERT_TRUE(pose);
   const MatchedLandmarks& matched = verifier_.matched();
-  const auto features = map_->sift(matched.training_image);
+  const auto features = map_->local(matched.training_image);
   const auto geometry = map_->geometry(matched.training_image);
   std::size_t inliers = 0;
   for (const MatchedLandmark& landmark : matched.landmarks) {
@@ -88,7 +88,7 @@ TEST_F(MatchedLandmarksTest, CountByHowWellTheyAreKnown) {
   config.training_images = 1;
   verifier_.configure(config);
   // A metre ahead: where the training image was taken nothing depends on how far a landmark is.
-  const SiftFeatures seen = test::viewOf(world_, camera_, poses_[kImage + 1].camera, 0.3, random_).features;
+  const LocalFeatures seen = test::viewOf(world_, camera_, poses_[kImage + 1].camera, 0.3, random_).features;
   verifier_.startImage(0, seen, camera_);
   const std::optional<MetricPose> pose = verifier_.nearOneOf({kImage});
   ASSERT_TRUE(pose);
@@ -97,7 +97,7 @@ TEST_F(MatchedLandmarksTest, CountByHowWellTheyAreKnown) {
   for (const SeenLandmark& landmark : geometry->landmarks) features.push_back(landmark.feature);
   const KeypointRays rays = raysOf(seen, camera_, config.keypoint_sigma_px);
   std::vector<LandmarkMatch> sights;
-  for (const FeatureMatch& match : matchSymmetric(seen, map_->sift(kImage)->subset(features), config.match_ratio)) {
+  for (const FeatureMatch& match : matchSymmetric(seen, map_->local(kImage)->subset(features), config.match_ratio)) {
     const SeenLandmark& landmark = geometry->landmarks[match.b];
     sights.push_back({match.a, 0, rays.normalised[match.a], rays.sigmas[match.a],
                       geometry->camera.position_m + landmark.offset_m.cast<double>(), covarianceOf(landmark)});
@@ -134,16 +134,16 @@ TEST_F(MatchedLandmarksTest, MayBeOneOfEachTrainingImage) {
   config.max_sigma_m = 100.0;
   std::vector<TrainingImage> images;
   for (std::size_t i = 0; i < map_->size(); ++i) images.push_back(map_->image(i));
-  const auto matchesOf = [&config](const SiftFeatures& seen, const TrainingImage& image) {
+  const auto matchesOf = [&config](const LocalFeatures& seen, const TrainingImage& image) {
     std::vector<std::size_t> features;
     for (const SeenLandmark& landmark : image.geometry->landmarks) features.push_back(landmark.feature);
-    return matchSymmetric(seen, image.sift.subset(features), config.match_ratio);
+    return matchSymmetric(seen, image.local.subset(features), config.match_ratio);
   };
-  const SiftFeatures all = test::viewOf(world_, camera_, poses_[kImage].camera, 0.3, random_).features;
+  const LocalFeatures all = test::viewOf(world_, camera_, poses_[kImage].camera, 0.3, random_).features;
   const std::vector<FeatureMatch> ahead = matchesOf(all, images[kImage + 5]);
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < 11; ++i) chosen.push_back(ahead[i * ahead.size() / 11].a);
-  const SiftFeatures seen = all.subset(chosen);
+  const LocalFeatures seen = all.subset(chosen);
   for (std::size_t i = 0; i < 11; ++i) {  // each training image shows another one of these
     TrainingImage& image = images[kImage - 5 + i];
     std::vector<SeenLandmark>& landmarks = image.geometry->landmarks;
@@ -170,11 +170,11 @@ class HalfReadStore final : public FeatureStore {
   HalfReadStore(const TrainingMap& map, std::size_t image, std::size_t readable)
       : map_(map), image_(image), readable_(readable) {}
 
-  std::shared_ptr<const SiftFeatures> sift(std::size_t image) const override {
-    if (image != image_) return map_.sift(image);
+  std::shared_ptr<const LocalFeatures> local(std::size_t image) const override {
+    if (image != image_) return map_.local(image);
     std::vector<std::size_t> first(readable_);
     std::iota(first.begin(), first.end(), std::size_t{0});
-    return std::make_shared<const SiftFeatures>(map_.sift(image)->subset(first));
+    return std::make_shared<const LocalFeatures>(map_.local(image)->subset(first));
   }
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override { return map_.global(image); }
   std::vector<std::uint8_t> preview(std::size_t image) const override { return map_.preview(image); }

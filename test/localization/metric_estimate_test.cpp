@@ -38,7 +38,7 @@ class MetricEstimate : public testing::Test {
   Estimate see(std::size_t i) { return show(street_.seenFrom(street_.trueNear(i, kHere_m))); }
   Estimate seeFew(std::size_t i) { return show(street_.fewSeenFrom(street_.trueNear(i, kHere_m), i)); }
   Estimate seeNothing() { return show({}); }
-  Estimate show(SiftFeatures features) {
+  Estimate show(LocalFeatures features) {
     image_->features = std::move(features);
     return localizer_->process(++images_ * kSecond_ns, cv::Mat());
   }
@@ -194,11 +194,11 @@ class SlowImage final : public test::FakeImage {
     report_.match_ms += stopwatch.elapsed_ms();
     return {};
   }
-  const SiftFeatures* unprunedSift() override { return &nothing_; }
+  const LocalFeatures* unprunedLocal() override { return &nothing_; }
   ImageReport report() const override { return report_; }
 
  private:
-  SiftFeatures nothing_;
+  LocalFeatures nothing_;
   ImageReport report_;
 };
 

@@ -49,7 +49,7 @@ class DriveWithOdometry : public testing::Test {
     return localizer_->process(static_cast<std::int64_t>(i) * kSecond_ns, cv::Mat());
   }
   Estimate seeNothing(std::size_t i) {
-    image_->features = SiftFeatures();
+    image_->features = LocalFeatures();
     return localizer_->process(static_cast<std::int64_t>(i) * kSecond_ns, cv::Mat());
   }
   double error_m(const Estimate& estimate, std::size_t i) {

@@ -20,7 +20,7 @@ class PathInterpolation : public ::testing::Test {
 
   Eigen::Vector2d from(std::size_t image, double along_m) {
     const TrainingMap map({{48.5, 9.0, 400.0}, {320, 240}, {}, {{"monday"}, {"tuesday"}}}, images_);
-    scores_.startImage(FeatureKind::kSift, [this, along_m, &map](FeatureKind, std::size_t i) {
+    scores_.startImage(FeatureKind::kLocal, [this, along_m, &map](FeatureKind, std::size_t i) {
       asked_.push_back(i);
       Score score{0.5, 0.5, 20, true, std::exp(0.05 * (along_m - map.position_m(i).x()))};
       if (i == unrecognised_) score.recognised = false;

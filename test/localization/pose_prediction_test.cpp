@@ -23,9 +23,9 @@ TEST_F(PosePrediction, PredictsWithAGrowingCovariance) {
   ASSERT_TRUE(verifyNear(0.0, 10));
   const auto pose = verifyNear(1.0, 11);
   ASSERT_TRUE(pose);
-  verify(2.0, SiftFeatures(), {});
+  verify(2.0, LocalFeatures(), {});
   const auto soon = verifier_.predicted();
-  verify(4.0, SiftFeatures(), {});
+  verify(4.0, LocalFeatures(), {});
   const auto later = verifier_.predicted();
   ASSERT_TRUE(soon && later);
   EXPECT_GT(soon->covariance_m2(0, 0), pose->covariance(0, 0) + pose->map_covariance(0, 0));
@@ -40,7 +40,7 @@ TEST_F(PosePrediction, TheVelocityLeadsStraightOnAndIsTheLessSureTheFarther) {
   const auto first = verifyNear(0.0, 10);
   const auto second = verifyNear(0.5, 11);
   ASSERT_TRUE(first && second);
-  verify(2.0, SiftFeatures(), {});
+  verify(2.0, LocalFeatures(), {});
   const auto prediction = verifier_.predicted();
   ASSERT_TRUE(prediction);
   const Eigen::Vector2d step_m = (second->base.translation() - first->base.translation()).head<2>();
@@ -70,7 +70,7 @@ TEST_F(PosePrediction, OdometryLeadsWhereItWentAndAWrongHeadingLeadsAside) {
     const double left_m = 3.0 * std::max(0.0, i / 10.0 - 1.0);
     track.add({i * kSecond_ns / 10, {ahead_m, left_m}, i > 10 ? 0.5 : 0.0});
   }
-  verify(2.0, SiftFeatures(), {});
+  verify(2.0, LocalFeatures(), {});
   const auto prediction = verifier_.predicted();
   ASSERT_TRUE(prediction);
   EXPECT_TRUE(prediction->by_odometry);
@@ -97,7 +97,7 @@ TEST_F(PosePrediction, OdometryThatTurnsOnLeadsToAHeadingWithinHalfATurn) {
   ASSERT_GT(std::abs(yaw_rad), 0.5);
   const double turn_rad = yaw_rad > 0.0 ? 2.8 : -2.8;
   for (int i = 0; i <= 10; ++i) track.add({i * kSecond_ns / 10, {0.0, 0.0}, 0.1 * i * turn_rad});
-  verify(1.0, SiftFeatures(), {});
+  verify(1.0, LocalFeatures(), {});
   const auto prediction = verifier_.predicted();
   ASSERT_TRUE(prediction && prediction->by_odometry);
   EXPECT_NEAR(prediction->yaw_rad, yaw_rad + turn_rad - std::copysign(2.0 * kPi, turn_rad), 1e-9);
@@ -116,7 +116,7 @@ TEST_F(PosePrediction, OdometryIsBelievedAgainAfterTenPosesThatItAgreesWith) {
     for (int k = 1; k <= 5; ++k) {
       track.add({(second - 1) * kSecond_ns + k * kSecond_ns / 5, {x_m += 0.2 * slip_m, 0.0}, 0.0});
     }
-    const SiftFeatures nothing;
+    const LocalFeatures nothing;
     verifier_.startImage(second * kSecond_ns, nothing, street_.camera());
     const auto prediction = verifier_.predicted();
     EXPECT_TRUE(verifyNear(static_cast<double>(second), 10)) << second;
@@ -136,7 +136,7 @@ class OdometryAgreement : public PoseVerifierTest {
     OdometryTrack track(config_);
     verifier_.useOdometry(track, config_);
     verifier_.reset();
-    const SiftFeatures seen = street_.seenFrom(street_.trueNear(10, kBeside_m));
+    const LocalFeatures seen = street_.seenFrom(street_.trueNear(10, kBeside_m));
     begin_s_ += 1000.0;
     const auto at = [this](double time_s) { return static_cast<std::int64_t>((begin_s_ + time_s) * kSecond_ns); };
     const auto look = [&](double time_s) { return verify(begin_s_ + time_s, seen, {9, 10, 11}); };
@@ -187,7 +187,7 @@ TEST_F(PosePrediction, OdometryLeadsNoFartherThanIsBelieved) {
     verifier_.reset();
     ASSERT_TRUE(verifyNear(0.0, 10));
     for (int i = 0; i <= 10; ++i) track.add({i * kSecond_ns / 10, {0.7 * i, 0.0}, 0.0});
-    verify(1.0, SiftFeatures(), {});
+    verify(1.0, LocalFeatures(), {});
     const auto prediction = verifier_.predicted();
     ASSERT_TRUE(prediction) << "otherwise by the velocity";
     EXPECT_EQ(prediction->by_odometry, max_distance_m > 7.0);
@@ -197,7 +197,7 @@ TEST_F(PosePrediction, OdometryLeadsNoFartherThanIsBelieved) {
 TEST_F(PosePrediction, NothingIsPredictedForTimesBeforeThePose) {
   ASSERT_TRUE(verifyNear(100.0, 10));
   EXPECT_TRUE(verifier_.predicted()) << "of the same moment";
-  verify(99.0, SiftFeatures(), {});
+  verify(99.0, LocalFeatures(), {});
   EXPECT_FALSE(verifier_.predicted());
 }
 

@@ -11,32 +11,32 @@
 #include "test/localization/street_map.h"
 #include "test/support/fake_image.h"
 #include "test/support/stamps.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
 
 namespace visual_localization::test {
 
 /// Known by its features.
 class SeenImage final : public FakeImage {
  public:
-  SeenImage(const TrainingMap& map, SiftFeatures features) : map_(map), features_(std::move(features)) {}
+  SeenImage(const TrainingMap& map, LocalFeatures features) : map_(map), features_(std::move(features)) {}
   Score compare(FeatureKind, std::size_t i) override {
-    return SiftSimilarity({}, {}).compare(features_, *map_.sift(i));
+    return LocalSimilarity({}, {}).compare(features_, *map_.local(i));
   }
-  const SiftFeatures* unprunedSift() override { return &features_; }
+  const LocalFeatures* unprunedLocal() override { return &features_; }
 
  private:
   const TrainingMap& map_;
-  SiftFeatures features_;
+  LocalFeatures features_;
 };
 
 class PoseVerifierTest : public testing::Test {
  protected:
   /// After particles compared the image with these training images.
-  std::optional<MetricPose> verify(double time_s, const SiftFeatures& features,
+  std::optional<MetricPose> verify(double time_s, const LocalFeatures& features,
                                    const std::vector<std::size_t>& compared) {
     return verifyWith(street_.camera(), time_s, features, compared);
   }
-  std::optional<MetricPose> verifyWith(const CameraModel& camera, double time_s, const SiftFeatures& features,
+  std::optional<MetricPose> verifyWith(const CameraModel& camera, double time_s, const LocalFeatures& features,
                                        const std::vector<std::size_t>& compared) {
     features_ = features;
     verifier_.startImage(static_cast<std::int64_t>(time_s * kSecond_ns), features_, camera);
@@ -46,7 +46,8 @@ class PoseVerifierTest : public testing::Test {
   std::vector<std::size_t> mostSimilar(const std::vector<std::size_t>& compared) {
     SeenImage image(street_.map(), features_);
     Scores scores(street_.map().size());
-    scores.startImage(FeatureKind::kSift, [&image](FeatureKind kind, std::size_t i) { return image.compare(kind, i); });
+    scores.startImage(FeatureKind::kLocal,
+                      [&image](FeatureKind kind, std::size_t i) { return image.compare(kind, i); });
     for (const std::size_t i : compared) scores[i];
     return scores.mostSimilar();
   }
@@ -65,7 +66,7 @@ class PoseVerifierTest : public testing::Test {
 
   const Eigen::Vector3d kBeside_m{0.3, -0.1, 0.4};
   StreetMap street_;
-  SiftFeatures features_;  ///< of the last image
+  LocalFeatures features_;  ///< of the last image
   SessionChoice sessions_{street_.map(), true};
   PoseVerifier verifier_{street_.map(), {}, sessions_};
 };

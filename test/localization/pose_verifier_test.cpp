@@ -96,7 +96,7 @@ TEST_F(PoseVerifierTest, TheCovarianceIsScaledAndThatOfTheRobotNotOfTheCamera) {
   MetricConfig config;
   config.sigma_factor = 1.0;
   verifier_.configure(config);
-  const SiftFeatures features = street_.seenFrom(street_.trueNear(14, kBeside_m));
+  const LocalFeatures features = street_.seenFrom(street_.trueNear(14, kBeside_m));
   const auto plain = verify(0.0, features, {14});
   config.sigma_factor = 3.0;
   verifier_.configure(config);
@@ -136,13 +136,13 @@ TEST_F(PoseVerifierTest, AsManyInliersAsAreAskedForAreEnough) {
     config.min_inliers_predicted = asked;
     verifier_.configure(config);
     verifier_.reset();
-    const auto again = verify(100.0, SiftFeatures(features_), {13, 14, 15});
+    const auto again = verify(100.0, LocalFeatures(features_), {13, 14, 15});
     EXPECT_EQ(again.has_value(), asked == static_cast<int>(all->inliers)) << asked;
   }
 }
 
 TEST_F(PoseVerifierTest, TriesTwoPlacesThatAreApart) {
-  const SiftFeatures features = street_.seenFrom(street_.trueNear(40, kBeside_m));
+  const LocalFeatures features = street_.seenFrom(street_.trueNear(40, kBeside_m));
   features_ = features;
   verifier_.startImage(0, features_, street_.camera());
   EXPECT_TRUE(verifier_.nearOneOf({3, 4, 5, 40})) << "3, 4 and 5 are one place";
@@ -157,7 +157,7 @@ TEST_F(PoseVerifierTest, FindsNothingWhereNothingMatches) {
   const auto elsewhere = test::pointsAlong(poses, 6.0, random);
   const auto view = test::viewOf(elsewhere, street_.camera(), poses[10].camera, 0.3, random);
   EXPECT_FALSE(verify(0.0, view.features, {9, 10, 11, 30}));
-  EXPECT_FALSE(verify(1.0, SiftFeatures(), {9, 10, 11, 30}));
+  EXPECT_FALSE(verify(1.0, LocalFeatures(), {9, 10, 11, 30}));
   EXPECT_EQ(verifier_.imagesSince(), 2U);
 }
 
@@ -322,9 +322,9 @@ TEST_F(PoseVerifierTest, TwoPosesFarApartDoNotFollowEachOtherUntilTheSpeedIsKnow
 TEST_F(PoseVerifierTest, RemembersThatPlantsMovedUntilHousesSayOtherwise) {
   constexpr double kWind_m = 0.03;
   // So little wind that 15 landmarks cannot tell.
-  const SiftFeatures few = street_.fewOf(street_.seenInWind(street_.trueNear(14, kBeside_m), 0.013), 14);
+  const LocalFeatures few = street_.fewOf(street_.seenInWind(street_.trueNear(14, kBeside_m), 0.013), 14);
   double time_s = 0.0;
-  const auto sigmaOf_m = [&](const SiftFeatures& features) {
+  const auto sigmaOf_m = [&](const LocalFeatures& features) {
     const auto pose = verify(++time_s, features, {13, 14, 15});
     return pose ? pose->sigma_m() : 0.0;
   };
@@ -347,7 +347,7 @@ TEST_F(PoseVerifierTest, RemembersThatPlantsMovedUntilHousesSayOtherwise) {
 }
 
 TEST_F(PoseVerifierTest, WhileNothingIsSeenNothingSaysThatPlantsMove) {
-  const SiftFeatures few = street_.fewOf(street_.seenInWind(street_.trueNear(14, kBeside_m), 0.013), 14);
+  const LocalFeatures few = street_.fewOf(street_.seenInWind(street_.trueNear(14, kBeside_m), 0.013), 14);
   std::vector<double> sigmas_m;
   for (const int unseen : {0, 100}) {
     verifier_.reset();

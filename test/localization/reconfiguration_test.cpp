@@ -61,7 +61,7 @@ TEST_F(Reconfiguration, TheTrackGoesOnWithOtherFeatures) {
   changeAndDriveOn({{"features", std::string("global")}});
   EXPECT_EQ(last_.evidence.features, FeatureKind::kGlobal);
   changeAndDriveOn({{"features", std::string("sift")}, {"match/mode", std::string("one_way")}, {"prune", false}});
-  EXPECT_EQ(last_.evidence.features, FeatureKind::kSift);
+  EXPECT_EQ(last_.evidence.features, FeatureKind::kLocal);
   EXPECT_EQ(last_.image.features_kept, last_.image.features_extracted);
 }
 
@@ -99,7 +99,7 @@ TEST_F(Reconfiguration, AnInvalidConfigurationChangesNothing) {
 TEST(Sweep, AReconfigurationSweepsTheImageAnew) {
   const auto map = test::mapAt(test::street(100, 1.0));
   Scores scores(map->size());
-  scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{1.0, 1.0}; });
+  scores.startImage(FeatureKind::kLocal, [](FeatureKind, std::size_t) { return Score{1.0, 1.0}; });
   MapSweep sweep(*map, 100, 100);
   Random random(1);
   sweep.draw(scores, random);

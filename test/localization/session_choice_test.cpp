@@ -346,7 +346,7 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
     for (int i = 0; i < 100; ++i) {
       const Eigen::Vector2d robot_m = test::onCircle(0.6 * i);
       sessions.startImage(i * 1'000'000'000LL);
-      scores.startImage(FeatureKind::kSift, [&](FeatureKind, std::size_t image) {
+      scores.startImage(FeatureKind::kLocal, [&](FeatureKind, std::size_t image) {
         const double bell = std::exp(-0.125 * (map.position_m(image) - robot_m).squaredNorm());
         return test::World::scoreAt((map.pose(image).session == 1 ? 0.5 : 0.1) * bell);
       });

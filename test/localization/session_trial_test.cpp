@@ -55,7 +55,7 @@ class SessionTrial : public testing::Test {
     std::vector<std::size_t> chosen;
     for (std::size_t i = 10; i < 10 + images; ++i) {
       const std::int64_t stamp_ns = begin_ns + static_cast<std::int64_t>(i) * kSecond_ns;
-      const SiftFeatures seen = street_.seenFrom(street_.trueNear(i, Eigen::Vector3d::Zero()));
+      const LocalFeatures seen = street_.seenFrom(street_.trueNear(i, Eigen::Vector3d::Zero()));
       sessions_.startImage(stamp_ns);
       verifier_.startImage(stamp_ns, seen, street_.camera());
       std::optional<MetricPose> pose = verifier_.nearPrediction();
@@ -94,7 +94,7 @@ class UnlikeImage final : public test::FakeImage {
     score.recognised = false;
     return score;
   }
-  const SiftFeatures* unprunedSift() override { return seen.unprunedSift(); }
+  const LocalFeatures* unprunedLocal() override { return seen.unprunedLocal(); }
 
   test::GivenImage seen;
 };
@@ -126,7 +126,7 @@ class SessionsTogether : public SessionTrial {
   }
   const std::size_t morning_ = 20;
   const std::size_t evening_ = street_.map().size() + 20;
-  const SiftFeatures seen_ = street_.seenFrom(street_.trueNear(20, Eigen::Vector3d::Zero()));
+  const LocalFeatures seen_ = street_.seenFrom(street_.trueNear(20, Eigen::Vector3d::Zero()));
   const std::size_t of_morning_ = inliersLike(morning_, withTracking(1));
   const std::size_t of_evening_ = inliersLike(evening_, withTracking(1));
 };

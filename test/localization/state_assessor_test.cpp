@@ -24,11 +24,11 @@ struct Said {
   bool recovering = false;
 };
 
-Said sift() { return {{FeatureKind::kSift}}; }
+Said sift() { return {{FeatureKind::kLocal}}; }
 Said global() { return {{FeatureKind::kGlobal}}; }
-Said lost() { return {{FeatureKind::kSift}, true}; }
-Said placeRatio(double ratio) { return {{FeatureKind::kSift, ratio}}; }
-Said blind() { return {{FeatureKind::kSift, 1.0, true}}; }
+Said lost() { return {{FeatureKind::kLocal}, true}; }
+Said placeRatio(double ratio) { return {{FeatureKind::kLocal, ratio}}; }
+Said blind() { return {{FeatureKind::kLocal, 1.0, true}}; }
 
 LocalizationState assess(StateAssessor& assessor, TrackerEstimate estimate, const Said& said) {
   estimate.tuning.recovering = said.recovering;

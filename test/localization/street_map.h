@@ -25,11 +25,11 @@ class StreetMap {
   CameraPose mappedNear(std::size_t i, const Eigen::Vector3d& by_m) const {
     return moved(map_->geometry(i)->camera, by_m);
   }
-  SiftFeatures seenFrom(const CameraPose& pose) {
+  LocalFeatures seenFrom(const CameraPose& pose) {
     return viewOf(world_, camera_, pose, kKeypointSigma_px, random_).features;
   }
   /// Where each landmark stands `sigma_m` along each axis from where it stood on the day of the map.
-  SiftFeatures seenInWind(const CameraPose& pose, double sigma_m) {
+  LocalFeatures seenInWind(const CameraPose& pose, double sigma_m) {
     std::normal_distribution<double> normal(0.0, 1.0);
     std::vector<WorldPoint> blown = world_;
     for (WorldPoint& point : blown) {
@@ -38,14 +38,14 @@ class StreetMap {
     return viewOf(blown, camera_, pose, kKeypointSigma_px, random_).features;
   }
   /// Only the first few features that show landmarks of training image `i`.
-  SiftFeatures fewSeenFrom(const CameraPose& pose, std::size_t i, std::size_t count = kFew) {
+  LocalFeatures fewSeenFrom(const CameraPose& pose, std::size_t i, std::size_t count = kFew) {
     return fewOf(seenFrom(pose), i, count);
   }
-  SiftFeatures fewOf(const SiftFeatures& all, std::size_t i, std::size_t count = kFew) const {
+  LocalFeatures fewOf(const LocalFeatures& all, std::size_t i, std::size_t count = kFew) const {
     std::vector<std::size_t> landmarks;
     for (const SeenLandmark& landmark : map_->geometry(i)->landmarks) landmarks.push_back(landmark.feature);
     std::vector<std::size_t> chosen;
-    for (const FeatureMatch& match : matchSymmetric(all, map_->sift(i)->subset(landmarks), 0.5)) {
+    for (const FeatureMatch& match : matchSymmetric(all, map_->local(i)->subset(landmarks), 0.5)) {
       if (chosen.size() < count) chosen.push_back(match.a);
     }
     return all.subset(chosen);
@@ -68,11 +68,13 @@ class StreetMap {
 class GivenImage final : public FakeImage {
  public:
   explicit GivenImage(const TrainingMap& map) : map_(map) {}
-  Score compare(FeatureKind, std::size_t i) override { return SiftSimilarity({}, {}).compare(features, *map_.sift(i)); }
-  std::size_t siftFeatures() override { return features.size(); }
-  const SiftFeatures* unprunedSift() override { return &features; }
+  Score compare(FeatureKind, std::size_t i) override {
+    return LocalSimilarity({}, {}).compare(features, *map_.local(i));
+  }
+  std::size_t localFeatures() override { return features.size(); }
+  const LocalFeatures* unprunedLocal() override { return &features; }
 
-  SiftFeatures features;
+  LocalFeatures features;
 
  private:
   const TrainingMap& map_;

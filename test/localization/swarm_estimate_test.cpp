@@ -47,7 +47,7 @@ TEST(SwarmEstimate, TheCentreOfTheBestIsThatOfThoseWithAnyWeight) {
   for (std::uint32_t seed = 1; seed <= 40; ++seed) {
     Dpso swarm(world.map(), config, FitnessConfig(), seed);
     const TrackerInput input = world.inTheDark();
-    input.scores.startImage(FeatureKind::kSift, [&world](FeatureKind, std::size_t image) {
+    input.scores.startImage(FeatureKind::kLocal, [&world](FeatureKind, std::size_t image) {
       return (world.map().position_m(image) - onCircle(20.0)).norm() < 2.0 ? World::scoreAt(0.3) : Score{};
     });
     const TrackerEstimate estimate = swarm.update(input);

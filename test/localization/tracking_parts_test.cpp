@@ -23,7 +23,7 @@ Particle particleAt(double x, double y, double weight) {
 TEST(Fitness, IsTheWeightTimesAGaussianOfTheDistance) {
   const auto map = test::mapAt({{0.0, 0.0}, {100.0, 0.0}});
   Scores scores(2);
-  scores.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t image) {
+  scores.startImage(FeatureKind::kLocal, [](FeatureKind, std::size_t image) {
     return Score{1.0, image == 0 ? 0.4 : 0.8, 10, true};
   });
   FitnessConfig config;

@@ -36,8 +36,8 @@ class TwinStreet {
   void setPlateau(double plateau_m) { plateau_m_ = plateau_m; }
 
   TrackerInput from(double along_m) {
-    scores_.startImage(FeatureKind::kSift, [this, along_m](FeatureKind kind, std::size_t image) {
-      const double wide_m = kind == FeatureKind::kSift ? 2.0 : 5.0;
+    scores_.startImage(FeatureKind::kLocal, [this, along_m](FeatureKind kind, std::size_t image) {
+      const double wide_m = kind == FeatureKind::kLocal ? 2.0 : 5.0;
       const double place_m = map_->position_m(image).x();
       const bool twins = along_m >= 20.0 && along_m < 60.0;
       double like = (twins ? own_ : 1.0) * bell(place_m - along_m, wide_m);

@@ -8,8 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "test/support/synthetic.h"
+#include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {
@@ -50,7 +51,7 @@ class WallStreet : public ::testing::Test {
     const auto sift_extractor = makeSiftExtractor(SiftConfig());
     GlobalExtractor global_extractor;
     std::vector<TrainingImage> images(kImages);
-    std::vector<SiftFeatures> unpruned;
+    std::vector<LocalFeatures> unpruned;
     for (std::size_t i = 0; i < images.size(); ++i) {
       images[i].stamp_ns = static_cast<std::int64_t>(i) * kSecond;
       images[i].position_m = {kMetresPerImage * static_cast<double>(i), 0.0};
@@ -59,7 +60,7 @@ class WallStreet : public ::testing::Test {
       unpruned.push_back(sift_extractor->extract(view));
     }
     for (std::size_t i = 0; i < images.size(); ++i) {
-      images[i].sift = keepSeenIn(unpruned[i], {&unpruned[i == 0 ? 1 : i - 1]}, 0.6);
+      images[i].local = keepSeenIn(unpruned[i], {&unpruned[i == 0 ? 1 : i - 1]}, 0.6);
     }
     MapHeader header;
     header.datum = {48.5, 9.0, 400.0};

@@ -32,7 +32,7 @@ TEST_F(LargeMap, DamagedFeaturesCountAsNoneAndAreNamedOnce) {
   tamper("UPDATE landmarks SET points = zeroblob(500) WHERE image = 8");
   const auto map = open();
   for (int round = 0; round < 2; ++round) {
-    for (const std::size_t i : {3U, 4U, 5U}) EXPECT_TRUE(map->sift(i)->empty()) << i;
+    for (const std::size_t i : {3U, 4U, 5U}) EXPECT_TRUE(map->local(i)->empty()) << i;
     EXPECT_EQ(map->global(6)->wgoh, GlobalFeatures().wgoh);
     EXPECT_TRUE(map->preview(7).empty());
     EXPECT_EQ(map->geometry(8), nullptr);
@@ -55,7 +55,7 @@ TEST_F(LargeMap, DamagedLandmarksCountAsNoneAndAreNamedOnce) {
     EXPECT_EQ(warnings_.size(), static_cast<std::size_t>(round));
     EXPECT_EQ(map->geometry(4), nullptr);
     EXPECT_EQ(map->geometry(5), nullptr);
-    EXPECT_EQ(map->sift(4)->descriptors(), images_[4].sift.descriptors());
+    EXPECT_EQ(map->local(4)->bytes(), images_[4].local.bytes());
     EXPECT_TRUE(same(map->image(7), images_[7]));
   }
   ASSERT_EQ(warnings_.size(), 1U);
@@ -66,7 +66,7 @@ TEST_F(LargeMap, DamagedLandmarksCountAsNoneAndAreNamedOnce) {
 TEST_F(LargeMap, AnImageWithOtherThanItsPlacesNumberOfFeaturesCountsAsDamaged) {
   std::vector<TrainingImage> others = images_;
   std::mt19937 random(9);
-  for (const std::size_t i : {3U, 4U}) others[i].sift = test::randomFeatures(51, random);
+  for (const std::size_t i : {3U, 4U}) others[i].local = test::randomFeatures(51, random);
   const std::string other_path = folder_ / "other.map";
   saveMap(TrainingMap(test::exampleHeader(), others), other_path);
   tamper("ATTACH '" + other_path +
@@ -75,15 +75,15 @@ TEST_F(LargeMap, AnImageWithOtherThanItsPlacesNumberOfFeaturesCountsAsDamaged) {
   // With checksums that are right.
   const TrainingPoses poses = posesOf(images_);
   for (const std::size_t i : {3U, 4U}) {
-    const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(others[i].sift.keypoints());
+    const std::vector<std::uint8_t> keypoints = map_schema::packKeypoints(others[i].local.keypoints());
     const std::int64_t crc32 =
         map_schema::rowChecksum(map_schema::rowSeed(map_schema::rowOf(poses, i)),
-                                {test::bytesOf(keypoints), test::bytesOf(others[i].sift.descriptors())});
+                                {test::bytesOf(keypoints), test::bytesOf(others[i].local.bytes())});
     tamper("UPDATE features SET crc32 = " + std::to_string(crc32) + " WHERE image = " + std::to_string(i));
   }
   const auto map = open();
-  EXPECT_TRUE(map->sift(3)->empty());
-  EXPECT_TRUE(map->sift(4)->empty());
+  EXPECT_TRUE(map->local(3)->empty());
+  EXPECT_TRUE(map->local(4)->empty());
   EXPECT_TRUE(same(map->image(5), images_[5]));
   ASSERT_EQ(warnings_.size(), 1U);
   EXPECT_THAT(warnings_.front(), AllOf(HasSubstr("image 3"), HasSubstr("51 features instead of 50")));
@@ -95,8 +95,8 @@ TEST_F(LargeMap, ExchangedImagesAreNotTakenForEachOther) {
       "UPDATE features SET image = -1 WHERE image = 3; UPDATE features SET image = 3 WHERE image = 4; "
       "UPDATE features SET image = 4 WHERE image = -1");
   const auto map = open();
-  EXPECT_TRUE(map->sift(3)->empty());
-  EXPECT_TRUE(map->sift(4)->empty());
+  EXPECT_TRUE(map->local(3)->empty());
+  EXPECT_TRUE(map->local(4)->empty());
 }
 
 TEST_F(LargeMap, SurvivesItsFileBeingDeletedOrReplaced) {
@@ -121,7 +121,7 @@ TEST_F(LargeMap, TakesNothingFromAnotherMapThatWasCopiedOverIt) {
   ASSERT_EQ(other.size(), test::readAll(path_).size());
   std::ofstream(path_, std::ios::binary | std::ios::in) << other;  // in place, so that the open file sees it
   for (std::size_t i = 0; i < kImages; ++i) {
-    EXPECT_TRUE(map->sift(i)->empty()) << i;
+    EXPECT_TRUE(map->local(i)->empty()) << i;
     EXPECT_EQ(map->global(i)->wgoh, GlobalFeatures().wgoh) << i;
     EXPECT_TRUE(map->preview(i).empty()) << i;
     EXPECT_EQ(map->geometry(i), nullptr) << i;
@@ -135,7 +135,7 @@ TEST_F(LargeMap, SurvivesItsFileBeingCutAtAnyLength) {
     test::writeAll(path_, whole);
     warnings_.clear();
     const auto map = open();
-    map->sift(7);
+    map->local(7);
     std::filesystem::resize_file(path_, length);
     expectRightOrNothing(*map);
     EXPECT_EQ(warnings_.size(), 1U) << length;
@@ -159,14 +159,14 @@ TEST_F(LargeMap, SurvivesItsFileBeingOverwritten) {
 
 TEST_F(LargeMap, OpensWithoutReadingFeatures) {
   std::string damaged = test::readAll(path_);
-  const std::vector<std::uint8_t>& bytes = images_[20].sift.descriptors();
+  const std::vector<std::uint8_t>& bytes = images_[20].local.bytes();
   const std::size_t at = damaged.find(std::string(bytes.begin(), bytes.begin() + 64));
   ASSERT_NE(at, std::string::npos);
   damaged[at + 32] ^= 1;
   test::writeAll(path_, damaged);
   const auto map = open();
   EXPECT_THAT(warnings_, ElementsAre());
-  EXPECT_TRUE(map->sift(20)->empty());
+  EXPECT_TRUE(map->local(20)->empty());
   EXPECT_THAT(warnings_, ElementsAre(HasSubstr("image 20")));
 }
 

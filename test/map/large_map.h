@@ -19,11 +19,8 @@ inline constexpr std::size_t kImages = 60;
 inline constexpr std::size_t kKilobyte = 1024;
 
 inline bool same(const TrainingImage& a, const TrainingImage& b) {
-  const std::size_t keypoint_bytes = a.sift.size() * sizeof(SiftKeypoint);
   return a.stamp_ns == b.stamp_ns && a.session == b.session && a.position_m == b.position_m && a.yaw_rad == b.yaw_rad &&
-         a.sift.descriptors() == b.sift.descriptors() && a.sift.size() == b.sift.size() &&
-         (keypoint_bytes == 0 ||
-          std::memcmp(a.sift.keypoints().data(), b.sift.keypoints().data(), keypoint_bytes) == 0) &&
+         a.local.bytes() == b.local.bytes() && a.local.keypoints() == b.local.keypoints() &&
          a.global.wgoh == b.global.wgoh && a.global.wgii == b.global.wgii && a.preview_jpeg == b.preview_jpeg &&
          test::same(a.geometry, b.geometry);
 }
@@ -49,7 +46,7 @@ class LargeMap : public testing::Test {
     ASSERT_EQ(map.size(), images_.size());
     for (std::size_t i = 0; i < images_.size(); ++i) {
       EXPECT_TRUE(same(map.image(i), images_[i])) << i;
-      EXPECT_EQ(map.featureCount(i), images_[i].sift.size());
+      EXPECT_EQ(map.featureCount(i), images_[i].local.size());
     }
   }
 
@@ -58,9 +55,9 @@ class LargeMap : public testing::Test {
   /// Uses everything in the map; what comes out is either right or nothing.
   void expectRightOrNothing(const TrainingMap& map) const {
     for (std::size_t i = 0; i < images_.size(); ++i) {
-      const auto sift = map.sift(i);
+      const auto sift = map.local(i);
       const auto global = map.global(i);
-      EXPECT_TRUE(sift->empty() || sift->descriptors() == images_[i].sift.descriptors()) << i;
+      EXPECT_TRUE(sift->empty() || sift->bytes() == images_[i].local.bytes()) << i;
       EXPECT_TRUE(global->wgoh == GlobalFeatures().wgoh || global->wgoh == images_[i].global.wgoh) << i;
       map.preview(i);
       const auto geometry = map.geometry(i);

@@ -31,9 +31,9 @@ TEST_F(LargeMap, EveryCacheGivesTheSameFeaturesAgainAndAgain) {
 
 TEST_F(LargeMap, WhatIsInUseOutlivesTheCache) {
   const auto map = open(20 * kKilobyte);
-  const auto used = map->sift(7);
+  const auto used = map->local(7);
   expectAllSame(*map);
-  EXPECT_EQ(used->descriptors(), images_[7].sift.descriptors());
+  EXPECT_EQ(used->bytes(), images_[7].local.bytes());
 }
 
 TEST_F(LargeMap, ServesEightThreads) {
@@ -46,7 +46,7 @@ TEST_F(LargeMap, ServesEightThreads) {
       std::uniform_int_distribution<std::size_t> any(0, kImages - 1);
       for (int round = 0; round < 300; ++round) {
         const std::size_t i = any(random);
-        if (map->sift(i)->descriptors() != images_[i].sift.descriptors()) ++wrong;
+        if (map->local(i)->bytes() != images_[i].local.bytes()) ++wrong;
         if (map->global(i)->wgii != images_[i].global.wgii) ++wrong;
         if (const auto geometry = map->geometry(i); (geometry != nullptr) != images_[i].geometry.has_value() ||
                                                     (geometry && !test::same(*geometry, images_[i].geometry))) {

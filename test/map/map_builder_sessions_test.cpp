@@ -47,7 +47,7 @@ TEST(MapBuilder, ARoundIsPrunedAsIfItWereAlone) {
   const auto three = together.build();
   ASSERT_EQ(three->size(), 3 * one->size());
   for (std::size_t i = 0; i < one->size(); ++i) {
-    EXPECT_EQ(three->sift(i)->descriptors(), one->sift(i)->descriptors());
+    EXPECT_EQ(three->local(i)->bytes(), one->local(i)->bytes());
     EXPECT_EQ(three->featureCount(2 * one->size() + i), one->featureCount(i));
   }
 }
@@ -163,12 +163,12 @@ TEST(MapBuilder, CameraAndMaskAreScaledWithTheImages) {
   EXPECT_TRUE(sessions[0].mask.empty());
   EXPECT_EQ(sessions[1].camera, exampleCamera({640, 480}).model->scaledTo({320, 240}));
   EXPECT_TRUE(sessions[1].mask == exampleCamera({320, 240}).mask);
-  ASSERT_GT(map->sift(0)->size(), 10U);
-  ASSERT_GT(map->sift(1)->size(), 10U);
+  ASSERT_GT(map->local(0)->size(), 10U);
+  ASSERT_GT(map->local(1)->size(), 10U);
   float lowest_px = 0.0F;
-  for (const SiftKeypoint& keypoint : map->sift(0)->keypoints()) lowest_px = std::max(lowest_px, keypoint.y_px);
+  for (const Keypoint& keypoint : map->local(0)->keypoints()) lowest_px = std::max(lowest_px, keypoint.y_px);
   EXPECT_GT(lowest_px, 150.0F);
-  for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.y_px, 120.0F);
+  for (const Keypoint& keypoint : map->local(1)->keypoints()) EXPECT_LT(keypoint.y_px, 120.0F);
 }
 
 TEST(MapBuilder, ACameraForImagesOfAnotherShapeIsRefused) {

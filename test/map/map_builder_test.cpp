@@ -12,6 +12,7 @@
 #include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
 #include "visual_localization/features/global_features.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization {
@@ -83,7 +84,7 @@ TEST(MapBuilder, CountsWhyImagesAreDropped) {
 MapBuilderConfig pruning() {
   MapBuilderConfig config;
   config.prune = true;
-  config.sift = SiftConfig();
+  config.local.choose(Sift());
   return config;
 }
 
@@ -120,7 +121,7 @@ TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   cv::resize(scene(1, 3), large, {640, 480});
   const auto map = mapOfImages({scene(1, 0), large});
   EXPECT_EQ(map->header().image_size, cv::Size(320, 240));
-  for (const SiftKeypoint& keypoint : map->sift(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
+  for (const Keypoint& keypoint : map->local(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
 
 TEST(MapBuilder, TheFirstImagesDoNotDecideASizeThatIsGiven) {

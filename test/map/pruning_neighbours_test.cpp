@@ -86,8 +86,8 @@ TEST(KeepFeatures, KeepsTheLandmarksThatTheyShow) {
   image.geometry = test::exampleGeometry(8);  // features 1, 3, 5 and 7 show landmarks
   const std::vector<SeenLandmark> landmarks = image.geometry->landmarks;
   keepFeatures({0, 3, 4, 5}, image);
-  ASSERT_EQ(image.sift.size(), 4U);
-  EXPECT_EQ(image.sift.keypoints()[3].x_px, all.sift.keypoints()[5].x_px);
+  ASSERT_EQ(image.local.size(), 4U);
+  EXPECT_EQ(image.local.keypoints()[3].x_px, all.local.keypoints()[5].x_px);
   ASSERT_EQ(image.geometry->landmarks.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(image.geometry->landmarks[i].feature, 1U + 2U * i);
@@ -95,7 +95,7 @@ TEST(KeepFeatures, KeepsTheLandmarksThatTheyShow) {
     EXPECT_EQ(image.geometry->landmarks[i].offset_m, landmarks[1 + i].offset_m);
   }
   keepFeatures({}, image);
-  EXPECT_TRUE(image.sift.empty());
+  EXPECT_TRUE(image.local.empty());
   EXPECT_TRUE(image.geometry->landmarks.empty());
 }
 
@@ -103,7 +103,7 @@ TEST(KeepFeatures, NeedsNoGeometry) {
   TrainingImage image = test::exampleImages(2, 8).back();
   image.geometry.reset();
   keepFeatures({7}, image);
-  EXPECT_EQ(image.sift.size(), 1U);
+  EXPECT_EQ(image.local.size(), 1U);
   EXPECT_FALSE(image.geometry);
 }
 

@@ -30,8 +30,8 @@ inline void expectSame(const MapHeader& a, const MapHeader& b) {
   EXPECT_EQ(a.datum.longitude_deg, b.datum.longitude_deg);
   EXPECT_EQ(a.datum.altitude_m, b.datum.altitude_m);
   EXPECT_EQ(a.image_size, b.image_size);
-  EXPECT_EQ(a.sift.contrast_threshold, b.sift.contrast_threshold);
-  EXPECT_EQ(a.sift.max_features, b.sift.max_features);
+  EXPECT_EQ(a.kind->name(), b.kind->name());
+  EXPECT_EQ(a.kind->parameters(), b.kind->parameters());
   ASSERT_EQ(a.sessions.size(), b.sessions.size());
   for (std::size_t s = 0; s < a.sessions.size(); ++s) {
     EXPECT_EQ(a.sessions[s].name, b.sessions[s].name);
@@ -50,10 +50,10 @@ inline void expectSame(const TrainingImage& a, const TrainingImage& b) {
   EXPECT_TRUE(same(a.geometry, b.geometry));
   EXPECT_EQ(a.global.wgoh, b.global.wgoh);
   EXPECT_EQ(a.global.wgii, b.global.wgii);
-  EXPECT_EQ(a.sift.descriptors(), b.sift.descriptors());
-  ASSERT_EQ(a.sift.size(), b.sift.size());
-  if (a.sift.empty()) return;
-  EXPECT_EQ(0, std::memcmp(a.sift.keypoints().data(), b.sift.keypoints().data(), a.sift.size() * sizeof(SiftKeypoint)));
+  EXPECT_EQ(a.local.bytes(), b.local.bytes());
+  ASSERT_EQ(a.local.size(), b.local.size());
+  if (a.local.empty()) return;
+  EXPECT_TRUE(a.local.keypoints() == b.local.keypoints());
 }
 
 /// Bit by bit, but for the sign of a zero.

@@ -22,8 +22,8 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 }
 
 TEST_F(MapStore, NamesBothVersions) {
-  tamper("PRAGMA user_version = 8");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 8"), HasSubstr("versions 3 to 7")));
+  tamper("PRAGMA user_version = 9");
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 9"), HasSubstr("versions 3 to 8")));
 }
 
 TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
@@ -32,6 +32,7 @@ TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
   tamper("DROP TABLE landmarks");
   EXPECT_THAT(refusal(path_), HasSubstr("unexpected table 'masks'"));
   tamper("DROP TABLE masks");
+  tamper("DELETE FROM meta WHERE key LIKE 'features/%'");
   EXPECT_THAT(refusal(path_), HasSubstr("'geometry/images' is unknown"));
   tamper("DELETE FROM meta WHERE key = 'geometry/images'");
   EXPECT_THAT(refusal(path_), HasSubstr("'session/0/camera/cx' is unknown"));

@@ -17,7 +17,7 @@ using visualization_msgs::Marker;
 TrainingImage imageWithLandmarks(double east_m, std::uint32_t first, std::uint32_t count) {
   TrainingImage image;
   image.position_m = {east_m, 0.0};
-  image.sift = test::randomFeatures(first, count);
+  image.local = test::randomFeatures(first, count);
   ImageGeometry geometry;
   geometry.camera.position_m = {east_m, 0.0, 2.0};
   for (std::uint32_t i = 0; i < count; ++i) {

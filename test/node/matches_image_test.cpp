@@ -9,6 +9,7 @@
 
 #include "node/drawings.h"
 #include "test/node/small_map.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
@@ -58,27 +59,26 @@ TEST(MatchesImage, AThinImageIsNotEnlargedWithoutEnd) {
 TEST(MatchesImage, JoinsMatchedFeatures) {
   const auto map = test::smallMap();
   const cv::Mat grey(480, 640, CV_8UC1, cv::Scalar(100));
-  EXPECT_GT(colouredPixels(drawMatches(grey, *map->sift(3), *map, 3, {})), 1000);
+  EXPECT_GT(colouredPixels(drawMatches(grey, *map->local(3), *map, 3, {})), 1000);
   EXPECT_EQ(colouredPixels(drawMatches(grey, test::randomFeatures(99, 40), *map, 3, {})), 0);
 }
 
 /// The first of `features` and a twin of it half an image away, whose nearest neighbour among them is that one too.
-SiftFeatures firstAndItsTwin(const SiftFeatures& features) {
-  SiftKeypoint twin = features.keypoints().front();
+LocalFeatures firstAndItsTwin(const LocalFeatures& features) {
+  Keypoint twin = features.keypoints()[0];
   twin.y_px += twin.y_px < 120.0F ? 120.0F : -120.0F;
   std::vector<std::uint8_t> descriptors;
   for (int i = 0; i < 2; ++i) {
-    descriptors.insert(descriptors.end(), features.descriptor(0),
-                       features.descriptor(0) + SiftFeatures::kDescriptorSize);
+    descriptors.insert(descriptors.end(), features.bytes(0), features.bytes(0) + kSiftDimension);
   }
   descriptors.back() ^= 1U;
-  return SiftFeatures({features.keypoints().front(), twin}, std::move(descriptors));
+  return LocalFeatures({features.keypoints()[0], twin}, std::move(descriptors));
 }
 
 /// Whether something is drawn around feature `i` of the current image.
-bool isJoined(const cv::Mat& canvas, const SiftFeatures& sift, std::size_t i) {
+bool isJoined(const cv::Mat& canvas, const LocalFeatures& sift, std::size_t i) {
   constexpr double kScale = 1.5;
-  const SiftKeypoint& keypoint = sift.keypoints()[i];
+  const Keypoint& keypoint = sift.keypoints()[i];
   const cv::Point centre(cvRound(keypoint.x_px * kScale), cvRound(keypoint.y_px * kScale));
   const cv::Rect around(centre - cv::Point(8, 8), cv::Size(17, 17));
   return colouredPixels(canvas, around) > 0;
@@ -87,7 +87,7 @@ bool isJoined(const cv::Mat& canvas, const SiftFeatures& sift, std::size_t i) {
 TEST(MatchesImage, DrawsTheMatchesOfTheMode) {
   const auto map = test::smallMap();
   const cv::Mat grey(240, 320, CV_8UC1, cv::Scalar(100));
-  const SiftFeatures sift = firstAndItsTwin(*map->sift(3));
+  const LocalFeatures sift = firstAndItsTwin(*map->local(3));
   const cv::Mat symmetric = drawMatches(grey, sift, *map, 3, {0.6, "symmetric"});
   EXPECT_TRUE(isJoined(symmetric, sift, 0));
   EXPECT_FALSE(isJoined(symmetric, sift, 1)) << "the training feature is nearer to the first";
@@ -108,7 +108,7 @@ int redPixels(const cv::Mat& canvas) { return pixelsMoreOf(canvas, 2, 1); }
 MatchedLandmarks matchedIn(const TrainingMap& map, std::size_t training, bool inlier) {
   MatchedLandmarks matched{training, {}};
   for (std::uint32_t i = 0; i < 10; ++i) {
-    const SiftKeypoint& keypoint = map.sift(training)->keypoints()[i];
+    const Keypoint& keypoint = map.local(training)->keypoints()[i];
     matched.landmarks.push_back({{keypoint.x_px, keypoint.y_px}, i, inlier});
   }
   return matched;

@@ -250,7 +250,7 @@ TEST(MessageConversions, StatesAndKindsHaveTheNumbersOfTheMessages) {
   EXPECT_EQ(static_cast<int>(PoseSource::kNone), LocalizationStatus::NONE);
   EXPECT_EQ(static_cast<int>(PoseSource::kPlace), LocalizationStatus::PLACE);
   EXPECT_EQ(static_cast<int>(PoseSource::kMetric), LocalizationStatus::METRIC);
-  EXPECT_EQ(static_cast<int>(FeatureKind::kSift), LocalizationStatus::SIFT);
+  EXPECT_EQ(static_cast<int>(FeatureKind::kLocal), LocalizationStatus::SIFT);
   EXPECT_EQ(static_cast<int>(FeatureKind::kGlobal), LocalizationStatus::GLOBAL);
   EXPECT_EQ(static_cast<int>(ParticleKind::kStandard), SwarmParticle::STANDARD);
   EXPECT_EQ(static_cast<int>(ParticleKind::kQuantum), SwarmParticle::QUANTUM);

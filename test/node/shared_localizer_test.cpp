@@ -54,9 +54,9 @@ TEST(SharedLocalizer, AMaskHoldsForTheMapThatComesLaterAndForTheNext) {
     localizer.setMap(test::smallMap());
     const auto result = localizer.process((i + 1) * kSecond_ns, noise());
     ASSERT_TRUE(result.has_value());
-    ASSERT_GT(result->sift.size(), 0U);
+    ASSERT_GT(result->local.size(), 0U);
     const int width_px = result->map->header().image_size.width;
-    for (const SiftKeypoint& keypoint : result->sift.keypoints())
+    for (const Keypoint& keypoint : result->local.keypoints())
       EXPECT_LE(keypoint.x_px, 0.5F * static_cast<float>(width_px));
   }
 }

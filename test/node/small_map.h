@@ -6,21 +6,22 @@
 #include <utility>
 #include <vector>
 
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {
 
 /// `count` features at random points of a 320 x 240 image with random descriptors; the same seed, the same ones.
-inline SiftFeatures randomFeatures(std::uint32_t seed, std::size_t count) {
+inline LocalFeatures randomFeatures(std::uint32_t seed, std::size_t count) {
   std::mt19937 random(seed);
-  std::vector<SiftKeypoint> keypoints(count);
+  std::vector<Keypoint> keypoints(count);
   for (auto& keypoint : keypoints) {
     keypoint.x_px = static_cast<float>(random() % 320);
     keypoint.y_px = static_cast<float>(random() % 240);
   }
-  std::vector<std::uint8_t> descriptors(count * SiftFeatures::kDescriptorSize);
+  std::vector<std::uint8_t> descriptors(count * kSiftDimension);
   for (auto& byte : descriptors) byte = static_cast<std::uint8_t>(random() % 256);
-  return SiftFeatures(std::move(keypoints), std::move(descriptors));
+  return LocalFeatures(std::move(keypoints), std::move(descriptors));
 }
 
 /// Two sessions of five images each, one per metre eastwards, the second 20 m north of the first.
@@ -35,7 +36,7 @@ inline std::shared_ptr<const TrainingMap> smallMap() {
     image.session = i / 5;
     image.stamp_ns = std::int64_t{1000000000} * i;
     image.position_m = {static_cast<double>(i % 5), 20.0 * image.session};
-    image.sift = randomFeatures(static_cast<std::uint32_t>(i), 40);
+    image.local = randomFeatures(static_cast<std::uint32_t>(i), 40);
     images.push_back(image);
   }
   return std::make_shared<const TrainingMap>(header, std::move(images));

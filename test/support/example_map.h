@@ -8,18 +8,19 @@
 #include <vector>
 
 #include "map/map_schema.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {
 
-inline SiftFeatures randomFeatures(std::size_t count, std::mt19937& random) {
+inline LocalFeatures randomFeatures(std::size_t count, std::mt19937& random) {
   std::uniform_int_distribution<int> byte(0, 255);
   std::uniform_real_distribution<float> pixel(0.0F, 320.0F);
-  std::vector<SiftKeypoint> keypoints(count);
-  std::vector<std::uint8_t> descriptors(count * SiftFeatures::kDescriptorSize);
+  std::vector<Keypoint> keypoints(count);
+  std::vector<std::uint8_t> descriptors(count * kSiftDimension);
   for (auto& keypoint : keypoints) keypoint = {pixel(random), pixel(random), 4.0F, pixel(random)};
   for (auto& value : descriptors) value = static_cast<std::uint8_t>(byte(random));
-  return SiftFeatures(keypoints, descriptors);
+  return LocalFeatures(keypoints, descriptors);
 }
 
 inline GlobalFeatures::Histogram randomHistogram(std::mt19937& random) {
@@ -55,7 +56,9 @@ inline MapHeader exampleHeader() {
   MapHeader header;
   header.datum = {48.5, 9.05, 430.25};
   header.image_size = {320, 240};
-  header.sift.contrast_threshold = 0.03;
+  SiftConfig sift;
+  sift.contrast_threshold = 0.03;
+  header.kind = std::make_shared<Sift>(sift);
   header.sessions = {{"monday", exampleCamera(), exampleMask(), exampleMount()}, {"tuesday \"quoted\" \xC3\xA4"}};
   return header;
 }
@@ -114,7 +117,7 @@ inline std::vector<TrainingImage> exampleImages(std::size_t count, std::size_t f
     images[i].position_m = {50.0 * std::cos(turn), i == 0 ? -0.0 : 30.0 * std::sin(turn)};
     images[i].yaw_rad = turn - 1.0 / 3.0;
     if (i == 0) continue;
-    images[i].sift = randomFeatures(features, random);
+    images[i].local = randomFeatures(features, random);
     images[i].global.wgoh = randomHistogram(random);
     images[i].global.wgii = randomHistogram(random);
     images[i].preview_jpeg = {0xFF, 0xD8, static_cast<std::uint8_t>(i)};

@@ -12,9 +12,9 @@ class FakeImage : public QueryImage {
  public:
   void set(std::int64_t, const cv::Mat&) override {}
   bool isRepeated() const override { return false; }
-  std::size_t siftFeatures() override { return 100; }
+  std::size_t localFeatures() override { return 100; }
   ImageReport report() const override { return {}; }
-  const SiftFeatures* sift() const override { return nullptr; }
+  const LocalFeatures* local() const override { return nullptr; }
   void configure(const FrontEndConfig&, const SimilarityConfig&) override {}
 };
 

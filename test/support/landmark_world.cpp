@@ -102,7 +102,7 @@ class PointGrid {
 View viewOf(const std::vector<WorldPoint>& world, const std::vector<std::size_t>& points, const CameraModel& camera,
             const CameraPose& pose, double noise_px, std::mt19937& random, std::size_t image) {
   std::normal_distribution<double> noise(0.0, 1.0);
-  std::vector<SiftKeypoint> keypoints;
+  std::vector<Keypoint> keypoints;
   std::vector<std::uint8_t> descriptors;
   View view;
   for (const std::size_t i : points) {
@@ -120,7 +120,7 @@ View viewOf(const std::vector<WorldPoint>& world, const std::vector<std::size_t>
     descriptors.insert(descriptors.end(), world[i].descriptor.begin(), world[i].descriptor.end());
     view.points.push_back(i);
   }
-  view.features = SiftFeatures(std::move(keypoints), std::move(descriptors));
+  view.features = LocalFeatures(std::move(keypoints), std::move(descriptors));
   return view;
 }
 
@@ -208,7 +208,7 @@ RecordedDrive record(const std::vector<DrivenPose>& poses, const std::vector<Wor
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::vector<std::size_t> points = grid.around(poses[i].camera.position_m);
     const View view = viewOf(world, points, recorded.camera, poses[i].camera, kKeypointSigma_px, random, i);
-    recorded.views.push_back(std::make_shared<const SiftFeatures>(view.features));
+    recorded.views.push_back(std::make_shared<const LocalFeatures>(view.features));
   }
   return recorded;
 }
@@ -219,7 +219,7 @@ std::shared_ptr<const TrainingMap> mapOf(const RecordedDrive& drive) {
   std::vector<TrainingImage> images(drive.views.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     images[i].stamp_ns = session.images[i].stamp_ns;
-    images[i].sift = *drive.views[i];
+    images[i].local = *drive.views[i];
     images[i].geometry = std::move(geometry.images[i]);
     images[i].position_m = images[i].geometry->camera.position_m.head<2>();
     images[i].yaw_rad = images[i].geometry->camera.yaw_rad();

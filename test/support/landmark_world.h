@@ -10,7 +10,8 @@
 
 #include "geometry/session_geometry.h"
 #include "visual_localization/camera/camera_model.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/map/training_map.h"
 
@@ -23,7 +24,7 @@ CameraModel streetCamera();
 
 /// A thing with a look of its own. Most stand still.
 struct WorldPoint {
-  using Descriptor = std::array<std::uint8_t, SiftFeatures::kDescriptorSize>;
+  using Descriptor = std::array<std::uint8_t, kSiftDimension>;
 
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d motion_m = Eigen::Vector3d::Zero();  ///< from one image to the next
@@ -34,7 +35,7 @@ WorldPoint randomPoint(const Eigen::Vector3d& position_m, std::mt19937& random);
 
 /// An image of the world.
 struct View {
-  SiftFeatures features;
+  LocalFeatures features;
   std::vector<std::size_t> points;  ///< which one each feature shows
 };
 
@@ -73,7 +74,7 @@ std::vector<WorldPoint> pointsAlong(const std::vector<DrivenPose>& poses, double
 struct RecordedDrive {
   CameraModel camera = streetCamera();
   std::vector<DrivenPose> truth;
-  std::vector<std::shared_ptr<const SiftFeatures>> views;
+  std::vector<std::shared_ptr<const LocalFeatures>> views;
   std::vector<MapFix> fixes;
 
   /// With the path that cleaning makes of the fixes. This must live longer.

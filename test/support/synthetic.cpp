@@ -6,31 +6,32 @@
 #include <opencv2/imgproc.hpp>
 
 #include "base/numbers.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization::test {
 
 std::vector<std::uint8_t> descriptor(const std::vector<int>& first_bins) {
-  std::vector<std::uint8_t> bytes(SiftFeatures::kDescriptorSize, 0);
+  std::vector<std::uint8_t> bytes(kSiftDimension, 0);
   for (std::size_t i = 0; i < first_bins.size(); ++i) bytes[i] = static_cast<std::uint8_t>(first_bins[i]);
   return bytes;
 }
 
-SiftFeatures featuresOf(const std::vector<std::vector<std::uint8_t>>& descriptors) {
-  std::vector<SiftKeypoint> keypoints(descriptors.size());
+LocalFeatures featuresOf(const std::vector<std::vector<std::uint8_t>>& descriptors) {
+  std::vector<Keypoint> keypoints(descriptors.size());
   std::vector<std::uint8_t> bytes;
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     keypoints[i].x_px = static_cast<float>(i);
     bytes.insert(bytes.end(), descriptors[i].begin(), descriptors[i].end());
   }
-  return SiftFeatures(std::move(keypoints), std::move(bytes));
+  return LocalFeatures(std::move(keypoints), std::move(bytes));
 }
 
-SiftFeatures randomFeatures(std::size_t count, std::uint32_t seed) {
+LocalFeatures randomFeatures(std::size_t count, std::uint32_t seed) {
   std::mt19937 engine(seed);
   std::uniform_int_distribution<int> byte(0, 255);
   std::vector<std::vector<std::uint8_t>> descriptors(count);
   for (auto& bytes : descriptors) {
-    bytes.resize(SiftFeatures::kDescriptorSize);
+    bytes.resize(kSiftDimension);
     for (auto& value : bytes) value = static_cast<std::uint8_t>(byte(engine));
   }
   return featuresOf(descriptors);

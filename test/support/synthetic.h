@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::test {
@@ -15,9 +15,9 @@ namespace visual_localization::test {
 /// A descriptor with the given values in its first bins and zeros behind.
 std::vector<std::uint8_t> descriptor(const std::vector<int>& first_bins);
 /// Features with these descriptors at keypoints (0, 0), (1, 0), ...
-SiftFeatures featuresOf(const std::vector<std::vector<std::uint8_t>>& descriptors);
+LocalFeatures featuresOf(const std::vector<std::vector<std::uint8_t>>& descriptors);
 /// `count` features with random descriptors, the same for the same seed.
-SiftFeatures randomFeatures(std::size_t count, std::uint32_t seed);
+LocalFeatures randomFeatures(std::size_t count, std::uint32_t seed);
 
 /// A map of images without features at these positions, heading from each to the next.
 std::shared_ptr<const TrainingMap> mapAt(const std::vector<Eigen::Vector2d>& positions_m);

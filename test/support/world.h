@@ -23,16 +23,16 @@ class World {
 
   /// What the robot sees from here; globally, places within some 10 m look alike.
   TrackerInput from(const Eigen::Vector2d& robot_m) {
-    scores_.startImage(FeatureKind::kSift, [this, robot_m](FeatureKind kind, std::size_t image) {
-      return kind == FeatureKind::kSift ? scoreAt(0.5 * bell(image, robot_m, 2.0))
-                                        : scoreAt(bell(image, robot_m, 10.0));
+    scores_.startImage(FeatureKind::kLocal, [this, robot_m](FeatureKind kind, std::size_t image) {
+      return kind == FeatureKind::kLocal ? scoreAt(0.5 * bell(image, robot_m, 2.0))
+                                         : scoreAt(bell(image, robot_m, 10.0));
     });
     sweep_.startImage();
     return {scores_, sweep_, sessions_};
   }
 
   TrackerInput inTheDark() {
-    scores_.startImage(FeatureKind::kSift, [](FeatureKind, std::size_t) { return Score{}; });
+    scores_.startImage(FeatureKind::kLocal, [](FeatureKind, std::size_t) { return Score{}; });
     sweep_.startImage();
     return {scores_, sweep_, sessions_};
   }

@@ -4,19 +4,19 @@
 #include "map/feature_store.h"
 #include "survey/map_survey.h"
 #include "test/support/example_map.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 namespace {
 
 /// Replaces the features `first` to `last` of an image by others.
-SiftFeatures withOthers(const SiftFeatures& features, std::size_t first, std::size_t last, unsigned seed) {
+LocalFeatures withOthers(const LocalFeatures& features, std::size_t first, std::size_t last, unsigned seed) {
   std::mt19937 random(seed);
-  const SiftFeatures others = test::randomFeatures(features.size(), random);
-  std::vector<std::uint8_t> descriptors = features.descriptors();
-  const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i * SiftFeatures::kDescriptorSize); };
-  std::copy(others.descriptors().begin() + at(first), others.descriptors().begin() + at(last),
-            descriptors.begin() + at(first));
-  return SiftFeatures(features.keypoints(), descriptors);
+  const LocalFeatures others = test::randomFeatures(features.size(), random);
+  std::vector<std::uint8_t> descriptors = features.bytes();
+  const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i * kSiftDimension); };
+  std::copy(others.bytes().begin() + at(first), others.bytes().begin() + at(last), descriptors.begin() + at(first));
+  return LocalFeatures(features.keypoints(), descriptors);
 }
 
 /// A street of 60 m with an image a metre, each with half its features from the one before. `twins`: so many images
@@ -28,13 +28,13 @@ std::vector<TrainingImage> street(std::size_t twins) {
     images[i].stamp_ns = static_cast<std::int64_t>(i) * 1'000'000'000;
     images[i].position_m = {static_cast<double>(i), 0.0};
     const auto seed = static_cast<unsigned>(i);
-    images[i].sift = i == 0 ? test::randomFeatures(60, random)
-                            : withOthers(images[i - 1].sift, i % 2 == 0 ? 0 : 30, i % 2 == 0 ? 30 : 60, seed);
+    images[i].local = i == 0 ? test::randomFeatures(60, random)
+                             : withOthers(images[i - 1].local, i % 2 == 0 ? 0 : 30, i % 2 == 0 ? 30 : 60, seed);
     images[i].global.wgoh = test::randomHistogram(random);
     images[i].global.wgii = test::randomHistogram(random);
   }
   for (std::size_t t = 0; t < twins; ++t) {
-    images[40 + t].sift = withOthers(images[5 + t].sift, 0, 15, 1000 + static_cast<unsigned>(t));
+    images[40 + t].local = withOthers(images[5 + t].local, 0, 15, 1000 + static_cast<unsigned>(t));
     images[40 + t].global = images[5 + t].global;
   }
   return images;
@@ -157,7 +157,7 @@ TEST(AmbiguousPlaces, AStretchEndsWithItsSession) {
 TEST(AmbiguousPlaces, ImagesWithoutFeaturesAreNotAmbiguous) {
   std::vector<TrainingImage> images = street(4);
   for (TrainingImage& image : images) {
-    image.sift = {};
+    image.local = {};
     image.global = {};
   }
   const AmbiguousPlaces found = findAmbiguousPlaces(mapOf(std::move(images)));

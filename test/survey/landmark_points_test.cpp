@@ -15,7 +15,7 @@ TrainingImage imageWith(int i, int session, const std::vector<std::uint32_t>& id
   TrainingImage image;
   image.session = session;
   image.position_m = {0.0, 10.0 * i};
-  image.sift = test::randomFeatures(ids.size(), random);
+  image.local = test::randomFeatures(ids.size(), random);
   image.geometry = ImageGeometry();
   image.geometry->camera.position_m = {0.0, 10.0 * i, 2.0};
   for (std::uint32_t k = 0; k < ids.size(); ++k) {

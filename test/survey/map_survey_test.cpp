@@ -26,7 +26,7 @@ class Rounds {
       image.session = session;
       image.position_m = from_m + static_cast<double>(i) * Eigen::Vector2d(std::cos(yaw_rad), std::sin(yaw_rad));
       image.yaw_rad = yaw_rad;
-      image.sift = test::randomFeatures(features, random);
+      image.local = test::randomFeatures(features, random);
       images_.push_back(image);
     }
     return *this;

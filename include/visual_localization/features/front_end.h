@@ -10,9 +10,10 @@
 #include <opencv2/imgproc.hpp>
 
 #include "visual_localization/camera/mask.h"
+#include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/local_features.h"
 
 namespace visual_localization {
 
@@ -42,7 +43,7 @@ const cv::Mat& withUsualContrast(const cv::Mat& grey, const GreyLevels& levels, 
 const cv::Mat& withoutMasked(const cv::Mat& grey, const Mask& mask, cv::Mat& buffer);
 
 /// Drops the features that lie where `mask`, which is empty or of the image's size, does not use the image.
-void dropMasked(const Mask& mask, SiftFeatures& features);
+void dropMasked(const Mask& mask, LocalFeatures& features);
 
 /// `image` at this size: itself when it has it, otherwise resized into `buffer`.
 inline const cv::Mat& fitted(const cv::Mat& image, cv::Size size, cv::Mat& buffer) {
@@ -58,34 +59,35 @@ inline double stretchOf(cv::Size recorded, cv::Size shown) {
 
 /// How live images are prepared.
 struct FrontEndConfig {
-  cv::Size image_size;            ///< the map's, pixels
-  SiftConfig sift;                ///< the map's
-  MatchConfig match;              ///< for pruning
-  bool prune = true;              ///< keep only features that the image before showed as well
-  double max_image_gap_s = 10.0;  ///< longer pauses make the image before useless for pruning
-  std::string sift_backend = kNativeSift;
+  cv::Size image_size;                           ///< the map's, pixels
+  std::shared_ptr<const LocalFeatureKind> kind;  ///< of the map's local features
+  MatchConfig match;                             ///< for pruning
+  bool prune = true;                             ///< keep only features that the image before showed as well
+  double max_image_gap_s = 10.0;                 ///< longer pauses make the image before useless for pruning
+  ExtractorChoice extractor = {};
   Mask mask = {};  ///< of image_size, or empty: features under it are not used
 };
 
-/// Live image in, features out: resizes to the map's size, spreads the grey levels of a dull image and extracts either
-/// kind of features when it is first asked for. SIFT features are kept only if the image directly before shows them as
-/// well (Weiss et al., section III); its features too are extracted only then. The first image, or one after a gap or
-/// after an image without features, is not pruned. An image that repeats the one before to the last bit is that one,
-/// seen longer. Takes no memory from the heap once it has seen a few images, but for what OpenCV needs to resize them.
+/// Live image in, features out: resizes to the map's size, spreads the grey levels of a dull image and extracts local
+/// or global features when they are first asked for. Local features are kept only if the image directly before shows
+/// them as well (Weiss et al., section III); its features too are extracted only then. The first image, or one after a
+/// gap or after an image without features, is not pruned. An image that repeats the one before to the last bit is that
+/// one, seen longer. Takes no memory from the heap once it has seen a few images, but for what OpenCV needs to resize
+/// them.
 class FrontEnd {
  public:
   explicit FrontEnd(const FrontEndConfig& config);
 
-  /// Holds from the next image on. Size, SIFT parameters and backend stay what they are. Features of the image before
+  /// Holds from the next image on. Size and kind of local features stay what they are. Features of the image before
   /// keep the mask that they were extracted with.
   void configure(const FrontEndConfig& config);
   /// The next image. `grey`: 8-bit, one channel, any size of at least 16 x 16; throws std::invalid_argument otherwise,
   /// and then nothing has changed.
   void setImage(std::int64_t stamp_ns, const cv::Mat& grey);
-  /// SIFT features of the image, pruned.
-  const SiftFeatures& sift();
+  /// Local features of the image, pruned.
+  const LocalFeatures& local();
   /// The same before pruning.
-  const SiftFeatures& unprunedSift();
+  const LocalFeatures& unprunedLocal();
   /// Global features of the image.
   const GlobalFeatures& global();
 
@@ -93,27 +95,27 @@ class FrontEnd {
   bool isRepeated() const { return is_repeated_; }
   /// What the image is like at the map's size, before its grey levels are spread.
   const ImageStatistics& statistics() const { return statistics_; }
-  /// The pruned SIFT features if they were asked for.
-  const SiftFeatures* siftIfExtracted() const { return has_pruned_ ? &pruned_ : nullptr; }
-  /// Number of SIFT features before pruning; 0 unless they were asked for.
-  std::size_t siftExtracted() const { return current_ && current_->has_sift ? current_->sift.size() : 0; }
+  /// The pruned local features if they were asked for.
+  const LocalFeatures* localIfExtracted() const { return has_pruned_ ? &pruned_ : nullptr; }
+  /// Number of local features before pruning; 0 unless they were asked for.
+  std::size_t localExtracted() const { return current_ && current_->has_local ? current_->local.size() : 0; }
   /// Time spent on extraction and pruning since setImage, which counts too.
   double extract_ms() const { return extract_ms_; }
 
  private:
   struct Image {
     std::int64_t stamp_ns = 0;
-    cv::Mat grey;       ///< of the map's size; a copy, since the camera's buffer does not stay
-    SiftFeatures sift;  ///< not pruned
-    bool has_sift = false;
+    cv::Mat grey;         ///< of the map's size; a copy, since the camera's buffer does not stay
+    LocalFeatures local;  ///< not pruned
+    bool has_local = false;
   };
 
   void takeImage(const cv::Mat& image);
-  const SiftFeatures& unprunedSift(Image& image);
+  const LocalFeatures& unprunedLocal(Image& image);
   bool previousIsClose() const;
 
   FrontEndConfig config_;
-  std::unique_ptr<SiftExtractor> sift_extractor_;
+  std::unique_ptr<LocalExtractor> local_extractor_;
   GlobalExtractor global_extractor_;
   std::optional<Image> previous_;
   std::optional<Image> current_;
@@ -122,7 +124,7 @@ class FrontEnd {
   cv::Mat masked_;
   bool is_repeated_ = false;
   ImageStatistics statistics_;
-  SiftFeatures pruned_;  ///< like those of the images kept when it no longer holds, for the sake of its memory
+  LocalFeatures pruned_;  ///< like those of the images kept when it no longer holds, for the sake of its memory
   bool has_pruned_ = false;
   std::optional<GlobalFeatures> global_;
   double extract_ms_ = 0.0;

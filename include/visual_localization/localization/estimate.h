@@ -128,6 +128,8 @@ struct Estimate {
   /// pose is metric, otherwise of everything that is not known.
   double sigma_m() const;
   double sigmaYaw_rad() const;
+  /// Name of the features that particles were compared by: "SIFT" or another kind of local ones, or "GLOBAL".
+  std::string featuresName() const;
   /// What to tell people about a calibration that the images contradict; empty while they do not.
   std::string cameraTrouble() const;
 };

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/front_end.h"
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/localization/estimate.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
@@ -23,6 +23,7 @@ struct LocalizerConfig : TrackerConfig {
   std::string features = "sift";
   std::string estimate = "interpolated";
   std::string sift_backend = kNativeSift;
+  std::string model;
   int seed = 1;
   bool prune = false;
   bool choose_session = true;
@@ -39,7 +40,7 @@ struct LocalizerConfig : TrackerConfig {
   void declare(ParameterVisitor& visitor);
 };
 
-/// How images are prepared for comparison with a map.
+/// How images are prepared for comparison with a map. Throws ParameterError when it has other local features.
 FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map);
 
 /// Names of the presets: sets of parameters of a localizer that belong together.

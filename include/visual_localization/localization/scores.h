@@ -10,10 +10,12 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/map/training_map.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -22,10 +24,7 @@ namespace visual_localization {
 class Random;
 
 /// Which features images are compared by.
-enum class FeatureKind : std::uint8_t { kSift = 0, kGlobal = 1 };
-
-/// "SIFT", "GLOBAL".
-std::string toString(FeatureKind kind);
+enum class FeatureKind : std::uint8_t { kLocal = 0, kGlobal = 1 };
 
 /// How alike two images are, and on how much evidence.
 struct Score {
@@ -62,18 +61,20 @@ struct HybridConfig {
   void declare(ParameterVisitor& visitor);
 };
 
-/// Share of SIFT features that match (Kronfeld et al. (journal), section 4; one-way: Weiss et al., section III).
+/// Share of local features that match (Kronfeld et al. (journal), section 4; one-way: Weiss et al., section III).
 /// Stateless, so that one may serve several threads.
-class SiftSimilarity {
+class LocalSimilarity {
  public:
-  /// `image_width_px`: the map's.
-  SiftSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px = 640);
+  /// `image_width_px`: the map's, like `kind`.
+  LocalSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px = 640,
+                  std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>());
   /// 0 when either image has fewer than two features.
-  Score compare(const SiftFeatures& current, const SiftFeatures& training) const;
+  Score compare(const LocalFeatures& current, const LocalFeatures& training) const;
   /// The score of a similarity that is known already.
   Score scoreOf(double similarity, std::size_t matches, double scale) const;
 
  private:
+  std::shared_ptr<const LocalFeatureKind> kind_;
   MatchConfig match_;
   double recognised_;
   double exponent_;
@@ -99,12 +100,12 @@ class GlobalSimilarity {
 /// others alone, sunny to cloudy: 2.40 m at 5.4 % SIFT against 2.46 m at 4.2 %; the same trade.)
 class FeatureChoice {
  public:
-  /// `features`: "sift", "global" or "hybrid".
+  /// `features`: "global", "hybrid", or the name of a kind of local features.
   FeatureChoice(const std::string& features, const HybridConfig& config);
 
   /// Other features or thresholds. The next image is compared as it would have been, unless the features are others.
   void configure(const std::string& features, const HybridConfig& config);
-  /// The position is unknown: the hybrid choice begins with SIFT.
+  /// The position is unknown: the hybrid choice begins with local features.
   void reset();
   FeatureKind next() const { return next_; }
   /// After an image that was compared by next(): `spread_m` is sigma_x, sigma_y of the cloud (Eq. 2). `confirmed`: the
@@ -113,22 +114,23 @@ class FeatureChoice {
   void update(const Eigen::Vector2d& spread_m, bool confirmed, bool doubtful);
 
  private:
-  bool isSiftDue(bool confirmed) const;
+  bool isLocalDue(bool confirmed) const;
 
   bool hybrid_;
   HybridConfig config_;
   FeatureKind first_;
   FeatureKind next_;
-  int since_sift_ = 0;  ///< images since the last one that was compared by SIFT
+  int since_local_ = 0;  ///< images since the last one that was compared by local features
 };
 
 /// What is known of an image beside its scores.
 struct ImageReport {
   ImageStatistics statistics;
-  std::size_t features_extracted = 0;  ///< SIFT features before pruning; 0 when there was no need for them
-  std::size_t features_kept = 0;       ///< after pruning
-  double extract_ms = 0.0;             ///< wall-clock time of feature extraction and pruning
-  double match_ms = 0.0;               ///< wall-clock time of comparisons with training images
+  std::string local_features = "SIFT";  ///< their kind
+  std::size_t features_extracted = 0;   ///< local features before pruning; 0 when there was no need for them
+  std::size_t features_kept = 0;        ///< after pruning
+  double extract_ms = 0.0;              ///< wall-clock time of feature extraction and pruning
+  double match_ms = 0.0;                ///< wall-clock time of comparisons with training images
 };
 
 /// The current image: something that can be compared with every training image, by either kind of features. A live
@@ -142,13 +144,14 @@ class QueryImage {
   virtual bool isRepeated() const = 0;
   /// Not cached: see Scores.
   virtual Score compare(FeatureKind kind, std::size_t training_image) = 0;
-  /// Number of SIFT features that it is compared by; extracts them if that has not been done.
-  virtual std::size_t siftFeatures() = 0;
+  /// Number of local features that it is compared by; extracts them if that has not been done.
+  virtual std::size_t localFeatures() = 0;
   virtual ImageReport report() const = 0;
-  /// Its SIFT features after pruning, if there was a need for them; null otherwise.
-  virtual const SiftFeatures* sift() const = 0;
-  /// All its SIFT features, not pruned, extracted if that has not been done; null when it is known by its scores alone.
-  virtual const SiftFeatures* unprunedSift() { return nullptr; }
+  /// Its local features after pruning, if there was a need for them; null otherwise.
+  virtual const LocalFeatures* local() const = 0;
+  /// All its local features, not pruned, extracted if that has not been done; null when it is known by its scores
+  /// alone.
+  virtual const LocalFeatures* unprunedLocal() { return nullptr; }
   /// Holds from the next image on.
   virtual void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) = 0;
 };
@@ -162,16 +165,17 @@ class LiveImage final : public QueryImage {
   void set(std::int64_t stamp_ns, const cv::Mat& grey) override;
   bool isRepeated() const override { return front_end_.isRepeated(); }
   Score compare(FeatureKind kind, std::size_t training_image) override;
-  std::size_t siftFeatures() override { return front_end_.sift().size(); }
+  std::size_t localFeatures() override { return front_end_.local().size(); }
   ImageReport report() const override;
-  const SiftFeatures* sift() const override { return front_end_.siftIfExtracted(); }
-  const SiftFeatures* unprunedSift() override { return &front_end_.unprunedSift(); }
+  const LocalFeatures* local() const override { return front_end_.localIfExtracted(); }
+  const LocalFeatures* unprunedLocal() override { return &front_end_.unprunedLocal(); }
   void configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) override;
 
  private:
   const TrainingMap& map_;
+  std::string name_;  ///< of its local features
   FrontEnd front_end_;
-  SiftSimilarity sift_similarity_;
+  LocalSimilarity local_similarity_;
   GlobalSimilarity global_similarity_;
   double match_ms_ = 0.0;  ///< without the extraction that comparisons bring about
 };
@@ -182,7 +186,7 @@ class Scores {
  public:
   using Compare = std::function<Score(FeatureKind kind, std::size_t training_image)>;
 
-  explicit Scores(std::size_t training_images) : sift_(training_images), global_(training_images) {}
+  explicit Scores(std::size_t training_images) : local_(training_images), global_(training_images) {}
 
   /// Forgets everything and takes scores from `compare` from now on. `kind`: what particles are compared by.
   void startImage(FeatureKind kind, Compare compare);
@@ -201,7 +205,7 @@ class Scores {
   std::vector<Compared> compared() const;
   /// The training images that particles were compared with, the most similar first.
   std::vector<std::size_t> mostSimilar() const;
-  /// Training images that were compared otherwise, by SIFT.
+  /// Training images that were compared otherwise, by local features.
   void count(const std::vector<std::size_t>& training_images);
   /// Distinct training images that particles were compared with, and those counted: the papers' measure of cost.
   std::size_t comparisons() const { return comparisons_ + counted_; }
@@ -228,9 +232,9 @@ class Scores {
     std::vector<std::uint32_t> entry_of_;  ///< of each training image; holds if the entry is there and says so too
   };
 
-  Cache sift_;
+  Cache local_;
   Cache global_;
-  FeatureKind kind_ = FeatureKind::kSift;
+  FeatureKind kind_ = FeatureKind::kLocal;
   Compare compare_;
   std::size_t comparisons_ = 0;
   std::size_t counted_ = 0;  ///< beside those of the particles
@@ -275,7 +279,7 @@ class MapSweep {
 /// Where along the path of a session the current image was taken (east, north; metres): where the median ratio of the
 /// sizes of matched features (Score::scale) is 1. That of a training image ahead is below 1, that of one behind above.
 /// Begins at `image` and asks its neighbours on that side, a few at most. Without a change of sides there, the position
-/// of the image whose ratio is nearest to 1. `scores` must be by SIFT.
+/// of the image whose ratio is nearest to 1. `scores` must be by local features.
 Eigen::Vector2d interpolateOnPath(const TrainingMap& map, Scores& scores, std::size_t image);
 
 }  // namespace visual_localization

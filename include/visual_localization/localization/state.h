@@ -54,9 +54,9 @@ struct StateConfig {
 
 /// What one image says about the position that the tracker estimates.
 struct Evidence {
-  FeatureKind features = FeatureKind::kSift;  ///< by which particles were compared
-  double place_ratio = 1.0;                   ///< see MapSweep::ratio; 1 when there was no need to ask
-  bool blind = false;                         ///< there is hardly anything to see in the image
+  FeatureKind features = FeatureKind::kLocal;  ///< by which particles were compared
+  double place_ratio = 1.0;                    ///< see MapSweep::ratio; 1 when there was no need to ask
+  bool blind = false;                          ///< there is hardly anything to see in the image
   /// Whether landmarks verify the pose; nothing where map or camera do not allow that. Then it alone decides.
   std::optional<bool> verified = {};
   /// How likely the robot is around the estimate, by a filter over the training images; nothing where the similarity

@@ -69,7 +69,7 @@ struct ParticleFilterConfig {
 /// Parameters of the discrete Bayes filter over the training images.
 struct BayesConfig {
   double anywhere = 0.02;
-  double exponent = 3.0;
+  double exponent = 0.0;
   double uniform = 0.03;
   int comparisons = 60;
   int first_comparisons = 400;

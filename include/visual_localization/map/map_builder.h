@@ -13,8 +13,8 @@
 #include <opencv2/core.hpp>
 
 #include "visual_localization/base/progress.h"
-#include "visual_localization/features/sift_features.h"
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/features/local_feature_kind.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/training_map.h"
@@ -35,12 +35,12 @@ struct MapBuilderConfig {
   double spacing_m = 0.0;
   bool prune = false;
   int preview_width_px = 80;
-  std::string sift_backend = kNativeSift;
+  ExtractorChoice extractor;
   std::string base_frame = "base_link";
   std::string camera_mount;
   std::string antenna_mount;
   std::string fix_frame;
-  SiftConfig sift = SiftConfig::uprightHellinger();
+  LocalFeatureConfig local;
   MatchConfig match;
   TrajectoryCleanerConfig trajectory;
   GeometryConfig geometry;

@@ -17,10 +17,10 @@ class MapStoreError : public std::runtime_error {
 };
 
 /// Version of the schema that this build writes.
-constexpr int kMapSchemaVersion = 7;
+constexpr int kMapSchemaVersion = 8;
 /// The oldest one that it reads. Version 3 knows neither cameras nor masks; until version 4 the rows of an image could
 /// belong to another map; until version 5 a map has no history; until version 6 its features
-/// are not upright.
+/// are not upright; until version 7 they are all SIFT.
 constexpr int kOldestMapSchemaVersion = 3;
 
 /// Megabytes (2^20 bytes) of features that are kept in memory unless someone says otherwise.
@@ -41,7 +41,7 @@ void saveMap(const TrainingMap& map, const std::string& path);
 
 /// Reads and verifies a map: application id, schema version, checksum over everything read, every size and
 /// range. The file is opened read-only and its schema is not trusted. Throws MapStoreError. An open map survives
-/// whatever happens to its file: see TrainingMap::sift.
+/// whatever happens to its file: see TrainingMap::local.
 std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoading& loading = {});
 
 /// Verifies all that loadMap() verifies, everything that an image looked like, and the structure of the file, image by

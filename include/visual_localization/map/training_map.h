@@ -13,7 +13,9 @@
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/features/global_features.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_feature_kind.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/geometry/image_geometry.h"
@@ -34,7 +36,7 @@ struct TrainingPose {
 
 /// One image of the map: where it was taken and what it looked like.
 struct TrainingImage : TrainingPose {
-  SiftFeatures sift;                           ///< after pruning
+  LocalFeatures local;                         ///< after pruning
   GlobalFeatures global;                       ///< of the whole image
   std::vector<std::uint8_t> preview_jpeg;      ///< small grey JPEG for people; may be empty
   std::optional<ImageGeometry> geometry = {};  ///< none: the camera is not calibrated, or the adjustment left it out
@@ -46,7 +48,7 @@ struct TrainingPoses {
   std::vector<double> yaws_rad;              ///< see TrainingPose
   std::vector<std::int64_t> stamps_ns;
   std::vector<std::int32_t> sessions;         ///< which of MapHeader::sessions
-  std::vector<std::uint32_t> feature_counts;  ///< SIFT features after pruning
+  std::vector<std::uint32_t> feature_counts;  ///< local features after pruning
 
   std::size_t size() const { return stamps_ns.size(); }
   void reserve(std::size_t count);
@@ -68,10 +70,10 @@ struct Session {
 
 /// What holds for all images of a map.
 struct MapHeader {
-  GeodeticPoint datum;                    ///< origin of the map frame
-  cv::Size image_size;                    ///< pixels; live images are resized to it
-  SiftConfig sift;                        ///< how features were extracted
-  std::vector<Session> sessions;          ///< its recordings
+  GeodeticPoint datum;                                                      ///< origin of the map frame
+  cv::Size image_size;                                                      ///< pixels; live images are resized to it
+  std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>();  ///< of the local features
+  std::vector<Session> sessions;                                            ///< its recordings
   std::vector<std::string> history = {};  ///< what became of it after it was built: a line for each edit, oldest first
 };
 
@@ -114,12 +116,12 @@ class TrainingMap {
   const Eigen::Vector2d& position_m(std::size_t i) const { return poses_.positions_m[i]; }
   double yaw_rad(std::size_t i) const { return poses_.yaws_rad[i]; }
   TrainingPose pose(std::size_t i) const;
-  /// Number of SIFT features, without reading them.
+  /// Number of local features, without reading them.
   std::size_t featureCount(std::size_t i) const { return poses_.feature_counts[i]; }
 
   // What training image `i` looked like, for as long as the map and the pointer live. Read from the map's file when it
   // is not in memory: what cannot be read there, or does not agree with its checksum, counts as without features.
-  std::shared_ptr<const SiftFeatures> sift(std::size_t i) const;
+  std::shared_ptr<const LocalFeatures> local(std::size_t i) const;
   std::shared_ptr<const GlobalFeatures> global(std::size_t i) const;
   std::vector<std::uint8_t> preview(std::size_t i) const;
   /// Its camera's pose and landmarks; null when it has none. The features of the landmarks are below featureCount(i);

@@ -6,6 +6,7 @@
 
 #include "features/sift/extrema.h"
 #include "features/sift/scale_space.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "features/highway.h"
+#include "visual_localization/features/sift.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace visual_localization {

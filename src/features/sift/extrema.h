@@ -4,7 +4,8 @@
 #include <vector>
 
 #include "features/sift/scale_space.h"
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 

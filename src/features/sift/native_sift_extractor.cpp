@@ -46,14 +46,14 @@ void halve(const FloatPlane& from, FloatPlane& to) {
 /// Pixels of the image to a pixel of the octave: the first one is doubled.
 float pixelsOf(int octave) { return std::ldexp(0.5F, octave); }
 
-SiftKeypoint keypointOf(const SiftPoint& point) {
+Keypoint keypointOf(const SiftPoint& point) {
   const float px = pixelsOf(point.octave);
   return {point.x_px * px, point.y_px * px, 2.0F * point.sigma_px * px, point.angle_deg};
 }
 
 /// What makes two points the same feature; larger ones first where several are at the same position.
 auto identity(const SiftPoint& point) {
-  const SiftKeypoint keypoint = keypointOf(point);
+  const Keypoint keypoint = keypointOf(point);
   return std::make_tuple(keypoint.x_px, keypoint.y_px, -keypoint.size_px, keypoint.angle_deg);
 }
 
@@ -126,18 +126,18 @@ void SiftScaleSpace::advanceLevel(std::size_t level) {
 NativeSiftExtractor::NativeSiftExtractor(const SiftConfig& config)
     : config_(config), scale_space_(config), search_(config), describer_(config.hellinger) {}
 
-void NativeSiftExtractor::extract(const cv::Mat& grey, SiftFeatures& features) {
+void NativeSiftExtractor::extract(const cv::Mat& grey, LocalFeatures& features) {
   requireExtractable(grey);
   scale_space_.setImage(grey);
   detect();
   keypoints_.clear();
-  descriptors_.resize(points_.size() * SiftFeatures::kDescriptorSize);
+  descriptors_.resize(points_.size() * kSiftDimension);
   std::uint8_t* descriptor = descriptors_.data();
   for (const SiftPoint& point : points_) {
     keypoints_.push_back(keypointOf(point));
     const SiftOctave& octave = scale_space_.octave(static_cast<std::size_t>(point.octave));
     describer_.describe(octave.levels[static_cast<std::size_t>(point.level)], point, descriptor);
-    descriptor += SiftFeatures::kDescriptorSize;
+    descriptor += kSiftDimension;
   }
   features.swapIn(keypoints_, descriptors_);
 }

@@ -6,7 +6,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
+#include "visual_localization/features/sift.h"
 
 namespace visual_localization {
 

@@ -1,9 +1,10 @@
-#include "visual_localization/features/sift_matcher.h"
+#include "visual_localization/features/feature_matcher.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <stdexcept>
 
 #include "base/numbers.h"
 #include "features/displacement_votes.h"
@@ -24,7 +25,7 @@ bool isDistinct(const TwoNearest& nearest, const AngleRatioTest& test) {
 }
 
 /// The neighbours in memory that is kept from call to call.
-const NearestDescriptors& neighboursOf(const SiftFeatures& a, const SiftFeatures& b) {
+const NearestDescriptors& neighboursOf(const LocalFeatures& a, const LocalFeatures& b) {
   static thread_local NearestDescriptors nearest;
   findNearest(a, b, nearest);
   return nearest;
@@ -37,7 +38,7 @@ bool matchesBack(std::uint32_t i, const NearestDescriptors& nearest, const Angle
 }
 
 template <class Use>
-void forEachOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio, Use use) {
+void forEachOneWay(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio, Use use) {
   if (a.size() < 2 || b.size() < 2) return;
   const NearestDescriptors& nearest = neighboursOf(a, b);
   const AngleRatioTest& test = ratioTest(max_angle_ratio);
@@ -47,13 +48,21 @@ void forEachOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angl
 }
 
 template <class Use>
-void forEachSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio, Use use) {
+void forEachSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio, Use use) {
   if (a.size() < 2 || b.size() < 2) return;
   const NearestDescriptors& nearest = neighboursOf(a, b);
   const AngleRatioTest& test = ratioTest(max_angle_ratio);
   for (std::uint32_t i = 0; i < a.size(); ++i) {
     if (matchesBack(i, nearest, test)) use(FeatureMatch{i, nearest.of_a[i].index});
   }
+}
+
+float product(const LocalFeatures& a, std::size_t i, const LocalFeatures& b, std::size_t j) {
+  const std::size_t dimension = a.form().dimension;
+  if (a.form().element == DescriptorElement::kFloat) {
+    return std::inner_product(a.floats(i), a.floats(i) + dimension, b.floats(j), 0.0F);
+  }
+  return static_cast<float>(std::inner_product(a.bytes(i), a.bytes(i) + dimension, b.bytes(j), std::int32_t{0}));
 }
 
 void offer(TwoNearest& nearest, float cosine, std::size_t candidate) {
@@ -75,31 +84,31 @@ void MatchConfig::declare(ParameterVisitor& visitor) {
                  mode, {"votes", "symmetric", "one_way"});
 }
 
-std::vector<FeatureMatch> matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
+std::vector<FeatureMatch> matchOneWay(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio) {
   std::vector<FeatureMatch> matches;
   matchOneWay(a, b, max_angle_ratio, matches);
   return matches;
 }
 
-std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio) {
+std::vector<FeatureMatch> matchSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio) {
   std::vector<FeatureMatch> matches;
   matchSymmetric(a, b, max_angle_ratio, matches);
   return matches;
 }
 
-void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+void matchOneWay(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio,
                  std::vector<FeatureMatch>& matches) {
   matches.clear();
   forEachOneWay(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
 }
 
-void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+void matchSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio,
                     std::vector<FeatureMatch>& matches) {
   matches.clear();
   forEachSymmetric(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
 }
 
-void matchMutual(const SiftFeatures& a, const SiftFeatures& b, std::vector<FeatureMatch>& matches) {
+void matchMutual(const LocalFeatures& a, const LocalFeatures& b, std::vector<FeatureMatch>& matches) {
   matches.clear();
   if (a.size() < 2 || b.size() < 2) return;
   const NearestDescriptors& nearest = neighboursOf(a, b);
@@ -109,7 +118,7 @@ void matchMutual(const SiftFeatures& a, const SiftFeatures& b, std::vector<Featu
   }
 }
 
-void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b, double image_width_px,
+void matchBy(const MatchConfig& config, const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
              std::vector<FeatureMatch>& matches) {
   if (config.isByVotes()) {
     matchMutual(a, b, matches);
@@ -121,7 +130,7 @@ void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeature
   }
 }
 
-double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vector<FeatureMatch>& matches) {
+double medianScale(const LocalFeatures& a, const LocalFeatures& b, const std::vector<FeatureMatch>& matches) {
   static thread_local std::vector<float> scales;
   scales.clear();
   for (const FeatureMatch& match : matches) {
@@ -132,10 +141,10 @@ double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vect
   return static_cast<double>(upperMedian(scales));
 }
 
-std::vector<std::size_t> seenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
+std::vector<std::size_t> seenIn(const LocalFeatures& features, const std::vector<const LocalFeatures*>& neighbours,
                                 double max_angle_ratio) {
   std::vector<bool> seen(features.size(), false);
-  for (const SiftFeatures* neighbour : neighbours) {
+  for (const LocalFeatures* neighbour : neighbours) {
     for (const FeatureMatch& match : matchOneWay(features, *neighbour, max_angle_ratio)) seen[match.a] = true;
   }
   std::vector<std::size_t> kept;
@@ -145,13 +154,13 @@ std::vector<std::size_t> seenIn(const SiftFeatures& features, const std::vector<
   return kept;
 }
 
-SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
-                        double max_angle_ratio) {
+LocalFeatures keepSeenIn(const LocalFeatures& features, const std::vector<const LocalFeatures*>& neighbours,
+                         double max_angle_ratio) {
   return features.subset(seenIn(features, neighbours, max_angle_ratio));
 }
 
-void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, double max_angle_ratio,
-                SiftFeatures& kept) {
+void keepSeenIn(const LocalFeatures& features, const LocalFeatures& neighbour, double max_angle_ratio,
+                LocalFeatures& kept) {
   static thread_local std::vector<FeatureMatch> matches;
   static thread_local std::vector<std::size_t> seen;
   matchOneWay(features, neighbour, max_angle_ratio, matches);
@@ -160,14 +169,18 @@ void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, dou
   features.subset(seen, kept);
 }
 
-void findNearestPlain(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+void requireAlike(const LocalFeatures& a, const LocalFeatures& b) {
+  if (a.empty() || b.empty() || a.form() == b.form()) return;
+  throw std::invalid_argument("local features with descriptors of different forms cannot be compared");
+}
+
+void findNearestPlain(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
+  requireAlike(a, b);
   nearest.of_a.assign(a.size(), TwoNearest());
   nearest.of_b.assign(b.size(), TwoNearest());
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::int32_t product =
-          std::inner_product(a.descriptor(i), a.descriptor(i) + SiftFeatures::kDescriptorSize, b.descriptor(j), 0);
-      const float cosine = static_cast<float>(product) * a.inverseNorm(i) * b.inverseNorm(j);
+      const float cosine = product(a, i, b, j) * a.inverseNorm(i) * b.inverseNorm(j);
       offer(nearest.of_a[i], cosine, j);
       offer(nearest.of_b[j], cosine, i);
     }
@@ -187,7 +200,7 @@ bool AngleRatioTest::exactly(float best, float second) const {
 }
 
 #ifndef VISUAL_LOCALIZATION_HIGHWAY
-void findNearest(const SiftFeatures& a, const SiftFeatures& b, NearestDescriptors& nearest) {
+void findNearest(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
   findNearestPlain(a, b, nearest);
 }
 #endif

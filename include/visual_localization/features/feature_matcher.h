@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "visual_localization/features/sift_features.h"
+#include "visual_localization/features/local_features.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -29,39 +29,39 @@ struct FeatureMatch {
 /// M_AB of Kronfeld et al. (journal), section 4: for each a its nearest neighbour b in B when
 /// acos(<a,b1>) / acos(<a,b2>) < max_angle_ratio on unit descriptors. Empty when either side has fewer than two
 /// features. In order of a.
-std::vector<FeatureMatch> matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
+std::vector<FeatureMatch> matchOneWay(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio);
 
 /// M*_AB: pairs that are each other's nearest neighbour and pass the ratio test in both directions. In order of a.
-std::vector<FeatureMatch> matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio);
+std::vector<FeatureMatch> matchSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio);
 
 /// The same as above into `matches`; without memory of their own.
-void matchOneWay(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+void matchOneWay(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio,
                  std::vector<FeatureMatch>& matches);
-void matchSymmetric(const SiftFeatures& a, const SiftFeatures& b, double max_angle_ratio,
+void matchSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio,
                     std::vector<FeatureMatch>& matches);
 /// Pairs that are each other's nearest neighbour, however near the second nearest is.
-void matchMutual(const SiftFeatures& a, const SiftFeatures& b, std::vector<FeatureMatch>& matches);
+void matchMutual(const LocalFeatures& a, const LocalFeatures& b, std::vector<FeatureMatch>& matches);
 /// By the mode and the ratio of `config`. By votes: of matchMutual(), the largest number with a common displacement
 /// (see displacement_votes.h), for images of this width.
-void matchBy(const MatchConfig& config, const SiftFeatures& a, const SiftFeatures& b, double image_width_px,
+void matchBy(const MatchConfig& config, const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
              std::vector<FeatureMatch>& matches);
 
 /// Median size of the matched features of `a` as a share of their partners' in `b`: how much larger the same things
 /// look, and so how much nearer they are, seen from a. 1 without matches of sizes above 0.
-double medianScale(const SiftFeatures& a, const SiftFeatures& b, const std::vector<FeatureMatch>& matches);
+double medianScale(const LocalFeatures& a, const LocalFeatures& b, const std::vector<FeatureMatch>& matches);
 
 /// Without the "noisy" features that appear in one image only (Weiss et al., section III): the indices of those of
 /// `features`, in order, that match (one way, ratio test) a feature of at least one of `neighbours`. The neighbours are
 /// given unpruned.
-std::vector<std::size_t> seenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
+std::vector<std::size_t> seenIn(const LocalFeatures& features, const std::vector<const LocalFeatures*>& neighbours,
                                 double max_angle_ratio);
 
 /// The features themselves.
-SiftFeatures keepSeenIn(const SiftFeatures& features, const std::vector<const SiftFeatures*>& neighbours,
-                        double max_angle_ratio);
+LocalFeatures keepSeenIn(const LocalFeatures& features, const std::vector<const LocalFeatures*>& neighbours,
+                         double max_angle_ratio);
 
 /// The same with one neighbour, into `kept`, whose memory is used again.
-void keepSeenIn(const SiftFeatures& features, const SiftFeatures& neighbour, double max_angle_ratio,
-                SiftFeatures& kept);
+void keepSeenIn(const LocalFeatures& features, const LocalFeatures& neighbour, double max_angle_ratio,
+                LocalFeatures& kept);
 
 }  // namespace visual_localization
