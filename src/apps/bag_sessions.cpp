@@ -169,6 +169,10 @@ MapBuilderConfig readConfig(const MapBuilderOptions& options) {
     overrideWith(config, "--spacing", "geometry/spacing", *options.spacing_m);
   }
   if (options.self_calibrate) overrideWith(config, "--self-calibrate", "geometry/self_calibration", true);
+  if (!options.model.empty()) {
+    overrideWith(config, "--model", "map/features", "learned");
+    overrideWith(config, "--model", "map/model", options.model);
+  }
   if (options.sift_backend) overrideWith(config, "--sift-backend", "map/sift_backend", *options.sift_backend);
   return config;
 }
@@ -256,7 +260,7 @@ void mergeAndPrint(const Target& target, const std::vector<NamedMap>& maps, cons
 
 MapBuilder builderFor(const TrainingMap& map, const MapBuilderOptions& options, MapBuilderConfig& config,
                       const std::string& output) {
-  config.sift = map.header().sift;
+  config.local.choose(*map.header().kind);
   return MapBuilder(config, {options.threads, output}, MapBase{map.header().datum, map.header().image_size});
 }
 

@@ -81,6 +81,8 @@ void declareRecordings(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--fix-topic", options.fix_topic, "sensor_msgs/NavSatFix")->capture_default_str();
   declareCamera(app, options, "the camera_info beside the image topic");
   app.add_option("--config", options.config, "Parameters, YAML (see config/map_builder.yaml)");
+  app.add_option("--model", options.model,
+                 "ONNX file: learned features instead of SIFT (parameters 'map/features', 'map/model')");
   app.add_option("--min-spacing", options.min_spacing_m,
                  "Metres between training images of a session, before the adjustment (parameter 'map/min_spacing')");
   app.add_option("--spacing", options.spacing_m,
@@ -175,6 +177,7 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
       "'paper': parameters to the letter of the papers, in place of the configuration's (config/paper.yaml)");
   app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
   app.add_option("--features", options.features, "Features (parameter 'features')");
+  app.add_option("--model", options.model, "ONNX file of learned features (parameter 'model')");
   app.add_option("--match", options.match, "How local features are matched (parameter 'match/mode')");
   app.add_option("--pose-source", options.pose_source, "'metric' or 'place' (parameter 'pose_source')");
   app.add_option("--particles", options.particles, "Number of particles of the tracker");

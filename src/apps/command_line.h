@@ -28,6 +28,7 @@ struct MapBuilderOptions {
   std::optional<double> spacing_m;
   std::size_t threads = allCores();
   std::optional<std::string> sift_backend;
+  std::string model;
   bool self_calibrate = false;
 };
 
@@ -63,6 +64,7 @@ struct LocalizeOptions {
   std::string tracker;
   std::string features;
   std::string match;
+  std::string model;
   std::string pose_source;
   std::string image_topic = "/stereo/left/image_raw";
   std::string truth_topic;

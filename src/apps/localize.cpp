@@ -80,6 +80,7 @@ NodeParameters configOf(const LocalizeOptions& options) {
   }
   if (!options.tracker.empty()) given["tracker"] = options.tracker;
   if (!options.features.empty()) given["features"] = options.features;
+  if (!options.model.empty()) given["model"] = options.model;
   if (!options.match.empty()) given["match/mode"] = options.match;
   if (!options.pose_source.empty()) given["pose_source"] = options.pose_source;
   if (options.seed) given["seed"] = *options.seed;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/text.h"
+#include "visual_localization/features/learned.h"
 #include "visual_localization/features/sift.h"
 
 namespace visual_localization {
@@ -15,7 +16,7 @@ using Kinds = std::vector<std::shared_ptr<const LocalFeatureKind>>;
 
 /// A line for each kind.
 Kinds& registered() {
-  static Kinds kinds{std::make_shared<Sift>(SiftConfig::uprightHellinger())};
+  static Kinds kinds{std::make_shared<Sift>(SiftConfig::uprightHellinger()), std::make_shared<Learned>()};
   return kinds;
 }
 
