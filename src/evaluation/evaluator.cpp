@@ -26,7 +26,7 @@ constexpr std::size_t kLargestResult_bytes = std::size_t{256} << 20U;
 /// The part of an experiment's YAML that decides about results: no comments, no words for the report.
 std::string decisivePart(const std::string& yaml, const std::string& path) {
   try {
-    return parameters::withoutKeys(yaml, {"title", "source", "discussion"});
+    return parameters::withoutKeys(yaml, {"title", "source"});
   } catch (const ParameterError&) {
     throw ResultError(path + ": is damaged: not an experiment");
   }

@@ -314,7 +314,7 @@ LocalizerConfig localizerConfig(YamlMap& yaml) {
 Experiment parse(YamlMap yaml) {
   Experiment experiment;
   experiment.name = readName(yaml, "experiment");
-  for (const char* for_the_report : {"title", "source", "discussion"}) yaml.text(for_the_report, "");
+  for (const char* for_the_report : {"title", "source"}) yaml.text(for_the_report, "");
   YamlMap rounds = yaml.map("rounds");
   experiment.closed = rounds.flag("closed", true);
   experiment.rounds = readRounds(rounds);
