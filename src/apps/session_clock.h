@@ -10,22 +10,20 @@
 
 namespace visual_localization::apps {
 
-/// What the stamps of a recording's fixes say against those of its images.
 struct ClockCheck {
   double offset_s = 0.0;   ///< to be taken off the fixes' stamps
   bool exchanged = false;  ///< the fixes' latitude and longitude are to be exchanged
   Remark remark;
 };
 
-/// Compares turns of the path with turns of the pictures, which it reads once for that, at most four a second. Throws
-/// BagError, with both ranges of time, when fixes and images have none in common.
+/// Compares turns of the path with turns of the pictures, of which it reads at most four a second. Throws BagError,
+/// with both ranges of time, when fixes and images have none in common.
 ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::vector<Fix>& fixes,
                       const MapBuilderConfig& config, const std::optional<SensorMount>& mount, std::size_t threads);
 
-/// Where the stamps of the fixes pause for longer than cleaning bridges, or go back: one line each, of the first few.
+/// One line each, of the first few pauses longer than cleaning bridges and of stamps that go back.
 std::vector<Remark> breaksOf(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config);
 
-/// The fixes as they should have been.
 std::vector<Fix> putRight(std::vector<Fix> fixes, const ClockCheck& check);
 
 }  // namespace visual_localization::apps

@@ -35,7 +35,6 @@ constexpr double kLargestTurn_rad = 0.5;    ///< that a tie asks for
 constexpr double kAgreeing_m = 0.5;         ///< a tie that is farther off after the alignment is wrong
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
-/// A tie, and how well the other map knows where it is.
 struct FoundTie {
   PoseTie tie;
   MapAlignment::Covariance map_covariance;
@@ -124,7 +123,7 @@ class Aligner {
     return std::nullopt;
   }
 
-  /// Cameras that have seen the same: one after the other, and of sessions that were tied when the map was made.
+  /// One after the other, and of sessions that were tied when the map was made.
   std::vector<std::pair<std::size_t, std::size_t>> neighbours() const {
     std::vector<std::pair<std::size_t, std::size_t>> pairs;
     std::vector<Neighbour> near;
@@ -224,7 +223,7 @@ MapAlignment align(const TrainingMap& map, const LocalFrame& frame, const std::v
 
 namespace {
 
-/// What tells the recordings of maps apart: their first stamp and the names of their sessions.
+/// Their first stamp and the names of their sessions.
 auto ageOf(const TrainingMap& map) {
   std::int64_t first_ns = std::numeric_limits<std::int64_t>::max();
   for (std::size_t i = 0; i < map.size(); ++i) first_ns = std::min(first_ns, map.pose(i).stamp_ns);
@@ -258,7 +257,7 @@ void requireAlike(const NamedMap& first, const NamedMap& other) {
                    " km");
 }
 
-/// Which recordings are in the new map already, by the stamps of their images.
+/// By the stamps of their images.
 class KnownSessions {
  public:
   /// Throws MergeError when most images of a session are there.
@@ -286,7 +285,6 @@ class KnownSessions {
   std::unordered_map<std::int64_t, std::size_t> owners_;  ///< which map has an image of this time
 };
 
-/// Puts images of several maps into one file.
 class Merger {
  public:
   /// `target`: the path of a map, or a file that stays the caller's.

@@ -19,12 +19,12 @@
 
 namespace visual_localization {
 
-/// From the frame of one map to that of another. Both are flat, so that it is not the same everywhere.
+/// Both frames are flat, so that the change depends on the position.
 class FrameChange {
  public:
   FrameChange(const LocalFrame& from, const LocalFrame& to);
 
-  /// Of what is at this position, east and north in the first frame.
+  /// East and north in the first frame.
   PoseCorrection at(const Eigen::Vector2d& position_m) const;
 
  private:
@@ -33,13 +33,12 @@ class FrameChange {
   bool same_;
 };
 
-/// A map whose images lie in the frame of the new map already.
+/// Its images lie in the frame of the new map already.
 struct PlacedMap {
   std::shared_ptr<const TrainingMap> map;
   std::vector<PoseCorrection> corrections;  ///< of each image, from the map's own frame
 };
 
-/// How the images of a map come to lie beside those of the maps before it.
 struct MapAlignment {
   using Covariance = Eigen::Matrix<double, 6, 6>;
 
@@ -50,31 +49,29 @@ struct MapAlignment {
   double left_m = 0.0;   ///< and after it
 };
 
-/// Lays `map` beside the `placed` ones, which stay, in `frame`: each of its images that is near one of theirs is
-/// located by their landmarks, as a live image is, and between these its own geometry holds. Where they overlap in
-/// fewer than kLeastTied images it lies where its own fixes have it. The result does not depend on the number of
-/// threads.
+/// Lays `map` beside the `placed` ones, which stay, in `frame`: images near one of theirs are located by their
+/// landmarks, and between these the map's own geometry holds. Where fewer than kLeastTied images overlap it lies where
+/// its own fixes have it. The result does not depend on the number of threads.
 MapAlignment align(const TrainingMap& map, const LocalFrame& frame, const std::vector<PlacedMap>& placed,
                    std::size_t threads, const Progress& progress = {});
 
 constexpr std::size_t kLeastTied = 5;
 
-/// Maps that cannot become one. The text is one line and begins with the name of a map.
+/// One line that begins with the name of a map.
 class MergeError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A map and how it is called, opened with strictLoading().
+/// Opened with strictLoading().
 struct NamedMap {
   std::string name;
   std::shared_ptr<const TrainingMap> map;
 };
 
-/// The first session of which most images have a stamp that is `known`: it is the same recording.
+/// Of which most images have a stamp that is `known`: the same recording.
 std::optional<std::size_t> knownSession(const TrainingMap& map, const std::function<bool(std::int64_t)>& known);
 
-/// Where a map came to lie in the new one.
 struct MergedMap {
   std::string name;
   std::size_t images = 0;
@@ -84,16 +81,15 @@ struct MergedMap {
   double left_m = 0.0;
 };
 
-/// Those of the oldest recording first, whatever the order of the arguments was.
+/// The oldest recording first, whatever the order of the arguments.
 std::vector<NamedMap> inOrderOfTime(std::vector<NamedMap> maps);
 
-/// Makes one map of several, as a file. The first one stays as it is, and its frame is that of the new map; each other
-/// one is aligned with those before it (see align). Sessions of one name get numbers. `edit`: for MapHeader::history.
-/// Throws MergeError when images or features of two maps are of another kind, when they are too far apart, or when a
-/// session is in both; MapStoreError.
+/// The first map stays as it is, and its frame is that of the new map; each other one is aligned with those before it
+/// (see align). Sessions of one name get numbers. `edit`: for MapHeader::history. Throws MergeError when images or
+/// features are of another kind, maps are too far apart, or a session is in both; MapStoreError.
 std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const std::string& path,
                                  std::size_t threads, const Progress& progress = {});
-/// The same into a file that stays the caller's: nothing is put in place.
+/// Into a file that stays the caller's: nothing is put in place.
 std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const PartialFile& file,
                                  std::size_t threads, const Progress& progress = {});
 

@@ -42,7 +42,6 @@ Number numberOf(const std::string& column, const std::string& text) {
   return number;
 }
 
-/// Reads rows by the names of their columns.
 class PoseTable {
  public:
   explicit PoseTable(const std::string& header) {
@@ -119,7 +118,7 @@ Trajectory movedOnto(const Trajectory& positions, const Trajectory& poses) {
 
 namespace {
 
-/// Times of one row, so that no two threads write to the same memory.
+/// So that no two threads write to the same memory.
 struct RowTimes {
   double sift_ms = 0.0;
   double global_ms = 0.0;

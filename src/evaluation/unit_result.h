@@ -10,7 +10,7 @@
 
 namespace visual_localization {
 
-/// What extraction and comparisons cost in one pair of rounds, milliseconds of processor time each.
+/// Milliseconds of processor time each.
 struct StageCosts {
   double sift_extraction_ms = 0.0;
   double global_extraction_ms = 0.0;
@@ -18,7 +18,6 @@ struct StageCosts {
   double global_comparison_ms = 0.0;
 };
 
-/// The figures of one run.
 struct RunFigures {
   std::size_t start = 0;
   std::size_t images = 0;
@@ -34,7 +33,7 @@ struct RunFigures {
   double update_ms = 0.0;
 };
 
-/// Sums over all runs at the same number of images since the start.
+/// Over all runs at the same number of images since the start.
 struct StepSums {
   std::size_t runs = 0;
   std::size_t judged = 0;
@@ -43,16 +42,16 @@ struct StepSums {
   std::size_t sift = 0;
 };
 
-/// One image of the traced run of a tracker, as lines of TUM trajectories.
+/// Lines of TUM trajectories.
 struct TracedPose {
   std::string estimate;
   std::string truth;  ///< empty when it is not known
 };
 
-/// Of the text of a UnitResult: goes up whenever older results cannot be read any more.
+/// Goes up whenever older results cannot be read any more.
 constexpr int kUnitFormat = 3;
 
-/// One method on one pair of rounds: the unit of work that is stored and resumed.
+/// One method on one pair of rounds: stored and resumed as a whole.
 struct UnitResult {
   std::vector<RunFigures> runs;
   std::vector<StepSums> steps;
@@ -66,14 +65,12 @@ struct UnitResult {
   double p95_relative_err_m = 0.0;     ///< the same in relation to the map; 0 when nothing is known of that
 };
 
-/// Sums up the runs of one method on one pair.
 UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& costs);
 
-/// Text for a file, and back. parseUnit throws std::runtime_error when the text is not whole.
+/// parseUnit throws std::runtime_error when the text is not whole.
 std::string serialise(const UnitResult& unit);
 UnitResult parseUnit(const std::string& text);
 
-/// The columns of `UnitResult::trace`.
 extern const char* const kTraceColumns;
 
 }  // namespace visual_localization

@@ -15,25 +15,22 @@
 
 namespace visual_localization {
 
-/// The current image (left) beside training image `training` (right), with a line for each match, by the rule that the
-/// localizer compares them by. `grey`: 8-bit, one channel, any size; `sift`: its features in pixels of the map's image
-/// size. The map keeps only a small preview of a training image, which is enlarged; without one the right half stays
-/// dark. Returns an 8-bit BGR image.
+/// The current image (left) beside the enlarged preview of training image `training` (right; dark without one), with a
+/// line for each match. `grey`: 8-bit, any size; `sift`: its features in pixels of the map's image size. Returns 8-bit
+/// BGR.
 cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
                     const MatchConfig& match);
 
-/// The same with the landmarks of a metric pose beside the training image that shares most of them: green those that
-/// agree with the pose, red those that do not.
+/// Beside the training image that shares most landmarks: green those that agree with the pose, red those that do not.
 cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, const TrainingMap& map);
 
-/// The status as a picture for people: the state in colour, the figures that explain it, and their history over the
-/// last images. Thread-safe.
+/// State, figures and their history over the last images as a picture. Thread-safe.
 class Dashboard {
  public:
-  static constexpr std::size_t kShown = 120;  ///< number of images that are remembered
+  static constexpr std::size_t kShown = 120;
 
   void add(const LocalizationStatus& status);
-  /// 8-bit BGR, always of the same size; dark when nothing has been added.
+  /// 8-bit BGR, always of the same size.
   cv::Mat draw() const;
 
  private:

@@ -22,26 +22,25 @@
 
 namespace visual_localization {
 
-/// An image as it arrived, not decoded yet: only the newest one is worth that.
+/// Not decoded yet: only the newest one is worth that.
 struct ReceivedImage {
   std_msgs::Header header;
   std::function<cv::Mat()> decode;  ///< 8-bit grey; throws ImageError when the message is unusable
 };
 
-/// The subscription to the camera, by any transport.
 class ImageSource {
  public:
   using Callback = std::function<void(ReceivedImage)>;
 
-  /// Subscribes to `image` of `node`. `transport` compressed means `<image>/compressed`, decoded here, for
-  /// which no plugin is needed. Throws ParameterError when there is no such transport.
+  /// `transport` compressed means `<image>/compressed`, decoded here without a plugin. Throws ParameterError when there
+  /// is no such transport.
   ImageSource(ros::NodeHandle node, const ros::NodeHandle& private_node, const std::string& transport,
               Callback callback);
 
   /// Returns after a callback that is running.
   void shutdown();
   const std::string& topic() const { return topic_; }
-  /// For people: the topic and how many publish it, and what else might be meant when nobody does.
+  /// For people: the topic, how many publish it, and what else might be meant when nobody does.
   std::string description();
 
  private:
@@ -52,12 +51,11 @@ class ImageSource {
   PublishedTopics published_;
 };
 
-/// A queue of one between threads: a newer item replaces one that nobody has taken yet, so that a slow
-/// consumer always works on the newest.
+/// Queue of one between threads: a newer item replaces one that nobody has taken yet.
 template <class Item>
 class LatestQueue {
  public:
-  /// Never blocks. Counts the item that it replaces, if there is one.
+  /// Never blocks.
   void push(Item item) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -68,7 +66,7 @@ class LatestQueue {
     available_.notify_one();
   }
 
-  /// Waits for an item; nothing once the queue is closed.
+  /// Waits; nothing once the queue is closed.
   std::optional<Item> pop() {
     std::unique_lock<std::mutex> lock(mutex_);
     available_.wait(lock, [this] { return closed_ || item_; });
@@ -86,7 +84,7 @@ class LatestQueue {
     available_.notify_all();
   }
 
-  /// Items that were replaced before anybody took them.
+  /// Replaced before anybody took them.
   std::uint64_t dropped() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return dropped_;
@@ -101,8 +99,8 @@ class LatestQueue {
 };
 
 /// Tells images that come late from time that goes back: an image older than the newest one is late; when the next one
-/// is older too, and not older than that one, time has gone back, as when a bag starts again. That costs one image of
-/// the new time, and two publishers whose clocks differ cannot move the time back and forth.
+/// is older too, and not older than that one, time has gone back. Two publishers whose clocks differ cannot move the
+/// time back and forth.
 class StampMonitor {
  public:
   enum class Verdict : std::uint8_t {
@@ -113,7 +111,7 @@ class StampMonitor {
 
   /// `stamp_ns` of the image that came now.
   Verdict judge(std::int64_t stamp_ns);
-  /// How much older than the newest image the last one was, seconds; zero when it was not.
+  /// Seconds behind the newest image; zero when it was not.
   double lag_s() const { return lag_s_; }
 
  private:
@@ -122,20 +120,18 @@ class StampMonitor {
   double lag_s_ = 0.0;
 };
 
-/// How many images came since the start, and what became of them. Each one ends in exactly one of the counts below
-/// `received`; until then it waits or is being processed.
+/// Each received image ends in exactly one of the other counts; until then it waits or is being processed.
 struct ImageCounts {
   std::uint64_t received = 0;
   std::uint64_t processed = 0;
-  std::uint64_t dropped = 0;      ///< replaced by a newer one before they were processed
-  std::uint64_t late = 0;         ///< older than one that was processed
-  std::uint64_t refused = 0;      ///< unusable
+  std::uint64_t dropped = 0;
+  std::uint64_t late = 0;  ///< older than one that was processed
+  std::uint64_t refused = 0;
   std::uint64_t without_map = 0;  ///< came while no map was loaded
 
   std::uint64_t ended() const { return processed + dropped + late + refused + without_map; }
 };
 
-/// One image and what the localizer says about it.
 struct LocalizedImage {
   SharedLocalizer::Result result;  ///< finite
   std_msgs::Header header;         ///< of the image; a missing stamp is replaced by the time of processing
@@ -143,7 +139,6 @@ struct LocalizedImage {
   cv::Mat grey;
 };
 
-/// Where the worker's thread hands its results.
 class ImageOutput {
  public:
   virtual ~ImageOutput() = default;
@@ -152,7 +147,7 @@ class ImageOutput {
   virtual void timeWentBack() {}
 };
 
-/// Localises the newest image in a thread of its own; the callbacks of roscpp only push.
+/// In a thread of its own; the callbacks of roscpp only push.
 class ImageWorker {
  public:
   /// All must outlive it. The outputs are served in their order.
@@ -162,7 +157,7 @@ class ImageWorker {
   ImageWorker(const ImageWorker&) = delete;
   ImageWorker& operator=(const ImageWorker&) = delete;
 
-  /// Images that were pushed before are waiting. `topic` names the camera in the log.
+  /// `topic` names the camera in the log.
   void start(const std::string& topic);
   /// Finishes the image that is being processed.
   void stop();

@@ -31,8 +31,7 @@
 
 namespace visual_localization {
 
-/// Images in, poses out: parameters, callbacks and services around an ImageWorker. An invalid parameter stops the
-/// start.
+/// Parameters, callbacks and services around an ImageWorker. An invalid parameter stops the start.
 class LocalizerNodelet : public nodelet::Nodelet {
  public:
   LocalizerNodelet();

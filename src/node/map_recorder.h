@@ -36,7 +36,6 @@
 
 namespace visual_localization {
 
-/// What counts as weak.
 struct WatchConfig {
   double max_spacing_m = 2.0;
   double max_fix_sigma_m = 3.0;
@@ -46,7 +45,6 @@ struct WatchConfig {
   void declare(ParameterVisitor& visitor);
 };
 
-/// Parameters of the recorder.
 struct RecorderConfig {
   std::string folder;
   std::string map;
@@ -59,28 +57,26 @@ struct RecorderConfig {
   void declare(ParameterVisitor& visitor);
 };
 
-/// What a map will lack where an image was recorded; the first that holds.
+/// The first that holds.
 enum class Weakness : std::uint8_t {
   kNone,
-  kNoFix,        ///< no usable fix lately
+  kNoFix,
   kPoorFix,      ///< the receiver itself doubts its fixes
   kFewFeatures,  ///< too dark, too bright, blurred, or nothing to see
   kFarApart,     ///< too fast for the rate of the camera
 };
 constexpr std::size_t kWeaknesses = 5;
-/// In a few words, for people.
 const char* describe(Weakness weakness);
 
-/// Looks at a session while it is recorded and says what will be weak in its map, as long as the robot is still there.
+/// While a session is recorded, as long as the robot is still there.
 class RecordingWatch {
  public:
-  /// An image that was looked at, where the last usable fix was.
+  /// At the last usable fix.
   struct Spot {
     Eigen::Vector2d position_m =
         Eigen::Vector2d::Zero();  ///< east, north in the map's frame, or about the first usable fix
     Weakness weakness = Weakness::kNone;
   };
-  /// What is known so far.
   struct Summary {
     std::size_t images = 0;                          ///< that were looked at
     std::array<std::size_t, kWeaknesses> weak = {};  ///< images by weakness
@@ -95,17 +91,16 @@ class RecordingWatch {
                                    ///< of this time of day, so that they add little
   };
 
-  /// `map` is the one that the session will be added to; null: none.
+  /// `map`: the one that the session will be added to; null: none.
   RecordingWatch(const WatchConfig& config, std::shared_ptr<const TrainingMap> map);
 
   void addFix(const Fix& fix);
-  /// An image that was recorded.
   void addImage(std::int64_t stamp_ns);
-  /// One of these that was looked at: a slow computer does not look at all of them.
+  /// A slow computer does not look at all images.
   void addLook(std::int64_t stamp_ns, std::size_t features);
 
   Summary summary() const { return summary_; }
-  /// Images that were looked at since the first usable fix, in their order.
+  /// Since the first usable fix, in their order.
   const std::vector<Spot>& spots() const { return spots_; }
 
  private:
@@ -127,7 +122,6 @@ class RecordingWatch {
   Summary summary_;
 };
 
-/// What a map is built from.
 struct RecordedSession {
   std::string bag;
   std::string image_topic;  ///< without the transport's suffix
@@ -137,13 +131,11 @@ struct RecordedSession {
   std::string output;
 };
 
-/// Records a session while somebody drives the robot: images, camera_info, fixes, odometry and static transforms, into
-/// a bag that is whole at any moment. Says what will be weak, on /diagnostics and in rviz, and writes the map when
-/// asked to.
+/// Records images, camera_info, fixes, odometry and static transforms into a bag that is whole at any moment. Says what
+/// will be weak, on /diagnostics and in rviz, and writes the map when asked to.
 class MapRecorder {
  public:
-  /// Writes the map of a session, as a process of its own so that the recording goes on; throws std::exception in one
-  /// line.
+  /// In a process of its own, so that the recording goes on; throws std::exception in one line.
   using BuildMap = std::function<void(const RecordedSession& session)>;
 
   /// Begins to record. Throws ParameterError, FileError or MapStoreError.

@@ -13,8 +13,8 @@
 
 namespace visual_localization {
 
-/// A log of messages that may come with every image: one of each kind per period of wall time. Unlike the macros of
-/// roscpp it belongs to one object, so that two localizers in one process do not silence each other. Thread-safe.
+/// One message of each kind per period of wall time. Belongs to one object, unlike roscpp's macros, so that two
+/// localizers in one process do not silence each other. Thread-safe.
 class ThrottledLog {
  public:
   enum class Severity : std::uint8_t { kWarning, kError };
@@ -23,7 +23,7 @@ class ThrottledLog {
   explicit ThrottledLog(Write write, std::chrono::milliseconds period = std::chrono::seconds(5))
       : write_(std::move(write)), period_(period) {}
 
-  /// `kind` tells which messages count as the same one, whatever their text.
+  /// `kind`: which messages count as the same one.
   void warn(const std::string& kind, const std::string& text) { add(Severity::kWarning, kind, text); }
   void error(const std::string& kind, const std::string& text) { add(Severity::kError, kind, text); }
 

@@ -21,14 +21,14 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Each scan of a progressive JPEG goes over all its pixels and may take ten bytes; encoders write about ten of them.
+/// Each scan of a progressive JPEG goes over all its pixels; encoders write about ten of them.
 constexpr int kMaxJpegScans = 100;
 
 bool startsWith(const Bytes& data, std::initializer_list<std::uint8_t> magic) {
   return data.size() >= magic.size() && std::equal(magic.begin(), magic.end(), data.begin());
 }
 
-/// libjpeg reading an image. It reports errors by a jump, so functions that call it have no objects of their own.
+/// Reports errors by a jump, so functions that call it have no objects of their own.
 class JpegReader {
  public:
   JpegReader() {
@@ -44,7 +44,7 @@ class JpegReader {
   JpegReader(const JpegReader&) = delete;
   JpegReader& operator=(const JpegReader&) = delete;
 
-  /// False when it is broken.
+  /// False when broken.
   bool readHeader(const Bytes& data) {
     if (setjmp(refused_) != 0) return false;
     jpeg_create_decompress(&decoder_);
@@ -52,7 +52,7 @@ class JpegReader {
     return ::jpeg_read_header(&decoder_, TRUE) == JPEG_HEADER_OK;
   }
 
-  /// False when it is broken or has more than kMaxJpegScans.
+  /// False when broken or with more than kMaxJpegScans.
   bool hasFewScans() {
     if (setjmp(refused_) != 0) return false;
     if (::jpeg_has_multiple_scans(&decoder_) == FALSE) return true;
@@ -65,7 +65,7 @@ class JpegReader {
     return false;
   }
 
-  /// False when it is broken. `rows`: of its size. Whatever stands behind the decoder's own end is not looked at.
+  /// False when broken. Whatever stands behind the decoder's own end is not looked at.
   bool read(std::vector<JSAMPROW>& rows) {
     if (setjmp(refused_) != 0) return false;
     decoder_.out_color_space = JCS_GRAYSCALE;
@@ -79,7 +79,6 @@ class JpegReader {
 
   std::uint64_t width() const { return decoder_.image_width; }
   std::uint64_t height() const { return decoder_.image_height; }
-  /// Whether the file ended before the image.
   bool isCutOff() const { return cut_off_; }
 
  private:
@@ -121,8 +120,8 @@ cv::Mat greyOfJpeg(const Bytes& data) {
   return grey;
 }
 
-/// libpng decoding an image to grey. It reports errors by a jump, so functions that call it have no objects of their
-/// own. OpenCV's decoder lets it decompress and keep all texts in the file: gigabytes from a few megabytes.
+/// Reports errors by a jump, so functions that call it have no objects of their own. OpenCV's decoder lets libpng
+/// decompress and keep all texts: gigabytes from a few megabytes.
 class PngReader {
  public:
   explicit PngReader(const Bytes& data) : data_(data) {
@@ -136,7 +135,7 @@ class PngReader {
   PngReader(const PngReader&) = delete;
   PngReader& operator=(const PngReader&) = delete;
 
-  /// False when it is broken.
+  /// False when broken.
   bool readHeader() {
     if (info_ == nullptr || setjmp(refused_) != 0) return false;
     ::png_set_read_fn(png_, this, [](png_structp png, png_bytep to, std::size_t count) {
@@ -156,7 +155,7 @@ class PngReader {
     return ::png_get_color_type(png_, info_) == PNG_COLOR_TYPE_GRAY && ::png_get_bit_depth(png_, info_) == 16 ? 2 : 1;
   }
 
-  /// False when it is broken. `rows`: of its size and of pixelBytes().
+  /// False when broken. `rows`: of pixelBytes() a pixel.
   bool read(std::vector<png_bytep>& rows) {
     if (setjmp(refused_) != 0) return false;
     const auto bytes = static_cast<std::uint64_t>(pixelBytes());
@@ -225,7 +224,7 @@ cv::Mat greyOfPng(const Bytes& data) {
 
 bool isJpeg(const Bytes& file) { return startsWith(file, {0xFF, 0xD8, 0xFF}); }
 
-/// Throws ImageError for anything that is neither a JPEG nor a PNG.
+/// Throws ImageError.
 void requireKnown(const Bytes& file) {
   if (file.empty()) throw ImageError("compressed image is empty");
   if (isJpeg(file) || startsWith(file, {0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A})) return;
