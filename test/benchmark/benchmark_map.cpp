@@ -43,7 +43,6 @@ double resident_mib() {
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
-/// Takes the file out of the system's cache.
 void forget(const std::string& path) {
   const int file = ::open(path.c_str(), O_RDONLY);
   ::fdatasync(file);
@@ -51,7 +50,7 @@ void forget(const std::string& path) {
   ::close(file);
 }
 
-/// Views that are compared with the map like a camera's images, but were never extracted.
+/// Compared with the map, but never extracted.
 class StreetImage final : public test::FakeImage {
  public:
   StreetImage(const StreetMap& streets, const TrainingMap& map) : streets_(streets), map_(map) {}

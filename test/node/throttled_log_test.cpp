@@ -11,7 +11,6 @@ namespace {
 using testing::ElementsAre;
 using Severity = ThrottledLog::Severity;
 
-/// Keeps what is written.
 struct Lines {
   ThrottledLog::Write writer() {
     return [this](Severity severity, const std::string& text) {

@@ -21,7 +21,7 @@ constexpr double kKeypointSigma_px = 0.3;
 /// 640 x 480 pixels, focal length 450 pixels, a lens that bends a little.
 CameraModel streetCamera();
 
-/// A thing with a look of its own. Most stand still.
+/// Most stand still.
 struct WorldPoint {
   using Descriptor = std::array<std::uint8_t, SiftFeatures::kDescriptorSize>;
 
@@ -32,7 +32,6 @@ struct WorldPoint {
 
 WorldPoint randomPoint(const Eigen::Vector3d& position_m, std::mt19937& random);
 
-/// An image of the world.
 struct View {
   SiftFeatures features;
   std::vector<std::size_t> points;  ///< which one each feature shows
@@ -43,7 +42,7 @@ struct View {
 View viewOf(const std::vector<WorldPoint>& world, const CameraModel& camera, const CameraPose& pose, double noise_px,
             std::mt19937& random, std::size_t image = 0);
 
-/// How a street is driven: straight on, a turn to the left, straight on, a turn to the right, straight on.
+/// Straight on, a turn to the left, straight on, a turn to the right, straight on.
 struct StreetDrive {
   std::size_t images = 45;
   double spacing_m = 1.0;
@@ -55,7 +54,6 @@ struct StreetDrive {
   bool reverses = false;   ///< backwards in the last fifth: `travel_yaw_rad` stays where the robot looks
 };
 
-/// Where the robot is and where it drives to, the camera on it and the time.
 struct DrivenPose {
   CameraPose camera;
   double travel_yaw_rad = 0.0;
@@ -69,7 +67,7 @@ std::vector<DrivenPose> drive(const StreetDrive& street);
 /// Points at random, 2 to 10 m beside the street and up to 20 m beyond its end.
 std::vector<WorldPoint> pointsAlong(const std::vector<DrivenPose>& poses, double points_per_m, std::mt19937& random);
 
-/// A drive that was recorded: one image a second, five fixes a second.
+/// One image a second, five fixes a second.
 struct RecordedDrive {
   CameraModel camera = streetCamera();
   std::vector<DrivenPose> truth;
@@ -90,7 +88,7 @@ std::shared_ptr<const TrainingMap> mapOf(const RecordedDrive& drive);
 /// Reflected signals: from `begin` to `end` (shares of the drive) the fixes bend aside, by `most_m` in the middle.
 void bendFixes(RecordedDrive& drive, double begin, double end, double most_m);
 
-/// Horizontal distances of these positions from the truth: their root mean square.
+/// Horizontal root mean square.
 double pathError_m(const std::vector<Eigen::Vector2d>& positions_m, const std::vector<DrivenPose>& truth);
 
 }  // namespace visual_localization::test

@@ -11,7 +11,7 @@
 
 namespace visual_localization::test {
 
-/// A folder that lives as long as this object.
+/// As long as this object lives.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -28,7 +28,6 @@ class TemporaryFolder {
 
   std::string operator/(const std::string& name) const { return (path_ / name).string(); }
   std::string path() const { return path_.string(); }
-  /// Names of all files in it.
   std::vector<std::string> names() const {
     std::vector<std::string> found;
     for (const auto& entry : std::filesystem::directory_iterator(path_))

@@ -15,13 +15,13 @@
 
 namespace visual_localization::test {
 
-/// A world without images: how alike two places look depends on their distance only.
+/// How alike two places look depends on their distance only.
 class World {
  public:
   explicit World(std::shared_ptr<const TrainingMap> map)
       : map_(std::move(map)), scores_(map_->size()), sweep_(*map_, 100000, 100000), sessions_(*map_, false) {}
 
-  /// What the robot sees from here; globally, places within some 10 m look alike.
+  /// Globally, places within some 10 m look alike.
   TrackerInput from(const Eigen::Vector2d& robot_m) {
     scores_.startImage(FeatureKind::kSift, [this, robot_m](FeatureKind kind, std::size_t image) {
       return kind == FeatureKind::kSift ? scoreAt(0.5 * bell(image, robot_m, 2.0))
@@ -55,10 +55,9 @@ class World {
   SessionChoice sessions_;
 };
 
-/// A round of 30 m radius with an image every 0.94 m.
+/// Radius 30 m, an image every 0.94 m.
 inline World roundWorld() { return World(mapAt(circle(200, 30.0))); }
 
-/// The place `arc_m` along that round.
 inline Eigen::Vector2d onCircle(double arc_m) {
   return 30.0 * Eigen::Vector2d(std::cos(arc_m / 30.0), std::sin(arc_m / 30.0));
 }
