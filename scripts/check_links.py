@@ -15,7 +15,6 @@ HEADING = re.compile(r'^#+ (.*)$', re.MULTILINE)
 
 
 def text_of(page: Path) -> str:
-    """A page without its blocks of code."""
     return FENCE.sub('', page.read_text(encoding='utf-8'))
 
 
@@ -25,7 +24,6 @@ def anchor(heading: str) -> str:
 
 
 def anchors(page: Path) -> Set[str]:
-    """Those of all headings of a page."""
     return {anchor(heading) for heading in HEADING.findall(text_of(page))}
 
 
@@ -38,14 +36,12 @@ def links(page: Path) -> Iterator[str]:
 
 
 def broken(page: Path, target: str) -> bool:
-    """Whether a link leads nowhere."""
     name, _, heading = target.partition('#')
     path = (page.parent / name).resolve() if name else page
     return not path.exists() or (bool(heading) and heading not in anchors(path))
 
 
 def pages() -> List[Path]:
-    """The Markdown files of the repository."""
     return [page for page in sorted(ROOT.rglob('*.md'))
             if not any(part == 'build' or part.startswith('.') for part in page.relative_to(ROOT).parts)]
 

@@ -27,7 +27,6 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse_arguments() -> argparse.Namespace:
-    """The command line."""
     parser = Parser(prog='report_evaluation.py', description=(__doc__ or '').splitlines()[0])
     parser.add_argument('output', type=Path, metavar='OUTPUT_DIR', help='the folder that `evaluate` wrote')
     parser.add_argument('--papers', type=Path, metavar='FILE',

@@ -22,7 +22,6 @@ class GridPoint(NamedTuple):
 
 
 def group_title(group: Group) -> str:
-    """The title of a pair of groups."""
     if group in (CONSTANT, CHANGING):
         return f'{group[0]} illumination'
     return f'{group[0]} → {group[1]}'
@@ -67,7 +66,6 @@ def thresholds_of(results: Results, method: str) -> Optional[Tuple[float, float]
 
 
 def is_kidnapped(results: Results, method: str) -> bool:
-    """Whether the robot is kidnapped in the middle of the runs."""
     flag = results.settings.get(method, {}).get('kidnapped', '').lower()
     return flag in ('true', '1') or method.endswith(KIDNAPPED)
 

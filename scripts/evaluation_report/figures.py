@@ -26,8 +26,6 @@ class Drawing:
 
 
 class Figures:
-    """The figures of one report."""
-
     def __init__(self, results: Results, papers: Papers):
         self._results = results
         self._papers = papers

@@ -14,12 +14,10 @@ DISCUSSION = re.compile(r'^## Discussion\n.*?(?=^## |\Z)', re.DOTALL | re.MULTIL
 
 
 def counted(count: int, what: str) -> str:
-    """A number with its noun, singular or plural."""
     return f'{count} {what}' if count == 1 else f'{count} {what}s'
 
 
 def introduction(results: Results) -> str:
-    """Title, source, and what was run."""
     title = escape(results.description.get('title') or results.experiment)
     text = f'# {title}\n\n'
     source = results.description.get('source')
@@ -39,7 +37,6 @@ def introduction(results: Results) -> str:
 
 
 def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]], discussion: str) -> str:
-    """The whole report in Markdown."""
     text = introduction(results) + '## Results\n\n' + result_tables(results, papers)
     for title, tables in (('Poses: recall within position and heading', pose_tables(results)),
                           ('Poses in relation to the map', relative_tables(results)),

@@ -104,7 +104,6 @@ class EvaluateTest(ProgramTest):
         self.assertEqual(list(self.output.rglob('*.partial')), [])
 
     def edited(self, part: str, replacement: str) -> Path:
-        """The short sample with one part replaced."""
         text = short_sample()
         self.assertIn(part, text)
         config = self.folder / 'edited.yaml'

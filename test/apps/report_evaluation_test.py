@@ -36,13 +36,11 @@ class Evaluation:
         self.rows, self.steps, self.traces, self.settings = [], [], [], []
 
     def method(self, group: tuple, name: str, error: object, comparisons: object = '', **more: object) -> None:
-        """One row of the summary."""
         self.rows.append(dict({'experiment': self.experiment, 'train_group': group[0], 'test_group': group[1],
                                'method': name, 'runs': 400, 'mean_err_m': error, 'comparisons_per_image': comparisons},
                               **more))
 
     def fill(self, methods: list, group: tuple = OTHER) -> None:
-        """Plausible rows and curves for all of these methods."""
         for index, name in enumerate(methods):
             error = 2.2 + .9 * abs(math.sin(1.7 * index + len(group[1])))
             self.method(group, name, round(error, 4), round(20 + 7.3 * index, 2), std_err_m=round(.2 + error / 9, 3),
@@ -71,7 +69,6 @@ class Evaluation:
             self.traces.append(row)
 
     def write(self) -> Path:
-        """All files of the folder."""
         self.folder.mkdir(parents=True, exist_ok=True)
         text = f'experiment: {self.experiment}\ntitle: A made-up evaluation\nsource: "a paper | its Table"\n'
         (self.folder / 'experiment.yaml').write_text(text, encoding='utf-8')
@@ -88,21 +85,17 @@ class Evaluation:
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess:
-    """The script to its end."""
     return subprocess.run([sys.executable, str(SCRIPT), *map(str, arguments)], capture_output=True, text=True,
                           timeout=200, check=False)
 
 
 class ReportTest(unittest.TestCase):
-    """Each test has a folder of its own."""
-
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name) / 'evaluation'
 
     def evaluation(self, experiment: str) -> Evaluation:
-        """An evaluation in this test's folder."""
         return Evaluation(self.folder, experiment)
 
     def papers(self, *rows: tuple) -> Path:
