@@ -16,6 +16,10 @@
 #include "ros/image_depth.h"
 #include "visual_localization/ros/image_conversion.h"
 
+// libjpeg and libpng themselves, whose only way to report an error is a jump. OpenCV 4.6 takes 346 of 348 cut-off JPEGs
+// for whole, and 378 MiB for a PNG of 0.44 MB with compressed texts. TurboJPEG's limit of scans is newer than Debian
+// 11, and stray bytes within a JPEG look to it like a cut-off one. libpng's simplified interface reads the texts too,
+// and corrects gamma, so that its greys are not those of OpenCV.
 namespace visual_localization {
 namespace {
 
