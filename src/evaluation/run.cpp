@@ -163,10 +163,10 @@ std::vector<std::optional<MapError>> mapErrors(const PartialMap& part,
 namespace {
 
 struct Verdict {
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-  double confidence = 0.0;  ///< the larger the surer
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< in the map frame
+  double confidence = 0.0;                               ///< the larger the surer
   FeatureKind features = FeatureKind::kSift;
-  std::size_t comparisons = 0;
+  std::size_t comparisons = 0;       ///< training images compared
   std::optional<Estimate> estimate;  ///< of a tracker, for tracing
 };
 

@@ -75,8 +75,9 @@ class ScoreTable {
   const Entry& at(std::size_t drive_image, std::size_t training_image) const {
     return entries_[drive_image * training_images_ + training_image];
   }
+  /// Number of SIFT features of an image of the drive.
   std::size_t siftFeatures(std::size_t drive_image) const { return sift_features_[drive_image]; }
-  /// Processor time.
+  /// Mean processor time of one comparison.
   double siftCompare_ms() const { return sift_compare_ms_; }
   double globalCompare_ms() const { return global_compare_ms_; }
 
@@ -96,8 +97,10 @@ class RecordedImage final : public QueryImage {
   RecordedImage(const ScoreTable& table, const std::vector<std::size_t>& training_images, const MatchConfig& match,
                 const SimilarityConfig& similarity);
 
-  /// `covered`: nothing can be seen. `unpruned`: all its SIFT features, which must outlive it; null when not kept.
+  /// The next image. `covered`: nothing can be seen in it. `unpruned`: all its SIFT features, which must outlive it;
+  /// null when they were not kept.
   void show(std::size_t drive_image, bool covered, const SiftFeatures* unpruned = nullptr);
+  /// Similarities to all training images.
   void row(FeatureKind kind, std::vector<double>& similarities);
   std::size_t siftComparisons() const { return sift_comparisons_; }
   std::size_t globalComparisons() const { return global_comparisons_; }

@@ -15,9 +15,10 @@
 
 namespace visual_localization {
 
-/// The current image (left) beside the enlarged preview of training image `training` (right; dark without one), with a
-/// line for each match. `grey`: 8-bit, any size; `sift`: its features in pixels of the map's image size. Returns 8-bit
-/// BGR.
+/// The current image (left) beside training image `training` (right), with a line for each match, by the rule that the
+/// localizer compares them by. `grey`: 8-bit, one channel, any size; `sift`: its features in pixels of the map's image
+/// size. The map keeps only a small preview of a training image, which is enlarged; without one the right half stays
+/// dark. Returns an 8-bit BGR image.
 cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const TrainingMap& map, std::size_t training,
                     const MatchConfig& match);
 

@@ -11,7 +11,7 @@
 
 namespace visual_localization::benchmarks {
 
-/// With the length and the skew of real ones (512 times a unit vector, many entries near zero).
+/// `count` descriptors with the length and the skew of real ones (512 times a unit vector, many entries near zero).
 inline SiftFeatures randomDescriptors(std::size_t count, std::uint32_t seed) {
   std::mt19937 engine(seed);
   std::exponential_distribution<double> entry(1.0);
@@ -32,7 +32,7 @@ inline SiftFeatures randomDescriptors(std::size_t count, std::uint32_t seed) {
   return SiftFeatures(std::move(keypoints), std::move(bytes));
 }
 
-/// `shared` are those of `other` with some noise.
+/// `count` descriptors of which `shared` are those of `other` with some noise, as two images of one place have them.
 inline SiftFeatures overlappingDescriptors(const SiftFeatures& other, std::size_t count, double shared,
                                            std::uint32_t seed) {
   SiftFeatures fresh = randomDescriptors(count, seed);

@@ -101,7 +101,7 @@ class StreetMap {
     return place;
   }
 
-  /// The noise differs from visit to visit.
+  /// What a camera sees at the place of image `i`: the noise differs from visit to visit.
   SiftFeatures view(std::size_t i, std::uint64_t visit) const {
     std::vector<SiftKeypoint> keypoints(features_);
     std::vector<std::uint8_t> descriptors(features_ * SiftFeatures::kDescriptorSize);

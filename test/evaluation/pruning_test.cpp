@@ -13,6 +13,7 @@ using Descriptors = std::vector<std::vector<std::uint8_t>>;
 constexpr double kRatio = 0.6;
 constexpr double kLongestGap_s = 5.0;
 
+/// What is seen of the world, thing by thing.
 SiftFeatures view(const std::vector<std::uint32_t>& things) {
   Descriptors descriptors;
   for (const std::uint32_t thing : things) descriptors.push_back(test::randomFeatures(1, thing).descriptors());

@@ -74,6 +74,7 @@ SiftFeatures firstAndItsTwin(const SiftFeatures& features) {
   return SiftFeatures({features.keypoints().front(), twin}, std::move(descriptors));
 }
 
+/// Whether something is drawn around feature `i` of the current image.
 bool isJoined(const cv::Mat& canvas, const SiftFeatures& sift, std::size_t i) {
   constexpr double kScale = 1.5;
   const SiftKeypoint& keypoint = sift.keypoints()[i];

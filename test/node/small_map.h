@@ -10,7 +10,7 @@
 
 namespace visual_localization::test {
 
-/// At random points of a 320 x 240 image.
+/// `count` features at random points of a 320 x 240 image with random descriptors; the same seed, the same ones.
 inline SiftFeatures randomFeatures(std::uint32_t seed, std::size_t count) {
   std::mt19937 random(seed);
   std::vector<SiftKeypoint> keypoints(count);

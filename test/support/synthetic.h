@@ -14,12 +14,12 @@ namespace visual_localization::test {
 
 /// Zeros behind the first bins.
 std::vector<std::uint8_t> descriptor(const std::vector<int>& first_bins);
-/// At keypoints (0, 0), (1, 0), ...
+/// Features with these descriptors at keypoints (0, 0), (1, 0), ...
 SiftFeatures featuresOf(const std::vector<std::vector<std::uint8_t>>& descriptors);
-/// The same for the same seed.
+/// `count` features with random descriptors, the same for the same seed.
 SiftFeatures randomFeatures(std::size_t count, std::uint32_t seed);
 
-/// Without features, heading from each position to the next.
+/// A map of images without features at these positions, heading from each to the next.
 std::shared_ptr<const TrainingMap> mapAt(const std::vector<Eigen::Vector2d>& positions_m);
 /// Counter-clockwise from the east.
 std::vector<Eigen::Vector2d> circle(std::size_t count, double radius_m);
