@@ -8,7 +8,6 @@ from worlds.campus_course import CameraPose
 
 
 def add_camera(scene: 'bpy.types.Scene', field_of_view_deg: float) -> 'bpy.types.Object':
-    """A pinhole camera."""
     data = bpy.data.cameras.new('camera')
     data.lens_unit = 'FOV'
     data.angle = math.radians(field_of_view_deg)
@@ -38,8 +37,6 @@ def configure_renderer(scene: 'bpy.types.Scene', size: tuple, samples: int) -> N
 
 
 class PlainCamera:
-    """Blender's own pinhole camera and tone curve."""
-
     def __init__(self, scene: 'bpy.types.Scene', field_of_view_deg: float, size: tuple, samples: int):
         self._scene = scene
         self._camera = add_camera(scene, field_of_view_deg)

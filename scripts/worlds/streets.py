@@ -156,8 +156,6 @@ def ground_material(rgb: np.ndarray, wet: bool) -> 'bpy.types.Material':
 
 
 class Pavements:
-    """Kerbs and slabs along every street."""
-
     def __init__(self, batch: Batch, plan: TownPlan, noise: np.random.Generator, wet: bool):
         self._batch, self._relief = batch, plan.relief
         self._kerb = meshes.flat_material((.42, .41, .39), 'kerb', .3 if wet else .9)
@@ -212,8 +210,6 @@ class Pavements:
 
 
 class Furniture:
-    """Lamps, signs, bins and boxes on the pavements."""
-
     def __init__(self, batch: Batch, plan: TownPlan, rng: random.Random, noise: np.random.Generator):
         self._batch, self._relief, self._rng, self._noise = batch, plan.relief, rng, noise
         self._pole = meshes.flat_material((.2, .22, .22), 'pole', .5)
@@ -224,13 +220,11 @@ class Furniture:
         self.lamps: List[Tuple[float, float, float]] = []
 
     def glow(self, strength: float) -> None:
-        """Switches the lamps on."""
         surface = self._glow.node_tree.nodes['Principled BSDF']
         surface.inputs['Emission'].default_value = (1, .78, .48, 1)
         surface.inputs['Emission Strength'].default_value = strength
 
     def lamp(self, site: Site) -> None:
-        """A post with an arm over the street."""
         x, y, _ = site.at(0, 0)
         z = float(self._relief.height(x, y))
         self._batch.cylinder((x, y, z), (x, y, z + 5), .075, self._pole, 7, .05)
@@ -244,7 +238,6 @@ class Furniture:
             self._plate(site, z + 2.0, .5)
 
     def sign(self, site: Site) -> None:
-        """A post with one or two plates."""
         x, y, _ = site.at(0, 0)
         z = float(self._relief.height(x, y))
         self._batch.cylinder((x, y, z), (x, y, z + 2.7), .035, self._pole, 6)
@@ -262,7 +255,6 @@ class Furniture:
                               site.at(side, a, bottom + height)], writing)
 
     def clutter(self, site: Site) -> None:
-        """A bin, a cabinet with posters, or bollards."""
         x, y, _ = site.at(0, 0)
         z = float(self._relief.height(x, y)) + .1
         yaw, kind = math.atan2(site.along[1], site.along[0]), self._rng.random()

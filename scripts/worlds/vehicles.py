@@ -11,8 +11,6 @@ from worlds.town_textures import placard
 
 
 class Parking:
-    """Parks cars on sloping ground."""
-
     def __init__(self, batch: Batch, rng: random.Random, noise: np.random.Generator,
                  height: Callable[[float, float], float]):
         self._batch, self._rng, self._noise, self._height = batch, rng, noise, height
@@ -82,7 +80,6 @@ class Parking:
 
 
 def add_person(batch: Batch, foot: Corner, yaw: float, rng: random.Random) -> None:
-    """Legs, a coat, arms, a head."""
     x, y, z = foot
     coat, trousers = (meshes.flat_material([rng.uniform(.02, .5) for _ in range(3)], 'clothes') for _ in range(2))
     skin = meshes.flat_material((.5, .33, .25), 'skin')
