@@ -11,7 +11,7 @@
 
 namespace visual_localization::apps {
 
-/// Ends the program with exit code 2.
+/// The command line asks for something that makes no sense; the program ends with exit code 2.
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

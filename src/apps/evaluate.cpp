@@ -60,6 +60,7 @@ std::string provenanceOf(const Experiment& experiment, const EvaluateOptions& op
   return text;
 }
 
+/// One bar for each stage of the work.
 class StageBars {
  public:
   void show(const std::string& stage, std::size_t done, std::size_t total) {

@@ -32,8 +32,8 @@
 namespace visual_localization::apps {
 namespace {
 
-/// Up to the stamp of an image before the image, as the robot would get it. What lies between two images that do not
-/// follow each other was not driven.
+/// Odometry of the drive, as the robot would get it: up to the stamp of an image before the image. What lies between
+/// two images that do not follow each other was not driven.
 class OdometryFeed {
  public:
   explicit OdometryFeed(std::vector<OdometryReading> readings) : readings_(std::move(readings)) {
@@ -105,6 +105,7 @@ std::vector<std::size_t> orderOf(const LocalizeOptions& options, std::size_t ima
   }
 }
 
+/// What a run adds up to.
 struct Totals {
   std::size_t images = 0;
   std::size_t unusable = 0;
@@ -272,6 +273,7 @@ OdometryFeed odometryOf(const LocalizeOptions& options, const NodeConfig& config
   return OdometryFeed(bag.odometry(options.odom_topic, config.base_frame_id, config.global_frame_id));
 }
 
+/// What a drive comes to.
 struct DriveResult {
   std::string track = trackCsvHeader();
   Totals totals;

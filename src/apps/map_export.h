@@ -17,7 +17,7 @@
 
 namespace visual_localization::apps {
 
-/// Text format: colmap.github.io/format.html.
+/// What a model in the text format of COLMAP (colmap.github.io/format.html) holds.
 struct ColmapSummary {
   std::size_t cameras = 0;
   std::size_t images = 0;
@@ -26,7 +26,7 @@ struct ColmapSummary {
   double error_px = 0.0;  ///< mean over the points of the mean distance of features and projections; -1: unknown
 };
 
-/// cameras(), then image() of each image, then points(), which the images gather.
+/// The three texts of a COLMAP model: cameras(), then image() of each image, then points(), which the images gather.
 class ColmapModel {
  public:
   explicit ColmapModel(const TrainingMap& map);
@@ -38,6 +38,7 @@ class ColmapModel {
   ColmapSummary summary() const { return summary_; }
 
  private:
+  /// A landmark and what the images that show it say.
   struct Point {
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
     std::vector<double> errors_px;  ///< of the sightings that the lens model can project
@@ -53,6 +54,7 @@ class ColmapModel {
   ColmapSummary summary_;
 };
 
+/// What was found out about a map.
 struct MapFindings {
   SurveyConfig config;
   MapSurvey survey;
@@ -76,12 +78,13 @@ std::string toGeoJson(const TrainingMap& map, const MapFindings& findings);
 /// something is in the folder, the map has no landmarks or cannot be read; then it leaves nothing.
 ColmapSummary writeColmap(const TrainingMap& map, const std::string& folder);
 
-/// In one line.
+/// What the builder has to say of a recording, in one line.
 struct Remark {
   std::string text;
   bool disagrees = false;  ///< parts of the recording contradict each other, and the map may be wrong
 };
 
+/// One session: its fixes beside what was made of them.
 struct PlottedSession {
   std::string name;
   std::vector<Fix> fixes;

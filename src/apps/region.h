@@ -8,7 +8,7 @@
 
 namespace visual_localization::apps {
 
-/// In one line.
+/// What is no area on the earth. The text is one line.
 class RegionError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -10,6 +10,7 @@
 
 namespace visual_localization::apps {
 
+/// What the stamps of a recording's fixes say against those of its images.
 struct ClockCheck {
   double offset_s = 0.0;   ///< to be taken off the fixes' stamps
   bool exchanged = false;  ///< the fixes' latitude and longitude are to be exchanged

@@ -107,6 +107,7 @@ std::string unpack(const Bytes& bytes, Range chunk, const std::string& compressi
   return unpacked;
 }
 
+/// A message's record in a chunk.
 struct FoundMessage {
   std::uint64_t offset = 0;
   std::uint32_t connection = 0;

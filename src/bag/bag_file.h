@@ -13,13 +13,13 @@
 
 namespace visual_localization::bag {
 
-/// Records do not fit together. One line, without the path.
+/// A bag whose records do not fit together. One line, without the path.
 class DamagedBag : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Maybe whole, but not one that can be read. One line, without the path.
+/// A bag that may be whole, but is none that can be read. One line, without the path.
 class UnsupportedBag : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -38,6 +38,7 @@ enum class Op : std::uint8_t {
 /// The fields of a record's header by name.
 using Fields = std::map<std::string, std::string>;
 
+/// The bytes that records lie in.
 class Bytes {
  public:
   Bytes() = default;
@@ -49,7 +50,7 @@ class Bytes {
   virtual void read(std::uint64_t offset, std::size_t count, char* to) const = 0;
 };
 
-/// Not mapped: a file that shrinks or a disk that fails must not end the program.
+/// Those of a file. Not mapped: a file that shrinks or a disk that fails must not end the program.
 class FileBytes : public Bytes {
  public:
   /// Throws DamagedBag.
@@ -65,7 +66,7 @@ class FileBytes : public Bytes {
   std::uint64_t size_ = 0;
 };
 
-/// An unpacked chunk, or a whole bag.
+/// Those of an unpacked chunk, or of a whole bag.
 class MemoryBytes : public Bytes {
  public:
   explicit MemoryBytes(std::string content) : content_(std::move(content)) {}
@@ -76,7 +77,7 @@ class MemoryBytes : public Bytes {
   std::string content_;
 };
 
-/// [begin, end).
+/// From `begin` to before `end`.
 struct Range {
   std::uint64_t begin = 0;
   std::uint64_t end = 0;
@@ -109,12 +110,14 @@ std::uint64_t number(const Fields& fields, const std::string& name, std::size_t 
 /// Little-endian; the bytes must exist.
 std::uint64_t numberAt(std::string_view bytes, std::size_t offset, std::size_t size);
 
+/// Where messages of one kind come from.
 struct Connection {
   std::string topic;
   std::string type;
   std::string md5sum;  ///< of the definition of the type
 };
 
+/// Where a message lies.
 struct Message {
   std::int64_t stamp_ns = 0;     ///< when it was recorded
   std::uint64_t chunk = 0;       ///< offset of its chunk's record in the file

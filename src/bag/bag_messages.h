@@ -83,7 +83,7 @@ std::vector<bag::Message> messagesOf(const bag::BagFile& file, const std::string
   return file.messages(connections);
 }
 
-/// Without allocating what the lengths of a serialized message claim.
+/// Steps over a serialized message without allocating what its lengths claim.
 class Cursor {
  public:
   explicit Cursor(std::string_view bytes) : bytes_(bytes) {}

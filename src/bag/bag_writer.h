@@ -53,6 +53,7 @@ class BagWriter {
   const std::string& path() const { return path_; }
 
  private:
+  /// Where messages come from, and how they are read.
   struct Kind {
     std::string topic;
     std::string type;

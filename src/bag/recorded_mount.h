@@ -9,6 +9,7 @@
 
 namespace visual_localization {
 
+/// Which frames of a recording are asked for.
 struct MountQuery {
   std::string base_frame;
   std::string image_topic;

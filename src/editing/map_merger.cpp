@@ -35,6 +35,7 @@ constexpr double kLargestTurn_rad = 0.5;    ///< that a tie asks for
 constexpr double kAgreeing_m = 0.5;         ///< a tie that is farther off after the alignment is wrong
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
+/// A tie, and how well the other map knows where it is.
 struct FoundTie {
   PoseTie tie;
   MapAlignment::Covariance map_covariance;
@@ -257,7 +258,7 @@ void requireAlike(const NamedMap& first, const NamedMap& other) {
                    " km");
 }
 
-/// By the stamps of their images.
+/// Which recordings are in the new map already, by the stamps of their images.
 class KnownSessions {
  public:
   /// Throws MergeError when most images of a session are there.
@@ -285,6 +286,7 @@ class KnownSessions {
   std::unordered_map<std::int64_t, std::size_t> owners_;  ///< which map has an image of this time
 };
 
+/// Puts images of several maps into one file.
 class Merger {
  public:
   /// `target`: the path of a map, or a file that stays the caller's.

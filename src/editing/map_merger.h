@@ -33,12 +33,13 @@ class FrameChange {
   bool same_;
 };
 
-/// Its images lie in the frame of the new map already.
+/// A map whose images lie in the frame of the new map already.
 struct PlacedMap {
   std::shared_ptr<const TrainingMap> map;
   std::vector<PoseCorrection> corrections;  ///< of each image, from the map's own frame
 };
 
+/// How the images of a map come to lie beside those of the maps before it.
 struct MapAlignment {
   using Covariance = Eigen::Matrix<double, 6, 6>;
 
@@ -57,13 +58,13 @@ MapAlignment align(const TrainingMap& map, const LocalFrame& frame, const std::v
 
 constexpr std::size_t kLeastTied = 5;
 
-/// One line that begins with the name of a map.
+/// Maps that cannot become one. The text is one line and begins with the name of a map.
 class MergeError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Opened with strictLoading().
+/// A map and how it is called, opened with strictLoading().
 struct NamedMap {
   std::string name;
   std::shared_ptr<const TrainingMap> map;
@@ -72,6 +73,7 @@ struct NamedMap {
 /// Of which most images have a stamp that is `known`: the same recording.
 std::optional<std::size_t> knownSession(const TrainingMap& map, const std::function<bool(std::int64_t)>& known);
 
+/// Where a map came to lie in the new one.
 struct MergedMap {
   std::string name;
   std::size_t images = 0;

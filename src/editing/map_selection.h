@@ -14,7 +14,7 @@
 
 namespace visual_localization {
 
-/// In one line.
+/// What is no record of use. The text is one line.
 class UsageFileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -44,7 +44,7 @@ class MapUsage {
   std::map<std::int64_t, OfImage> images_;  ///< by their stamps, which no edit of a map changes
 };
 
-/// A place: images within kPlace_m of each other that look the same way.
+/// What a summary keeps of each place: images within kPlace_m of each other that look the same way.
 struct SummaryConfig {
   std::size_t images_per_place = 4;      ///< those that were used most; but one of each session at least
   std::size_t landmarks_per_image = 40;  ///< at least, used or not
@@ -59,7 +59,7 @@ std::vector<bool> summary(const TrainingMap& map, const MapUsage& usage, const S
 /// Of an image that was used.
 void dropUnusedLandmarks(TrainingImage& image, const MapUsage& usage, const SummaryConfig& config);
 
-/// In one line.
+/// An edit that makes no sense. The text is one line.
 class MapEditError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

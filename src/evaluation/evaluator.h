@@ -17,7 +17,7 @@
 
 namespace visual_localization {
 
-/// One line that begins with the path.
+/// Results that cannot be stored or used. The text is one line and begins with the path.
 class ResultError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -90,7 +90,7 @@ struct Shard {
   bool contains(std::size_t pair) const { return pair % count + 1 == index; }
 };
 
-/// May be called from several threads.
+/// Makes rounds of what was recorded. May be called from several threads.
 struct RoundSource {
   std::function<std::shared_ptr<const TrainingMap>(const RoundSpec&)> map;
   std::function<std::shared_ptr<const Drive>(const RoundSpec&)> drive;

@@ -27,6 +27,7 @@ std::string readName(YamlMap& yaml, const std::string& key) {
   return name;
 }
 
+/// A number of a method itself, not a parameter.
 struct MethodNumber {
   const char* key;
   double MethodSpec::*value;
@@ -92,6 +93,7 @@ bool concernsFrontEnd(const std::string& parameter) {
          parameter == "sift_backend";
 }
 
+/// What the entry of one method says before the sweep's values are filled in.
 struct MethodEntry {
   std::string name;
   MethodSpec method;

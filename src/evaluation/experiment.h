@@ -18,6 +18,7 @@ enum class Pruning {
   kNone,      ///< none: all features stay, also where the round is the map
 };
 
+/// One recorded round of an experiment.
 struct RoundSpec {
   std::string name;
   std::string bag;  ///< file name as the experiment gives it
@@ -30,7 +31,7 @@ struct RoundSpec {
   Pruning pruning = Pruning::kPrevious;
 };
 
-/// Indices into Experiment::rounds.
+/// One round becomes the map, another one is driven. Indices into Experiment::rounds.
 struct PairSpec {
   std::size_t map = 0;
   std::size_t drive = 0;
@@ -52,6 +53,7 @@ struct MethodSpec {
   bool isTracker() const;
 };
 
+/// An experiment of the papers: which rounds, which pairs, which methods.
 struct Experiment {
   std::string name;
   bool closed = true;  ///< the rounds end where they begin: indices wrap

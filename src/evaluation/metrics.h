@@ -13,7 +13,7 @@
 
 namespace visual_localization {
 
-/// Distances between estimated and true positions, metres.
+/// Summary of localisation errors: distances between estimated and true positions, metres.
 struct ErrorStatistics {
   std::size_t count = 0;
   double mean_m = 0.0;
@@ -23,6 +23,7 @@ struct ErrorStatistics {
 
 ErrorStatistics summarise(std::vector<double> errors_m);
 
+/// One answer of a place recogniser and whether it was right.
 struct Decision {
   double confidence = 0.0;
   bool correct = false;
@@ -33,8 +34,8 @@ struct Decision {
 /// Throws std::invalid_argument for a `precision` outside [0, 1] and for a confidence that is NaN.
 double recallAtPrecision(std::vector<Decision> decisions, double precision);
 
-/// Counts of judged images. "Lost" is every state but TRACKING, and truly lost an estimate that is not right
-/// (kRight_m).
+/// How far a tracker's states can be trusted: counts of judged images. "Lost" is every state but TRACKING, and truly
+/// lost an estimate that is not right (kRight_m).
 struct Trust {
   std::size_t tracking_right = 0;
   std::size_t tracking_wrong = 0;
@@ -57,14 +58,14 @@ struct Trust {
   double offMapRecall() const;
 };
 
-/// As in the long-term localisation benchmark (Sattler et al., 2018).
+/// An error within both is a success of the long-term localisation benchmark (Sattler et al., 2018).
 struct RecallThreshold {
   double position_m;
   double heading_deg;
 };
 constexpr std::array<RecallThreshold, 3> kRecall{{{0.25, 2.0}, {0.5, 5.0}, {5.0, 10.0}}};
 
-/// Against the true poses, or these moved by the map's own error.
+/// Errors of poses against one truth: the true poses themselves, or these moved by the map's own error.
 struct PoseErrors {
   std::size_t positions = 0;  ///< images whose error is known
   double position_m = 0.0;    ///< sum
@@ -85,6 +86,7 @@ struct PoseErrors {
   double meanNees() const;
 };
 
+/// What the poses of a method come to over judged images.
 struct PoseFigures {
   std::size_t images = 0;    ///< judged, of a method with states
   std::size_t metric = 0;    ///< solved from landmarks

@@ -42,12 +42,13 @@ void Route::forEachWithin(std::size_t radius, std::size_t centre, Visit visit) c
   }
 }
 
+/// Where a place recogniser believes to be.
 struct Recognition {
   std::size_t training_image = 0;
   double confidence = 0.0;  ///< the larger the surer; comparable only between images of the same recogniser
 };
 
-/// Compares every image with the whole map.
+/// A method beside the papers' trackers: compares every image with the whole map.
 class PlaceRecogniser {
  public:
   virtual ~PlaceRecogniser() = default;
@@ -68,7 +69,7 @@ class BestSingleImage final : public PlaceRecogniser {
   std::size_t training_images_ = 0;
 };
 
-/// Symbols of Milford and Wyeth (ICRA 2012).
+/// Parameters of sequence matching; symbols of Milford and Wyeth (ICRA 2012).
 struct SequenceConfig {
   int length = 10;
   int normalisation_radius = 10;
@@ -81,6 +82,7 @@ struct SequenceConfig {
   void declare(ParameterVisitor& visitor);
 };
 
+/// Parameters of the topological filter.
 struct TopologicalBayesConfig {
   int min_step = -1;
   int max_step = 3;
@@ -91,6 +93,7 @@ struct TopologicalBayesConfig {
   void declare(ParameterVisitor& visitor);
 };
 
+/// Parameters of all place recognisers; the exhaustive one has none.
 struct PlaceRecogniserConfig {
   SequenceConfig sequence;
   TopologicalBayesConfig bayes;

@@ -89,7 +89,7 @@ double meanOfPairs(const std::vector<UnitResult>& units, double UnitResult::*fig
 
 std::size_t relativeOf(const UnitResult& unit) { return unit.poses.relative.positions; }
 
-/// Empty when unknown.
+/// A field for a number, empty when it is unknown.
 struct Known {
   double number;
 };

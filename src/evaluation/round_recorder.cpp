@@ -73,6 +73,7 @@ void forEachImage(const BagReader& bag, const std::string& topic,
   }
 }
 
+/// Sees images and adds them to a drive.
 class DriveRecorder {
  public:
   /// `image_size`: of most images. `for_poses`: keeps features that are not pruned.

@@ -109,6 +109,7 @@ PartialMap partOf(std::shared_ptr<const TrainingMap> map, double gap, double spa
 
 namespace {
 
+/// A training image whose true pose is known, in the map frame.
 struct KnownImage {
   Eigen::Vector2d true_position_m = Eigen::Vector2d::Zero();
   std::optional<double> true_yaw_rad;
@@ -162,6 +163,7 @@ std::vector<std::optional<MapError>> mapErrors(const PartialMap& part,
 
 namespace {
 
+/// What a method under test says after one image.
 struct Verdict {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< in the map frame
   double confidence = 0.0;                               ///< the larger the surer
@@ -170,6 +172,7 @@ struct Verdict {
   std::optional<Estimate> estimate;  ///< of a tracker, for tracing
 };
 
+/// A method under test in one run.
 class Contestant {
  public:
   virtual ~Contestant() = default;
@@ -183,7 +186,7 @@ LocalizerConfig seeded(LocalizerConfig config, std::uint32_t seed) {
   return config;
 }
 
-/// The localizer that runs on the robot.
+/// A tracker, run by the localizer that runs on the robot.
 class TrackerContestant final : public Contestant {
  public:
   /// `camera`: of the drive; none: that of the map.
@@ -262,7 +265,7 @@ std::size_t stepsUntilFound(const std::vector<StepRecord>& steps, double within_
   return end - begin;
 }
 
-/// Extractions that a live front end would have made.
+/// Counts the extractions that a live front end would have made.
 class ExtractionCounter {
  public:
   void add(const RecordedImage& image, RunRecord& record) {

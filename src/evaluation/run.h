@@ -26,6 +26,7 @@ struct Kidnapping {
 /// 6). Throws std::invalid_argument for an index beyond the drive.
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const std::optional<Kidnapping>& kidnapping);
 
+/// How the runs of an experiment go through a drive.
 struct RunShape {
   bool closed = true;      ///< indices wrap; an open drive is followed to its end
   double speed = 1.0;      ///< images of the drive per step: at 2 every other one, at 1/2 each one twice
@@ -49,7 +50,7 @@ struct PartialMap {
 /// one of their session. At least one stays.
 PartialMap partOf(std::shared_ptr<const TrainingMap> map, double gap, double spacing_m = 0.0);
 
-/// At a training image: its pose in the map minus the true one.
+/// What a map has wrong at one of its training images: its pose there minus the true one.
 struct MapError {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   std::optional<double> yaw_rad = {};  ///< none: the true heading is not known
@@ -65,7 +66,7 @@ constexpr double kRight_m = 5.0;
 /// A robot farther than this from all training images is off the map.
 constexpr double kOffMap_m = 10.0;
 
-/// NaN: not known.
+/// How far an estimate is from a truth; NaN: not known.
 struct StepErrors {
   float position_m = std::numeric_limits<float>::quiet_NaN();
   float heading_deg = std::numeric_limits<float>::quiet_NaN();
@@ -91,7 +92,7 @@ struct StepRecord {
   StepErrors relative_filtered = {};
 };
 
-/// For the track of a single run.
+/// A closer look at one step, for the track of a single run.
 struct TraceRecord {
   std::size_t image = 0;
   double diversity_m = 0.0;
@@ -100,6 +101,7 @@ struct TraceRecord {
   std::optional<double> true_yaw_rad = {};
 };
 
+/// One run of one method over one drive.
 struct RunRecord {
   std::size_t start = 0;
   std::vector<StepRecord> steps;
@@ -113,7 +115,7 @@ struct RunRecord {
   double method_ms = 0.0;              ///< time of the method itself, without extraction and comparisons
 };
 
-/// Shared by the runs of one pair of rounds.
+/// Everything that the runs of one pair of rounds share.
 struct RunContext {
   const PartialMap& map;
   const Drive& drive;

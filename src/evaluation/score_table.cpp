@@ -42,6 +42,7 @@ Number numberOf(const std::string& column, const std::string& text) {
   return number;
 }
 
+/// Reads rows by the names of their columns.
 class PoseTable {
  public:
   explicit PoseTable(const std::string& header) {
@@ -118,7 +119,7 @@ Trajectory movedOnto(const Trajectory& positions, const Trajectory& poses) {
 
 namespace {
 
-/// So that no two threads write to the same memory.
+/// Times of one row, so that no two threads write to the same memory.
 struct RowTimes {
   double sift_ms = 0.0;
   double global_ms = 0.0;

@@ -31,6 +31,7 @@ Trajectory readPoses(const std::string& path);
 /// Moved by the median difference on either axis. Throws std::runtime_error when the two have no time in common.
 Trajectory movedOnto(const Trajectory& positions, const Trajectory& poses);
 
+/// One image of a drive, as the front end of the localizer sees it.
 struct DriveImage {
   std::int64_t stamp_ns = 0;
   std::optional<TruePose> truth;  ///< absent when it has no true position
@@ -39,6 +40,7 @@ struct DriveImage {
   std::optional<SiftFeatures> unpruned;  ///< all its SIFT features; only kept for methods that solve poses
 };
 
+/// A recorded round as images to localise.
 struct Drive {
   std::vector<DriveImage> images;
   cv::Size image_size;
@@ -52,14 +54,14 @@ struct Drive {
 /// fewer than two features, is no neighbour; without any neighbour all features stay.
 void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_ratio, double max_gap_s);
 
-/// A role that it does not play is empty.
+/// A recorded round in the roles it plays in an experiment; a role it does not play is empty.
 struct RecordedRound {
   std::shared_ptr<const TrainingMap> map;
   std::vector<std::optional<TruePose>> map_truth;  ///< of the images of the map; empty when nothing is known
   std::shared_ptr<const Drive> drive;
 };
 
-/// Between a drive and a map, computed once for all runs.
+/// All similarities between a drive and a map, computed once and shared by all runs of an experiment.
 class ScoreTable {
  public:
   struct Entry {
@@ -89,7 +91,7 @@ class ScoreTable {
   double global_compare_ms_ = 0.0;
 };
 
-/// Looks scores up, and counts what live images would have cost.
+/// Recorded images whose scores are looked up instead of computed. Counts what live images would have cost.
 class RecordedImage final : public QueryImage {
  public:
   /// Only `training_images` are in the map, and counted by their index in this list; all when it is empty. Both must

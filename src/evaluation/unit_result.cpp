@@ -143,7 +143,7 @@ UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& c
 
 namespace {
 
-/// Up to an empty line.
+/// Reads lines of a section until an empty one.
 class SectionReader {
  public:
   explicit SectionReader(const std::string& text) : in_(text) {}
@@ -162,6 +162,7 @@ class SectionReader {
   std::istringstream in_;
 };
 
+/// The numbers of one line, in the order in which they were written.
 class NumberReader {
  public:
   explicit NumberReader(const std::string& line) : in_(line) { in_.imbue(std::locale::classic()); }

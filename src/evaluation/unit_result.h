@@ -10,7 +10,7 @@
 
 namespace visual_localization {
 
-/// Milliseconds of processor time each.
+/// What extraction and comparisons cost in one pair of rounds, milliseconds of processor time each.
 struct StageCosts {
   double sift_extraction_ms = 0.0;
   double global_extraction_ms = 0.0;
@@ -18,6 +18,7 @@ struct StageCosts {
   double global_comparison_ms = 0.0;
 };
 
+/// The figures of one run.
 struct RunFigures {
   std::size_t start = 0;
   std::size_t images = 0;
@@ -33,7 +34,7 @@ struct RunFigures {
   double update_ms = 0.0;
 };
 
-/// Over all runs at the same number of images since the start.
+/// Sums over all runs at the same number of images since the start.
 struct StepSums {
   std::size_t runs = 0;
   std::size_t judged = 0;
@@ -42,7 +43,7 @@ struct StepSums {
   std::size_t sift = 0;
 };
 
-/// Lines of TUM trajectories.
+/// One image of the traced run of a tracker, as lines of TUM trajectories.
 struct TracedPose {
   std::string estimate;
   std::string truth;  ///< empty when it is not known
@@ -51,7 +52,7 @@ struct TracedPose {
 /// Goes up whenever older results cannot be read any more.
 constexpr int kUnitFormat = 3;
 
-/// One method on one pair of rounds: stored and resumed as a whole.
+/// One method on one pair of rounds: the unit of work that is stored and resumed.
 struct UnitResult {
   std::vector<RunFigures> runs;
   std::vector<StepSums> steps;

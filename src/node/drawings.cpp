@@ -53,6 +53,7 @@ double scaleOf(const cv::Size& size) {
   return std::max(1.0, std::min(static_cast<double>(kSmallestWidth_px) / size.width, largest));
 }
 
+/// Two images beside each other, and lines between what both show.
 class ImagePair {
  public:
   ImagePair(const cv::Mat& grey, const TrainingMap& map, std::size_t training) {
@@ -137,6 +138,7 @@ const cv::Scalar kCurve(235, 190, 110);
 using Statuses = std::deque<LocalizationStatus>;
 using Figure = std::function<double(const LocalizationStatus&)>;
 
+/// One line of the picture.
 struct Row {
   std::string label;
   std::string value;

@@ -25,7 +25,8 @@ cv::Mat drawMatches(const cv::Mat& grey, const SiftFeatures& sift, const Trainin
 /// Beside the training image that shares most landmarks: green those that agree with the pose, red those that do not.
 cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, const TrainingMap& map);
 
-/// State, figures and their history over the last images as a picture. Thread-safe.
+/// The status as a picture for people: the state in colour, the figures that explain it, and their history over the
+/// last images. Thread-safe.
 class Dashboard {
  public:
   static constexpr std::size_t kShown = 120;

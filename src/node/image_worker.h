@@ -22,12 +22,13 @@
 
 namespace visual_localization {
 
-/// Not decoded yet: only the newest one is worth that.
+/// An image as it arrived, not decoded yet: only the newest one is worth that.
 struct ReceivedImage {
   std_msgs::Header header;
   std::function<cv::Mat()> decode;  ///< 8-bit grey; throws ImageError when the message is unusable
 };
 
+/// The subscription to the camera, by any transport.
 class ImageSource {
  public:
   using Callback = std::function<void(ReceivedImage)>;
@@ -51,7 +52,8 @@ class ImageSource {
   PublishedTopics published_;
 };
 
-/// Queue of one between threads: a newer item replaces one that nobody has taken yet.
+/// A queue of one between threads: a newer item replaces one that nobody has taken yet, so that a slow
+/// consumer always works on the newest.
 template <class Item>
 class LatestQueue {
  public:
@@ -99,8 +101,8 @@ class LatestQueue {
 };
 
 /// Tells images that come late from time that goes back: an image older than the newest one is late; when the next one
-/// is older too, and not older than that one, time has gone back. Two publishers whose clocks differ cannot move the
-/// time back and forth.
+/// is older too, and not older than that one, time has gone back, as when a bag starts again. That costs one image of
+/// the new time, and two publishers whose clocks differ cannot move the time back and forth.
 class StampMonitor {
  public:
   enum class Verdict : std::uint8_t {
@@ -120,7 +122,8 @@ class StampMonitor {
   double lag_s_ = 0.0;
 };
 
-/// Each received image ends in exactly one of the other counts; until then it waits or is being processed.
+/// How many images came since the start, and what became of them. Each one ends in exactly one of the counts below
+/// `received`; until then it waits or is being processed.
 struct ImageCounts {
   std::uint64_t received = 0;
   std::uint64_t processed = 0;
@@ -132,6 +135,7 @@ struct ImageCounts {
   std::uint64_t ended() const { return processed + dropped + late + refused + without_map; }
 };
 
+/// One image and what the localizer says about it.
 struct LocalizedImage {
   SharedLocalizer::Result result;  ///< finite
   std_msgs::Header header;         ///< of the image; a missing stamp is replaced by the time of processing
@@ -139,6 +143,7 @@ struct LocalizedImage {
   cv::Mat grey;
 };
 
+/// Where the worker's thread hands its results.
 class ImageOutput {
  public:
   virtual ~ImageOutput() = default;
@@ -147,7 +152,7 @@ class ImageOutput {
   virtual void timeWentBack() {}
 };
 
-/// In a thread of its own; the callbacks of roscpp only push.
+/// Localises the newest image in a thread of its own; the callbacks of roscpp only push.
 class ImageWorker {
  public:
   /// All must outlive it. The outputs are served in their order.

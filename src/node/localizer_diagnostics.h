@@ -20,7 +20,7 @@ namespace visual_localization {
 /// What is wrong with the image, in one line for people; empty for one that is recognised or seems well.
 std::string imageTrouble(const Estimate& estimate);
 
-/// Over the last seconds, so that events rarer than the reports show their rate.
+/// Rate of events over the last seconds, so that events rarer than the reports show their rate, not 1 and 0 in turn.
 class RateMeter {
  public:
   using Clock = std::chrono::steady_clock;
@@ -49,7 +49,7 @@ class RateMeter {
   std::deque<Clock::time_point> times_;
 };
 
-/// On /diagnostics. Thread-safe.
+/// What the node reports on /diagnostics: state, images, latency, map. Thread-safe.
 class LocalizerDiagnostics {
  public:
   using DescribeCamera = std::function<std::string()>;

@@ -31,7 +31,8 @@
 
 namespace visual_localization {
 
-/// Parameters, callbacks and services around an ImageWorker. An invalid parameter stops the start.
+/// Images in, poses out: parameters, callbacks and services around an ImageWorker. An invalid parameter stops the
+/// start.
 class LocalizerNodelet : public nodelet::Nodelet {
  public:
   LocalizerNodelet();

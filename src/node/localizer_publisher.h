@@ -109,7 +109,7 @@ class TransformPublisher {
   std::unique_ptr<ros::AsyncSpinner> spinner_;  ///< nothing that waits for an image may hold it up
 };
 
-/// Topics under the node's name, transform, diagnostics.
+/// Everything that the node says about an image: topics under its own name, transform, diagnostics.
 class LocalizerPublisher : public ImageOutput {
  public:
   /// `diagnostics` and `log` must outlive it.

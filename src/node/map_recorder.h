@@ -36,6 +36,7 @@
 
 namespace visual_localization {
 
+/// What counts as weak.
 struct WatchConfig {
   double max_spacing_m = 2.0;
   double max_fix_sigma_m = 3.0;
@@ -45,6 +46,7 @@ struct WatchConfig {
   void declare(ParameterVisitor& visitor);
 };
 
+/// Parameters of the recorder.
 struct RecorderConfig {
   std::string folder;
   std::string map;
@@ -57,7 +59,7 @@ struct RecorderConfig {
   void declare(ParameterVisitor& visitor);
 };
 
-/// The first that holds.
+/// What a map will lack where an image was recorded; the first that holds.
 enum class Weakness : std::uint8_t {
   kNone,
   kNoFix,
@@ -68,15 +70,16 @@ enum class Weakness : std::uint8_t {
 constexpr std::size_t kWeaknesses = 5;
 const char* describe(Weakness weakness);
 
-/// While a session is recorded, as long as the robot is still there.
+/// Looks at a session while it is recorded and says what will be weak in its map, as long as the robot is still there.
 class RecordingWatch {
  public:
-  /// At the last usable fix.
+  /// An image that was looked at, where the last usable fix was.
   struct Spot {
     Eigen::Vector2d position_m =
         Eigen::Vector2d::Zero();  ///< east, north in the map's frame, or about the first usable fix
     Weakness weakness = Weakness::kNone;
   };
+  /// What is known so far.
   struct Summary {
     std::size_t images = 0;                          ///< that were looked at
     std::array<std::size_t, kWeaknesses> weak = {};  ///< images by weakness
@@ -122,6 +125,7 @@ class RecordingWatch {
   Summary summary_;
 };
 
+/// What a map is built from.
 struct RecordedSession {
   std::string bag;
   std::string image_topic;  ///< without the transport's suffix

@@ -23,7 +23,7 @@ namespace visual_localization {
 visualization_msgs::Marker toCameraMarker(const Estimate& estimate, const std::optional<CameraModel>& camera,
                                           const std_msgs::Header& header);
 
-/// Where the robot was tracked. Not thread-safe.
+/// Where the robot drove, as far as it was tracked. Not thread-safe.
 class DrivenPath {
  public:
   static constexpr std::size_t kMost = 5000;

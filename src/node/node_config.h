@@ -13,6 +13,7 @@
 
 namespace visual_localization {
 
+/// Parameters of the ROS node alone.
 struct NodeConfig {
   std::string map;
   int map_cache_mb = kDefaultMapCache_mb;
@@ -39,6 +40,7 @@ struct NodeConfig {
   MapLoading mapLoading(std::function<void(const std::string&)> warn) const;
 };
 
+/// Everything in the private namespace of the node.
 struct NodeParameters {
   NodeConfig node;
   LocalizerConfig localizer;

@@ -13,7 +13,7 @@ using TopicTypes = std::map<std::string, std::string>;
 /// nothing helps.
 std::string topicHint(const std::string& topic, const std::string& type, const TopicTypes& published);
 
-/// In a thread of its own: a master that does not answer holds nobody up.
+/// Asks the master for them. In a thread of its own: one that does not answer holds nobody up.
 class PublishedTopics {
  public:
   /// By the last answer; asks for the next one.

@@ -25,8 +25,9 @@ dynamic_reconfigure::Config toConfig(const parameters::Declaration& declare);
 /// Throws ParameterError, with name and value, for one that is read at the start only.
 ParameterValues toValues(const dynamic_reconfigure::Config& config, const parameters::Declaration& declare);
 
-/// The protocol of dynamic_reconfigure. Its own server template needs a class generated from a .cfg file; here
-/// everything comes from the declarations. Values are stored on the parameter server as well. Thread-safe.
+/// The parameters while the node runs, by the protocol of dynamic_reconfigure. Its own server template needs a class
+/// generated from a .cfg file; here everything comes from the declarations that also check the start. The values are
+/// stored on the parameter server as well, so that `rosparam dump` shows those in force. Thread-safe.
 class ReconfigureServer {
  public:
   /// Throws when parameters cannot be put into effect, and then nothing has changed. `changed`: never empty.

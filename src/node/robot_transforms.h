@@ -54,7 +54,7 @@ class RobotTransforms {
   std::map<std::string, geometry_msgs::TransformStamped> statics_;  ///< of all frames: they are sent only once
 };
 
-/// With a thread of its own: whoever waits for a transform must not hold it up.
+/// Subscribes RobotTransforms to tf, with a thread of its own: whoever waits for a transform must not hold it up.
 class RobotTransformListener {
  public:
   RobotTransformListener(ros::NodeHandle node, RobotTransforms& transforms, ThrottledLog& log);

@@ -51,6 +51,7 @@ class UsageRecorder : public ImageOutput {
 /// Throws FileError.
 void writeUsage(const std::string& path, const MapUsage& usage);
 
+/// What a recorded session adds to a map.
 struct SessionExtension {
   std::string map;
   std::string bag;

@@ -18,15 +18,16 @@
 
 namespace visual_localization {
 
-/// For several threads; its map may be missing and may be replaced.
+/// A Localizer for several threads, whose map may be missing and may be replaced.
 class SharedLocalizer {
  public:
+  /// A position with its uncertainty, as a person gives it.
   struct Guess {
     Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
     Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Identity();
   };
 
-  /// A copy: publishing it does not block the localizer.
+  /// Everything about one image, as a copy: publishing it does not block the localizer.
   struct Result {
     Estimate estimate;
     std::vector<Particle> particles;

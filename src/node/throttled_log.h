@@ -13,8 +13,8 @@
 
 namespace visual_localization {
 
-/// One message of each kind per period of wall time. Belongs to one object, unlike roscpp's macros, so that two
-/// localizers in one process do not silence each other. Thread-safe.
+/// A log of messages that may come with every image: one of each kind per period of wall time. Unlike the macros of
+/// roscpp it belongs to one object, so that two localizers in one process do not silence each other. Thread-safe.
 class ThrottledLog {
  public:
   enum class Severity : std::uint8_t { kWarning, kError };

@@ -18,6 +18,7 @@ namespace {
 
 constexpr int kAsItIs = -1;  ///< grey already
 
+/// How OpenCV reads the pixels, and how it makes them grey.
 struct Encoding {
   const char* name;
   int type;

@@ -32,7 +32,7 @@ bool startsWith(const Bytes& data, std::initializer_list<std::uint8_t> magic) {
   return data.size() >= magic.size() && std::equal(magic.begin(), magic.end(), data.begin());
 }
 
-/// Reports errors by a jump, so functions that call it have no objects of their own.
+/// libjpeg reading an image. It reports errors by a jump, so functions that call it have no objects of their own.
 class JpegReader {
  public:
   JpegReader() {
@@ -124,8 +124,8 @@ cv::Mat greyOfJpeg(const Bytes& data) {
   return grey;
 }
 
-/// Reports errors by a jump, so functions that call it have no objects of their own. OpenCV's decoder lets libpng
-/// decompress and keep all texts: gigabytes from a few megabytes.
+/// libpng decoding an image to grey. It reports errors by a jump, so functions that call it have no objects of their
+/// own. OpenCV's decoder lets it decompress and keep all texts in the file: gigabytes from a few megabytes.
 class PngReader {
  public:
   explicit PngReader(const Bytes& data) : data_(data) {

@@ -55,7 +55,7 @@ class StaticTransforms {
   bool has_static_ = false;
 };
 
-/// How the mounting was found is for people.
+/// Where a robot carries camera and antenna by its frames, and how that was found, for people.
 struct RobotMount {
   SensorMount mount;
   std::string said;

@@ -195,7 +195,7 @@ std::vector<LandmarkPoint> everyOf(const std::vector<LandmarkPoint>& points, std
   return some;
 }
 
-/// In memory for no more than twice as many.
+/// Counts different numbers in memory for no more than twice as many.
 class DifferentNumbers {
  public:
   void add(std::uint32_t number) {

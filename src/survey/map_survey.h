@@ -49,6 +49,7 @@ class SightGrid {
   std::map<std::uint64_t, Cell> cells_;
 };
 
+/// What one session brought.
 struct SessionSurvey {
   std::size_t images = 0;
   std::int64_t first_ns = 0;  ///< earliest stamp
@@ -69,6 +70,7 @@ struct Stretch {
   std::size_t seen_elsewhere = 0;  ///< images near to which another session has one without the flaw, facing alike
 };
 
+/// A step from one image of a session to the next.
 struct Step {
   int session = 0;
   std::size_t from = 0;
@@ -109,6 +111,7 @@ using OfImage = std::function<bool(std::size_t image)>;
 std::vector<Stretch> stretchesOf(const TrainingMap& map, double gap_m, const OfImage& belongs,
                                  const OfImage& seen_elsewhere = {});
 
+/// A landmark, for people to look at.
 struct LandmarkPoint {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< map frame
   int session = 0;                                       ///< of the first image that shows it
@@ -118,7 +121,7 @@ struct LandmarkPoint {
 /// image is read; of more than `most_points` landmarks likewise. Both at least 1.
 std::vector<LandmarkPoint> landmarkPoints(const TrainingMap& map, std::size_t most_images, std::size_t most_points);
 
-/// Of the images read, but for `images`.
+/// What the landmarks of a map amount to. Their images are known without reading, all else is of the images read.
 struct LandmarkSurvey {
   std::size_t images = 0;                ///< with a geometry, of the whole map
   std::size_t images_read = 0;           ///< of those
@@ -130,6 +133,7 @@ struct LandmarkSurvey {
 /// `most_images`: at least 1; of a map that has more, so many are read, evenly spread.
 LandmarkSurvey landmarkSurvey(const TrainingMap& map, std::size_t most_images);
 
+/// When two images look alike although they are far apart, and how much work may go into finding them.
 struct AmbiguityConfig {
   double near_m = 5.0;                       ///< an image not farther away shows the same scene
   double far_m = 20.0;                       ///< one farther away shows another scene
@@ -143,6 +147,7 @@ struct AmbiguityConfig {
   SimilarityConfig similarity;
 };
 
+/// An image that looks nearly as much like one far away as like its neighbours.
 struct AmbiguousImage {
   std::size_t image = 0;
   std::size_t twin = 0;        ///< the image far away

@@ -200,6 +200,7 @@ TEST_F(BagFileTest, ALz4BlockLargerThanItsFrameAllowsIsRefused) {
   EXPECT_EQ(refusal(path), "a block of a compressed chunk is too long");
 }
 
+/// Counts what is read of a bag.
 class CountedBytes : public bag::Bytes {
  public:
   CountedBytes(const std::string& path, std::uint64_t& read) : file_(path), read_(read) {}

@@ -53,6 +53,7 @@ TEST_F(BagFileTest, TheReaderNamesThePath) {
   EXPECT_THAT(refusal, HasSubstr("damaged"));
 }
 
+/// One kind of damage to an uncompressed bag, and what is said about it.
 struct Damage {
   const char* text;
   std::function<void(std::string&)> make;

@@ -24,6 +24,7 @@
 
 namespace visual_localization::test {
 
+/// Bags, and bytes that may be none.
 class BagFileTest : public testing::Test {
  protected:
   /// Twelve images and fixes in several chunks.

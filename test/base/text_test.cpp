@@ -46,6 +46,7 @@ TEST(Csv, ALineHasAFieldMoreThanCommas) {
   EXPECT_EQ(csvFields(""), Fields{""});
 }
 
+/// Writes numbers as no file may have them.
 struct Commas : std::numpunct<char> {
   char do_decimal_point() const override { return ','; }
   char do_thousands_sep() const override { return '.'; }

@@ -50,7 +50,7 @@ void forget(const std::string& path) {
   ::close(file);
 }
 
-/// Compared with the map, but never extracted.
+/// Views that are compared with the map like a camera's images, but were never extracted.
 class StreetImage final : public test::FakeImage {
  public:
   StreetImage(const StreetMap& streets, const TrainingMap& map) : streets_(streets), map_(map) {}

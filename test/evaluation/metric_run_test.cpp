@@ -11,7 +11,7 @@
 namespace visual_localization {
 namespace {
 
-/// A drive 0.3 m beside the training images, known by its features.
+/// A street with landmarks, and a drive along it 0.3 m beside the training images, known by its features.
 class RecordedStreet {
  public:
   RecordedStreet() {

@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-/// On open and on closed routes.
+/// What holds for every place recogniser, on open and on closed routes.
 class EveryRecogniser : public ::testing::TestWithParam<std::tuple<std::string, bool>> {
  protected:
   bool closed() const { return std::get<1>(GetParam()); }

@@ -68,7 +68,7 @@ bool expect(Read read) {
   }
 }
 
-/// One after the other; zeros when the bytes are used up.
+/// Takes values from the bytes of an input, one after the other; zeros when they are used up.
 class Input {
  public:
   Input(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}

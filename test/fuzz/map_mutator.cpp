@@ -28,6 +28,7 @@ const char* oneOf(const std::array<const char*, n>& options, Random& random) {
   return options.at(random() % n);
 }
 
+/// A map in memory that may be changed at will.
 class Editor {
  public:
   Editor(const std::uint8_t* bytes, std::size_t size) {

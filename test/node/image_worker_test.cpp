@@ -33,7 +33,7 @@ ReceivedImage imageAt(double stamp_s, std::function<cv::Mat()> decode = smallNoi
   return image;
 }
 
-/// Read it only once the images have ended.
+/// Keeps what the worker hands on. Read it only once the images have ended.
 class RecordedOutput : public ImageOutput {
  public:
   void publish(const LocalizedImage& image, const ImageCounts& counts) override {

@@ -11,6 +11,7 @@ namespace {
 using testing::ElementsAre;
 using Severity = ThrottledLog::Severity;
 
+/// Keeps what is written.
 struct Lines {
   ThrottledLog::Write writer() {
     return [this](Severity severity, const std::string& text) {

@@ -7,7 +7,7 @@
 
 namespace visual_localization::test {
 
-/// Only how it compares matters.
+/// An image without pixels: only how it compares matters.
 class FakeImage : public QueryImage {
  public:
   void set(std::int64_t, const cv::Mat&) override {}

@@ -21,7 +21,7 @@ constexpr double kKeypointSigma_px = 0.3;
 /// 640 x 480 pixels, focal length 450 pixels, a lens that bends a little.
 CameraModel streetCamera();
 
-/// Most stand still.
+/// A thing with a look of its own. Most stand still.
 struct WorldPoint {
   using Descriptor = std::array<std::uint8_t, SiftFeatures::kDescriptorSize>;
 
@@ -32,6 +32,7 @@ struct WorldPoint {
 
 WorldPoint randomPoint(const Eigen::Vector3d& position_m, std::mt19937& random);
 
+/// An image of the world.
 struct View {
   SiftFeatures features;
   std::vector<std::size_t> points;  ///< which one each feature shows
@@ -42,7 +43,7 @@ struct View {
 View viewOf(const std::vector<WorldPoint>& world, const CameraModel& camera, const CameraPose& pose, double noise_px,
             std::mt19937& random, std::size_t image = 0);
 
-/// Straight on, a turn to the left, straight on, a turn to the right, straight on.
+/// How a street is driven: straight on, a turn to the left, straight on, a turn to the right, straight on.
 struct StreetDrive {
   std::size_t images = 45;
   double spacing_m = 1.0;
@@ -54,6 +55,7 @@ struct StreetDrive {
   bool reverses = false;   ///< backwards in the last fifth: `travel_yaw_rad` stays where the robot looks
 };
 
+/// Where the robot is and where it drives to, the camera on it and the time.
 struct DrivenPose {
   CameraPose camera;
   double travel_yaw_rad = 0.0;
@@ -67,7 +69,7 @@ std::vector<DrivenPose> drive(const StreetDrive& street);
 /// Points at random, 2 to 10 m beside the street and up to 20 m beyond its end.
 std::vector<WorldPoint> pointsAlong(const std::vector<DrivenPose>& poses, double points_per_m, std::mt19937& random);
 
-/// One image a second, five fixes a second.
+/// A drive that was recorded: one image a second, five fixes a second.
 struct RecordedDrive {
   CameraModel camera = streetCamera();
   std::vector<DrivenPose> truth;

@@ -11,7 +11,7 @@
 
 namespace visual_localization::test {
 
-/// As long as this object lives.
+/// A folder that lives as long as this object.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

@@ -15,7 +15,7 @@
 
 namespace visual_localization::test {
 
-/// How alike two places look depends on their distance only.
+/// A world without images: how alike two places look depends on their distance only.
 class World {
  public:
   explicit World(std::shared_ptr<const TrainingMap> map)

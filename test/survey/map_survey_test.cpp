@@ -14,6 +14,7 @@ namespace {
 
 using test::kSecond_ns;
 
+/// Collects images of a map.
 class Rounds {
  public:
   /// Images a metre apart from `from_m` on, heading that way.

@@ -27,21 +27,21 @@ class BagFile;
 class Bytes;
 }  // namespace bag
 
-/// One line that begins with the path.
+/// A bag that cannot be read. The text is one line and begins with the path.
 class BagError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Not decoded yet.
+/// One image of a bag, not decoded yet.
 struct BagImage {
   std::int64_t stamp_ns = 0;        ///< of the header, or when it was recorded if the header has none
   std::function<cv::Mat()> decode;  ///< 8-bit grey image; throws ImageError when the message is unusable
   cv::Size size = {};               ///< pixels, by the message's header; empty when the message is unusable
 };
 
-/// Of one topic in the order of recording; each is read only when asked for. Shares the open bag with its BagReader:
-/// use both in one thread.
+/// The images of one topic in the order of recording; each is read from the bag only when asked for. Keeps the bag
+/// open, which it shares with its BagReader: use both in one thread.
 class BagImages {
  public:
   std::size_t size() const;
@@ -61,14 +61,15 @@ class BagImages {
   std::shared_ptr<const Content> content_;
 };
 
+/// One source of positions.
 struct Receiver {
   std::string frame;       ///< of its antenna, or whatever its positions are about; may be empty
   std::vector<Fix> fixes;  ///< in the order of recording, believable or not
   std::string said = {};   ///< how they became fixes, if that is worth a line
 };
 
-/// The bag may come from anyone: a damaged one gives a BagError, on opening, or within a compressed chunk when its
-/// first message is read.
+/// Reads images and fixes from a bag that may come from anyone: a damaged one gives a BagError. Damage within a
+/// compressed chunk shows when its first message is read, all other on opening.
 class BagReader {
  public:
   /// Throws BagError when there is no readable, indexed bag at `path`.

@@ -10,7 +10,7 @@
 
 namespace visual_localization {
 
-/// The reason, in one line.
+/// An image message that cannot be used. The text is the reason, in one line.
 class ImageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
