@@ -72,6 +72,8 @@ class Run(NamedTuple):
 
 
 class Table(NamedTuple):
+    """Rows of text."""
+
     columns: List[str]
     rows: List[Dict[str, str]]
 

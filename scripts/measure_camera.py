@@ -83,6 +83,8 @@ def distance_m(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 class Programs:
+    """The programs of this package."""
+
     def __init__(self, folder: Optional[Path]):
         self._folder = folder
 

@@ -47,6 +47,7 @@ Positions = np.ndarray  # one row a position: east, north in metres
 
 
 class Session(NamedTuple):
+    """One session as map_builder describes it."""
     name: str
     fixes: Dict[str, Positions]
     counts: Dict[str, int]  # a fix before the path begins has no position

@@ -85,6 +85,8 @@ def launch(port: int, map_file: Path, topic: str, compressed: bool) -> roslaunch
 
 
 class Process:
+    """The figures of the localizer's process."""
+
     def __init__(self, name: str):
         api = rosgraph.Master('/soak').lookupNode(name)
         pid = xmlrpc.client.ServerProxy(api).getPid('/soak')[2]

@@ -33,6 +33,8 @@ def plain(text: str) -> str:
 
 
 class DataError(Exception):
+    """Says what is wrong with a file."""
+
     def __init__(self, path: Path, what: str):
         super().__init__(printable(f'{path}: {" ".join(what.split())}'))
 
@@ -70,6 +72,7 @@ class Series:
 
 @dataclass
 class Results:
+    """The content of the folder."""
     experiment: str
     description: Dict[str, Any]
     outcomes: List[Outcome]

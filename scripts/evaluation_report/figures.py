@@ -26,6 +26,8 @@ class Drawing:
 
 
 class Figures:
+    """The figures of one report."""
+
     def __init__(self, results: Results, papers: Papers):
         self._results = results
         self._papers = papers

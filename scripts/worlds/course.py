@@ -107,6 +107,8 @@ def _filled(points: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 class Path:
+    """A closed smooth path."""
+
     def __init__(self, points: np.ndarray):
         self._points = np.concatenate([points, points[:1]])
         self._s = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(self._points, axis=0), axis=1))])

@@ -36,6 +36,8 @@ class Site:
 
 
 class House:
+    """Walls, roof, chimney and steps of one design."""
+
     def __init__(self, plan: random.Random, noise: np.random.Generator, roofs: List['bpy.types.Material'],
                  stone: 'bpy.types.Material'):
         self.width_m, self.depth_m = plan.uniform(7.5, 11.5), plan.uniform(6.8, 8)

@@ -37,6 +37,8 @@ def configure_renderer(scene: 'bpy.types.Scene', size: tuple, samples: int) -> N
 
 
 class PlainCamera:
+    """Blender's own pinhole camera and tone curve."""
+
     def __init__(self, scene: 'bpy.types.Scene', field_of_view_deg: float, size: tuple, samples: int):
         self._scene = scene
         self._camera = add_camera(scene, field_of_view_deg)

@@ -7,6 +7,8 @@ Distortion = Tuple[float, float, float, float, float]  # plumb_bob: k1, k2, p1, 
 
 @dataclass(frozen=True)
 class Spec:
+    """Which world is rendered, in which light, and in which round."""
+
     seed: int
     day: str
     round: int

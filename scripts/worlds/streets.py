@@ -156,6 +156,8 @@ def ground_material(rgb: np.ndarray, wet: bool) -> 'bpy.types.Material':
 
 
 class Pavements:
+    """Kerbs and slabs along every street."""
+
     def __init__(self, batch: Batch, plan: TownPlan, noise: np.random.Generator, wet: bool):
         self._batch, self._relief = batch, plan.relief
         self._kerb = meshes.flat_material((.42, .41, .39), 'kerb', .3 if wet else .9)
@@ -210,6 +212,8 @@ class Pavements:
 
 
 class Furniture:
+    """Lamps, signs, bins and boxes on the pavements."""
+
     def __init__(self, batch: Batch, plan: TownPlan, rng: random.Random, noise: np.random.Generator):
         self._batch, self._relief, self._rng, self._noise = batch, plan.relief, rng, noise
         self._pole = meshes.flat_material((.2, .22, .22), 'pole', .5)

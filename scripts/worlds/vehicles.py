@@ -11,6 +11,8 @@ from worlds.town_textures import placard
 
 
 class Parking:
+    """Parks cars on sloping ground."""
+
     def __init__(self, batch: Batch, rng: random.Random, noise: np.random.Generator,
                  height: Callable[[float, float], float]):
         self._batch, self._rng, self._noise, self._height = batch, rng, noise, height
