@@ -21,7 +21,7 @@ class World {
   explicit World(std::shared_ptr<const TrainingMap> map)
       : map_(std::move(map)), scores_(map_->size()), sweep_(*map_, 100000, 100000), sessions_(*map_, false) {}
 
-  /// Globally, places within some 10 m look alike.
+  /// What the robot sees from here; globally, places within some 10 m look alike.
   TrackerInput from(const Eigen::Vector2d& robot_m) {
     scores_.startImage(FeatureKind::kSift, [this, robot_m](FeatureKind kind, std::size_t image) {
       return kind == FeatureKind::kSift ? scoreAt(0.5 * bell(image, robot_m, 2.0))
