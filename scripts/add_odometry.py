@@ -29,7 +29,6 @@ def covered(message, rng: np.random.Generator):
 
 
 def is_in(span: Span, time_s: float) -> bool:
-    """Whether a time lies in it."""
     return span is not None and span[0] <= time_s < span[1]
 
 
@@ -74,7 +73,6 @@ def write(options: argparse.Namespace) -> int:
 
 
 def main() -> int:
-    """Runs it; one line for what goes wrong."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--bag', type=Path, required=True, help='recording with compressed images')
     parser.add_argument('--output', type=Path, required=True, help='bag to write')

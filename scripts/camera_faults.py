@@ -35,7 +35,6 @@ def soiled(grey: np.ndarray, radius: float) -> np.ndarray:
 
 
 def scaled(grey: np.ndarray, factor: float) -> np.ndarray:
-    """Another resolution."""
     method = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_LINEAR
     return cv2.resize(grey, None, fx=factor, fy=factor, interpolation=method)
 

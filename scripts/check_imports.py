@@ -33,7 +33,6 @@ ORDER = written_order()
 
 
 def includes(path: Path) -> Iterator[Tuple[int, str]]:
-    """Line number and header of every include."""
     for number, line in enumerate(path.read_text(encoding='utf-8').splitlines(), 1):
         match = INCLUDE.match(line)
         if match:
@@ -41,7 +40,6 @@ def includes(path: Path) -> Iterator[Tuple[int, str]]:
 
 
 def sources(root: Path) -> Iterator[Path]:
-    """Every C++ file of the package."""
     for folder in (root / 'include' / PACKAGE, root / 'src', root / 'test'):
         for pattern in ('*.h', '*.hpp', '*.cpp'):
             yield from sorted(folder.rglob(pattern))

@@ -32,7 +32,6 @@ class Clock:
 
     @staticmethod
     def _used_s() -> float:
-        """Of all programs that have ended, on all cores."""
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         return used.ru_utime + used.ru_stime
 
@@ -53,7 +52,6 @@ def read_images(model: Path) -> Dict[str, Tuple[np.ndarray, np.ndarray]]:
 
 
 def poses_of(model: Path) -> Poses:
-    """Of all registered images."""
     poses = {}
     for name, (rotation, translation) in read_images(model).items():
         place, view = -rotation.T @ translation, rotation[2]
@@ -84,7 +82,6 @@ class Colmap:
                  '--SiftExtraction.use_gpu', 0, '--SiftExtraction.num_threads', self.threads)
 
     def list_of(self, images: List[str]) -> Path:
-        """A file that names these images."""
         path = self.output / 'images.txt'
         path.write_text('\n'.join(images) + '\n', encoding='utf-8')
         return path

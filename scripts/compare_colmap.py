@@ -73,14 +73,12 @@ class Recording:
 
 
 def poses_of_track(track: Path, name: str) -> Poses:
-    """Of all images with a pose."""
     with open(track, newline='', encoding='utf-8') as file:
         return {f"{name}/{row['stamp']}.png": tuple(float(row[key]) for key in ('east_m', 'north_m', 'yaw_rad'))
                 for row in csv.DictReader(file) if math.isfinite(float(row['east_m'] or 'nan'))}
 
 
 def report(label: str, poses: Poses, truth: Poses, map_s: float, drive_s: float) -> str:
-    """A row of the table."""
     found = [name for name in truth if name in poses]
     there, true = (np.array([table[name] for name in found]).reshape(-1, 3) for table in (poses, truth))
     error_m = np.hypot(*(there - true)[:, :2].T)
@@ -174,7 +172,6 @@ def compare(options: argparse.Namespace) -> None:
 
 
 def parse_arguments() -> argparse.Namespace:
-    """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--map-bag', type=Path, required=True, help='recording that makes the map')
     parser.add_argument('--map-poses', type=Path, required=True, help='its true poses, CSV with stamp_ns and yaw_rad')

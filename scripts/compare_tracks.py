@@ -60,7 +60,6 @@ class Run(NamedTuple):
     kidnapping: Optional[Dict[str, int]]
 
     def options(self) -> List[str]:
-        """For the command line."""
         options = ['--tracker', self.tracker, '--features', self.features, '--seed', str(self.seed)]
         for name, value in (self.kidnapping or {}).items():
             options += [f'--kidnap-{name}', str(value)]
@@ -121,7 +120,6 @@ class Build:
         return self.folder / f'{session.stem}_{content_of(session)}.map'
 
     def track_file(self, pair: Pair, run: Run) -> Path:
-        """Where the track of a run is or will be."""
         folder = f'{self.map_file(pair.session).stem}_to_{pair.drive.stem}_{content_of(pair.drive)}'
         return self.folder / folder / run.file_name()
 
@@ -162,12 +160,10 @@ class Build:
 
 @functools.lru_cache(maxsize=None)
 def content_of(path: Path) -> str:
-    """Short hash of a file's content."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
 
 
 def count_images(bag: Path) -> int:
-    """Number of images in a bag, raw or compressed."""
     try:
         with rosbag.Bag(str(bag)) as file:
             count = file.get_message_count([IMAGE_TOPIC, IMAGE_TOPIC + '/compressed'])
@@ -187,7 +183,6 @@ def runs_over(drive: Path, seeds: List[int]) -> List[Run]:
 
 
 def read_track(path: Path) -> Table:
-    """A track as localize wrote it."""
     with open(path, newline='', encoding='utf-8') as file:
         lines = list(csv.reader(file))
     if len(lines) < 2:
@@ -355,7 +350,6 @@ def pairs_of(rounds: Optional[Path]) -> List[Pair]:
 
 
 def positive(text: str) -> int:
-    """A number of at least 1, for argparse."""
     number = int(text)
     if number < 1:
         raise ValueError
@@ -363,7 +357,6 @@ def positive(text: str) -> int:
 
 
 def parse_arguments() -> argparse.Namespace:
-    """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--before', type=Path, required=True, metavar='BUILD_DIR', help='build folder to compare with')
     parser.add_argument('--after', type=Path, required=True, metavar='BUILD_DIR', help='build folder to judge')

@@ -21,12 +21,10 @@ def is_failed(case: xml.Element) -> bool:
 
 
 def cases_of(report: Path) -> List[xml.Element]:
-    """The single tests in a JUnit report."""
     return list(xml.parse(report).iter('testcase'))
 
 
 def show(title: str, cases: List[xml.Element]) -> None:
-    """One line of counts."""
     skipped, failed = sum(map(is_skipped, cases)), sum(map(is_failed, cases))
     print(f'{title}: {len(cases)} tests, {len(cases) - failed - skipped} passed, {failed} failed, {skipped} skipped')
 
@@ -53,7 +51,6 @@ def rostest_reports(build: Path) -> Dict[str, List[Path]]:
 
 
 def clear(build: Path) -> None:
-    """Removes the reports of earlier runs."""
     for paths in rostest_reports(build).values():
         for path in paths:
             path.unlink(missing_ok=True)
@@ -76,7 +73,6 @@ def count(build: Path) -> int:
 
 
 def main() -> int:
-    """Clears or counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('build', type=Path, help='build folder, with the report of ctest as ctest.xml')
     parser.add_argument('--clear', action='store_true', help='before a run: remove the reports of the rostests')

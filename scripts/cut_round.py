@@ -45,7 +45,6 @@ def cut(source: Path, target: Path, topics: List[str], start_s: float, duration_
 
 
 def parse_arguments() -> argparse.Namespace:
-    """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('source', type=Path, help='bag to read')
     parser.add_argument('target', type=Path, help='bag to write')
@@ -58,7 +57,6 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def main() -> None:
-    """Cuts, and says what came out."""
     args = parse_arguments()
     if not args.source.is_file():
         raise SystemExit(f'cut_round: {args.source} does not exist')

@@ -138,7 +138,6 @@ def add_no_fix(track: Track, end_s: float, rng: np.random.Generator) -> str:
 
 
 def add_spikes(track: Track, rng: np.random.Generator) -> str:
-    """Single fixes far away."""
     indices = rng.integers(20, len(track.stamps) - 20, 4)
     for index in indices:
         track.east[index] += rng.choice([-1, 1]) * rng.uniform(15, 60)
@@ -147,7 +146,6 @@ def add_spikes(track: Track, rng: np.random.Generator) -> str:
 
 def make_fix(east: float, north: float, status: int, variance: float, up_variance: float,
              up: float = 0.0) -> NavSatFix:
-    """A message; NaN throughout when the position is not known."""
     fix = NavSatFix()
     fix.header.frame_id = 'gps'
     fix.status.status = status
@@ -163,7 +161,6 @@ def make_fix(east: float, north: float, status: int, variance: float, up_varianc
 
 
 def make_image(path: Path, index: int, quality: int) -> CompressedImage:
-    """The frame as JPEG."""
     pixels = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if pixels is None:
         raise SystemExit(f'make_round_bag: cannot read {path}')
@@ -176,7 +173,6 @@ def make_image(path: Path, index: int, quality: int) -> CompressedImage:
 
 
 def make_pose(drive: Round, index: int) -> PoseStamped:
-    """The exact pose of the camera."""
     (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle / 2), math.cos(angle / 2)) for angle in (
         drive.roll[index], drive.pitch[index], drive.yaw[index]))
     message = PoseStamped()
@@ -204,7 +200,6 @@ def image_events(folder: Path, drive: Round, quality: int, camera_info: Optional
 
 
 def gps_events(track: Track) -> Iterator[Event]:
-    """Every fix that arrives."""
     for index in np.flatnonzero(~track.lost):
         variance = track.variance[index]
         fix = make_fix(track.east[index], track.north[index], int(track.status[index]), variance, 4 * variance,
@@ -213,7 +208,6 @@ def gps_events(track: Track) -> Iterator[Event]:
 
 
 def write_bag(path: Path, events: List[Event], start_s: float) -> None:
-    """Writes the events in the order of their stamps."""
     with rosbag.Bag(str(path), 'w', compression='none') as bag:
         for offset, topic, message in sorted(events, key=lambda event: event[0]):
             stamp = rospy.Time.from_sec(start_s + offset + FIRST_STAMP_S)
@@ -222,7 +216,6 @@ def write_bag(path: Path, events: List[Event], start_s: float) -> None:
 
 
 def parse_arguments() -> argparse.Namespace:
-    """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('round', type=Path, help='folder that render_world.py wrote')
     parser.add_argument('out', type=Path, help='bag to write')

@@ -53,7 +53,6 @@ def errors_of(images: List[Dict[str, str]], truth: np.ndarray, frame: LocalFrame
 
 
 def figures(values: np.ndarray) -> str:
-    """Mean, 95th and 99th percentile in words."""
     return (f'mean {values.mean():.3f} m, 95 % {np.percentile(values, 95):.3f} m, 99 % '
             f'{np.percentile(values, 99):.3f} m, most {values.max():.3f} m')
 
@@ -81,7 +80,6 @@ def errors_by_session(options: argparse.Namespace) -> Dict[str, np.ndarray]:
 
 
 def report(sessions: Dict[str, np.ndarray]) -> None:
-    """Prints it session by session."""
     before = np.empty((0, 4))
     for name, errors in sessions.items():
         print(f'{name}: {len(errors)} images, error {figures(np.linalg.norm(errors[:, 2:], axis=1))}')
@@ -106,7 +104,6 @@ def plot(sessions: Dict[str, np.ndarray], path: Path, times: float) -> None:
 
 
 def main() -> int:
-    """Runs it; one line for what goes wrong."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n', maxsplit=1)[0])
     parser.add_argument('--map', type=Path, action='append', required=True, help='map file; repeat it')
     parser.add_argument('--bag', type=Path, action='append', required=True, help='recording of a session; repeat it')

@@ -40,7 +40,6 @@ class Row(NamedTuple):
 
 
 def decoded(message: CompressedImage) -> np.ndarray:
-    """Grey pixels of a JPEG or PNG message."""
     return cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_GRAYSCALE)
 
 
@@ -78,7 +77,6 @@ def truth_of(bag: Path) -> Dict[str, Sequence[float]]:
 
 
 def distance_m(a: Sequence[float], b: Sequence[float]) -> float:
-    """Between two near positions in degrees."""
     north = math.radians(a[0] - b[0])
     east = math.radians(a[1] - b[1]) * math.cos(math.radians(b[0]))
     return EARTH_RADIUS_M * math.hypot(north, east)
@@ -101,7 +99,6 @@ class Programs:
             raise SystemExit(f'measure_camera: {name}: {done.stderr.strip()}')
 
     def build_map(self, bag: Path, target: Path) -> None:
-        """A map of one round."""
         self.run('map_builder', '--bag', bag, '--image-topic', IMAGES, '--fix-topic', FIXES, '--output', target)
 
     def drive(self, bag: Path, map_file: Path, start: int, options: List[str]) -> List[Row]:
@@ -182,7 +179,6 @@ class Measurement:
 
 
 def parse_arguments() -> argparse.Namespace:
-    """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--map-bag', type=Path, required=True, help='round that the map is made of')
     parser.add_argument('--bags', type=Path, nargs='+', required=True, help='rounds to drive')
@@ -195,7 +191,6 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def main() -> None:
-    """Prints the table row by row."""
     args = parse_arguments()
     with tempfile.TemporaryDirectory() as folder:
         measurement = Measurement(args, Path(folder))

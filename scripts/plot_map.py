@@ -192,17 +192,14 @@ def path_look(session: Session) -> Dict[str, Any]:
 
 
 def image_look(colour: str) -> Dict[str, Any]:
-    """A ring for each training image."""
     return {'marker': 'o', 'markersize': 2.6, 'markeredgewidth': .6, 'markerfacecolor': 'white', 'color': colour}
 
 
 def inside(area: Area, positions: Positions) -> Positions:
-    """Those that the panel shows."""
     return positions[((positions >= area.low) & (positions <= area.high)).all(axis=1)]
 
 
 def draw_session(page: Page, index: int, session: Session, area: Area) -> None:
-    """The panel of one session."""
     colour = SESSION_COLOURS[index % len(SESSION_COLOURS)]
     axes = page.panel(index, shown_name(session.name, 50))
     handles = []
@@ -223,7 +220,6 @@ def draw_session(page: Page, index: int, session: Session, area: Area) -> None:
 
 
 def draw_together(page: Page, index: int, sessions: Sequence[Session], area: Area) -> None:
-    """The panel with all paths."""
     axes = page.panel(index, 'all sessions, cleaned paths')
     handles = []
     for number, session in enumerate(sessions):
@@ -236,7 +232,6 @@ def draw_together(page: Page, index: int, sessions: Sequence[Session], area: Are
 
 
 def draw(sessions: Sequence[Session]) -> plt.Figure:
-    """The whole figure."""
     together = area_of(sessions)
     areas = [area_for(session, together) for session in sessions]
     lines = [len(VERDICTS) + 6] * len(sessions)
@@ -252,7 +247,6 @@ def draw(sessions: Sequence[Session]) -> plt.Figure:
 
 
 def save(figure: plt.Figure, path: Path) -> None:
-    """Whole or not at all; the same data give the same file."""
     picture, kind = io.BytesIO(), path.suffix[1:].lower()
     metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)
     dpi = min(plt.rcParams['savefig.dpi'], MOST_PIXELS / max(figure.get_size_inches()))

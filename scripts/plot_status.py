@@ -80,7 +80,6 @@ class History:
             return list(self._sources)
 
     def states(self) -> List[str]:
-        """The state's name at every image."""
         with self._lock:
             return list(self._states)
 
@@ -101,7 +100,6 @@ class Plot:
             self.figure.canvas.manager.set_window_title(title)
 
     def draw(self, history: History) -> None:
-        """Everything anew."""
         columns, states, sources = history.columns(), history.states(), history.sources()
         count = min(len(columns['seconds']), len(states), len(sources)) if columns else 0
         columns = {name: column[:count] for name, column in columns.items()}
@@ -222,7 +220,6 @@ def statuses_of(bag: Path, topic: str) -> Iterable:
 
 
 def plot_bag(args: argparse.Namespace) -> None:
-    """Of a recorded topic, once."""
     history, topic = History(), f'{args.localizer}/status'
     for status in statuses_of(args.bag, topic):
         history.add(status)
@@ -293,7 +290,6 @@ def choose_backend(output: Optional[Path]) -> None:
 
 
 def positive(text: str) -> float:
-    """A number above zero."""
     number = float(text)
     if not 0 < number < math.inf:
         raise argparse.ArgumentTypeError(f'{text} is not above 0')
@@ -301,7 +297,6 @@ def positive(text: str) -> float:
 
 
 def picture(text: str) -> Path:
-    """A path of a format that matplotlib writes."""
     path = Path(text)
     if path.suffix.lower() not in ('.png', '.svg', '.pdf'):
         raise argparse.ArgumentTypeError(f'{text} does not end in .png, .svg or .pdf')

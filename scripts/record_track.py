@@ -133,17 +133,14 @@ class Recorder:
             self.last_change_s = time.monotonic()
 
     def is_ready(self) -> bool:
-        """Whether the localizer has a map and nothing it says would be missed."""
         return (self._has_map and self._now is not None
                 and all(subscriber.get_num_connections() > 0 for subscriber in self._subscribers))
 
     def start(self) -> None:
-        """Counts from now on."""
         self._before = self._now
         self.last_change_s = None
 
     def last_status(self) -> Optional[LocalizationStatus]:
-        """The status of the newest image."""
         statuses = dict(self.statuses)
         return statuses[max(statuses)] if statuses else None
 
@@ -153,7 +150,6 @@ class Recorder:
 
 
 def count_messages(bag: Path, topic: str) -> int:
-    """Messages of one topic in a bag."""
     with rosbag.Bag(str(bag)) as file:
         return file.get_message_count(topic)
 
@@ -215,7 +211,6 @@ def row(stamp: rospy.Time, recorder: Recorder, truth: Truth) -> Dict[str, object
 
 
 def write_track(path: Path, rows: List[Dict[str, object]]) -> None:
-    """Writes the rows, all or nothing."""
     partial = path.with_name(path.name + '.partial')
     with open(partial, 'w', newline='', encoding='utf-8') as file:
         writer = csv.DictWriter(file, COLUMNS, restval='')
@@ -225,7 +220,6 @@ def write_track(path: Path, rows: List[Dict[str, object]]) -> None:
 
 
 def write_counts(path: Path, in_bag: int, counts: Counts, answered: int) -> None:
-    """Writes what became of the images of the bag."""
     path.write_text(json.dumps({'in_bag': in_bag, 'answered': answered, **counts._asdict()}) + '\n', encoding='utf-8')
 
 
@@ -245,7 +239,6 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def main() -> int:
-    """Waits, records, writes; 1 without a single answer."""
     args = parse_arguments()
     expected = count_messages(args.bag, args.image_topic)
     if expected == 0:

@@ -48,7 +48,6 @@ def coefficients(text: str) -> tuple:
 
 
 def number(low: float, high: float):
-    """A parser of numbers in a range."""
     def parse(text: str) -> float:
         try:
             value = float(text)
@@ -61,7 +60,6 @@ def number(low: float, high: float):
 
 
 def whole(low: int, high: int):
-    """A parser of whole numbers in a range."""
     def parse(text: str) -> int:
         if not re.fullmatch('[0-9]{1,10}', text) or not low <= int(text) <= high:
             raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from {low} to {high}")

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """Writes the report of an evaluation: report.md and figures/ beside the CSV files that `evaluate` wrote.
 
-The report holds our numbers beside the papers', says in sentences where order and ratios agree, and shows the figures.
+The report holds our numbers beside the papers' and shows the figures. A section "Discussion" that somebody wrote into
+it by hand stays when it is written again.
 """
 import argparse
 import sys
@@ -11,7 +12,7 @@ from typing import NoReturn, Optional
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 from evaluation_report.data import DataError  # noqa: E402
-from evaluation_report.report import renew_discussion, write_report  # noqa: E402
+from evaluation_report.report import write_report  # noqa: E402
 
 # Beside the scripts in the sources, and in the share folder of an installation.
 PAPERS = (HERE.parent / 'config/evaluation/papers.csv',
@@ -26,33 +27,17 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse_arguments() -> argparse.Namespace:
-    """The command line."""
     parser = Parser(prog='report_evaluation.py', description=(__doc__ or '').splitlines()[0])
     parser.add_argument('output', type=Path, metavar='OUTPUT_DIR', help='the folder that `evaluate` wrote')
     parser.add_argument('--papers', type=Path, metavar='FILE',
                         help='the papers\' numbers (default: config/evaluation/papers.csv of this package, if there)')
     parser.add_argument('--format', choices=['svg', 'png'], default='svg', help='of the figures (default: %(default)s)')
-    parser.add_argument('--discussion', type=Path, metavar='YAML', help='only write the discussion of OUTPUT_DIR/'
-                        'report.md anew: the text of this experiment, with the numbers of the report\'s own tables')
     return parser.parse_args()
-
-
-def renewed(folder: Path, experiment: Path) -> int:
-    """The discussion of a report that is there."""
-    try:
-        renew_discussion(folder, experiment)
-    except DataError as error:
-        print(f'report_evaluation: {error}', file=sys.stderr)
-        return 1
-    print(f'{folder / "report.md"}: discussion written')
-    return 0
 
 
 def main() -> int:
     """Exit code 0, or 1 with one line when a file is not as it should be."""
     arguments = parse_arguments()
-    if arguments.discussion:
-        return renewed(arguments.output, arguments.discussion)
     papers: Optional[Path] = arguments.papers or next((path for path in PAPERS if path.is_file()), None)
     try:
         figures = write_report(arguments.output, papers, arguments.format)

@@ -76,7 +76,6 @@ class Counts:
         self.never_received = self.in_bag - self.received
 
     def line(self) -> str:
-        """For people."""
         return (f'images           {self.in_bag} in the bag: {self.answered} answered, {self.dropped} dropped for a '
                 f'newer one, {self.late} late, {self.refused} refused, {self.without_map} before there was a map, '
                 f'{self.never_received} never received')
@@ -96,7 +95,6 @@ class Counts:
 
 
 def read_csv(path: Path) -> List[Dict[str, str]]:
-    """Rows of a CSV file by column name."""
     with open(path, newline='', encoding='utf-8') as file:
         return list(csv.DictReader(file))
 
@@ -204,7 +202,6 @@ def plot_error(axes: plt.Axes, track: Track, places: Optional[Places]) -> None:
 
 
 def plot_states(axes: plt.Axes, track: Track) -> None:
-    """State over time."""
     for level, state in enumerate(STATES):
         chosen = track.states == state
         axes.plot(track.seconds[chosen], np.full(chosen.sum(), level), '|', color=COLOURS[state], markersize=10)
@@ -215,7 +212,6 @@ def plot_states(axes: plt.Axes, track: Track) -> None:
 
 def plot(track: Track, training: Optional[Tuple[np.ndarray, np.ndarray]], places: Optional[Places],
          prefix: Path) -> List[Path]:
-    """Draws everything into PREFIX.png and PREFIX.svg."""
     figure = plt.figure(figsize=(13, 6), constrained_layout=True)
     grid = figure.add_gridspec(2, 2, width_ratios=[1.3, 1], height_ratios=[1.6, 1])
     plot_track(figure.add_subplot(grid[:, 0]), track, training)
@@ -230,7 +226,6 @@ def plot(track: Track, training: Optional[Tuple[np.ndarray, np.ndarray]], places
 
 
 def parse_arguments() -> argparse.Namespace:
-    """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('track', type=Path, help='CSV that record_track.py wrote')
     parser.add_argument('--counts', type=Path, help='JSON that record_track.py wrote (default: beside the track)')
@@ -242,7 +237,6 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def main() -> int:
-    """Prints, plots, judges."""
     args = parse_arguments()
     rows = read_csv(args.track)
     if not rows:

@@ -67,7 +67,6 @@ def read_images(bag: Path, topic: str) -> List[object]:
 
 
 def free_port() -> int:
-    """A port on which nobody listens."""
     with socket.socket() as probe:
         probe.bind(('127.0.0.1', 0))
         return probe.getsockname()[1]
@@ -94,7 +93,6 @@ class Process:
         self._folder = Path('/proc') / str(pid)
 
     def figures(self) -> Dict[str, float]:
-        """Memory, threads and open files now."""
         lines = (self._folder / 'status').read_text(encoding='ascii').splitlines()
         fields = {name: value.split() for name, value in (line.split(':', 1) for line in lines)}
         return {'resident_mib': int(fields['VmRSS'][0]) / MIB, 'peak_mib': int(fields['VmHWM'][0]) / MIB,
@@ -125,11 +123,9 @@ class Feeder:
             self._answered.notify()
 
     def is_connected(self) -> bool:
-        """Whether the localizer listens."""
         return self._publisher.get_num_connections() > 0 and self._clock.get_num_connections() > 0
 
     def send(self, number: int) -> rospy.Time:
-        """Sends the image number `number` of all; returns its stamp."""
         self._stamp += self._interval
         image = self._images[number % len(self._images)]
         image.header.stamp = self._stamp
@@ -138,13 +134,11 @@ class Feeder:
         return self._stamp
 
     def wait_for(self, stamp: rospy.Time, timeout_s: float) -> bool:
-        """Waits for the answer to an image; False when none comes."""
         with self._answered:
             return self._answered.wait_for(lambda: self._answer is not None and self._answer.header.stamp >= stamp,
                                            timeout_s)
 
     def last(self) -> Optional[LocalizationStatus]:
-        """The newest answer."""
         return self._answer
 
 
@@ -167,7 +161,6 @@ class Disturber:
             raise Failure(f'load_map: {answer.message}')
 
     def disturb(self) -> None:
-        """The next one."""
         self._actions[self._next % len(self._actions)]()
         self._next += 1
 
@@ -185,7 +178,6 @@ def row_of(images: int, begin: float, feeder: Feeder, process: Process) -> Dict[
 
 
 def run(args: argparse.Namespace, feeder: Feeder, process: Process, disturber: Disturber) -> List[Dict[str, object]]:
-    """Sends all images."""
     rows, begin = [], time.monotonic()
     for number in range(args.images):
         stamp = feeder.send(number)
@@ -202,7 +194,6 @@ def run(args: argparse.Namespace, feeder: Feeder, process: Process, disturber: D
 
 
 def write_rows(path: Path, rows: List[Dict[str, object]]) -> None:
-    """Writes the rows, all or nothing."""
     partial = path.with_name(path.name + '.partial')
     with open(partial, 'w', newline='', encoding='utf-8') as file:
         writer = csv.DictWriter(file, COLUMNS)
@@ -245,7 +236,6 @@ def summary_of(rows: List[Dict[str, object]]) -> str:
 
 
 def parse_arguments() -> argparse.Namespace:
-    """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--map', type=Path, required=True, help='map file')
     parser.add_argument('--bag', type=Path, required=True, help='round whose images are sent')
@@ -281,7 +271,6 @@ def soak(args: argparse.Namespace) -> List[Dict[str, object]]:
 
 
 def main() -> int:
-    """Runs, writes, says."""
     args = parse_arguments()
     try:
         rows = soak(args)

@@ -24,6 +24,7 @@ check_style() {
   echo "clang-format: clean"
   scripts/check_imports.py
   scripts/check_unity.py
+  scripts/check_links.py
   shellcheck scripts/*.sh .ci/run
   find scripts test -name '*.py' -print0 | xargs -0 python3 -c \
     'import ast, sys; [ast.parse(open(path, encoding="utf-8").read(), path) for path in sys.argv[1:]]'

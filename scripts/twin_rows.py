@@ -24,7 +24,6 @@ TOWN = LocalFrame({'latitude_deg': LATITUDE_DEG, 'longitude_deg': LONGITUDE_DEG,
 
 
 def arguments() -> argparse.Namespace:
-    """Those of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('tracks', type=Path, nargs='+', metavar='TRACK', help='CSV that localize wrote')
     parser.add_argument('--bag', type=Path, required=True, help='the drive, of make_round_bag.py')
@@ -44,7 +43,6 @@ def inside(points: np.ndarray, street: Tuple[np.ndarray, np.ndarray]) -> np.ndar
 
 
 def positions(track: Path, truth: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Estimated and true ones."""
     with open(track, newline='', encoding='utf-8') as file:
         rows = np.array([[float(row[name]) for name in ('stamp', 'latitude_deg', 'longitude_deg')]
                          for row in csv.DictReader(file)])
@@ -53,12 +51,10 @@ def positions(track: Path, truth: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def percent(which: List[np.ndarray]) -> str:
-    """Share of the images for which it holds."""
     return f'{100 * np.concatenate(which).mean():.2f} %'
 
 
 def main() -> None:
-    """Prints one line."""
     args = arguments()
     nodes = TownPlan(args.seed).nodes
     rows = [tuple(np.array(nodes[name]) for name in row) for row in TWIN_ROWS]

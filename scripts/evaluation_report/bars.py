@@ -19,7 +19,6 @@ class Bar:
         self.spread = None if spread is None else spread * scale
 
     def end(self) -> float:
-        """The end of bar and whisker."""
         return (self.value or 0) + (self.spread or 0)
 
 
@@ -57,7 +56,6 @@ def draw_panel(axis: plt.Axes, rows: Rows, decimals: int, named: bool) -> None:
 
 
 def longest(rows: Rows) -> float:
-    """The end of the longest bar."""
     return max((bar.end() for _, bars in rows for bar, _ in bars), default=0)
 
 
@@ -104,7 +102,6 @@ def bars_figure(results: Results, papers: Papers, palette: Palette, title: str, 
 
 def paper_bar(results: Results, papers: Papers, outcome: Outcome, metric: str, spread: Optional[str],
               scale: float) -> Bar:
-    """The papers' number and deviation of a method."""
     value, deviation = (papers.lead(results.experiment, outcome.group, outcome.method, name) if name else None
                         for name in (metric, spread))
     return Bar(value, deviation, scale)

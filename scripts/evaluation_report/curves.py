@@ -55,7 +55,6 @@ def steps_figure(results: Results, palette: Palette, title: str) -> Optional[plt
 
 
 def drawable(curves: Dict[str, Series], column: str = 'mean_err_m') -> Dict[str, Series]:
-    """The curves with a value in the column."""
     return {method: series for method, series in curves.items() if series.has(column)}
 
 
@@ -173,7 +172,6 @@ def cumulated(errors: Sequence[float]) -> List[float]:
 
 
 def middle(values: Sequence[float]) -> List[float]:
-    """The median of what is known, if anything is."""
     known = [value for value in values if math.isfinite(value)]
     return [median(known)] if known else []
 
@@ -193,7 +191,6 @@ def speeds_of(series: Series, metric: bool) -> Dict[str, List[float]]:
 
 
 def draw_run(axis: plt.Axes, series: Series, metric: bool) -> None:
-    """One run: cumulated error on the left axis, speeds on the right axis."""
     if series.has('recovering'):
         shade(axis, series.step, series.columns['recovering'])
     axis.plot(series.step, cumulated(series.columns['err_m']), color=COLOURS['black'], linewidth=1.2)

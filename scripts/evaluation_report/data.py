@@ -67,7 +67,6 @@ class Series:
             self.columns.setdefault(name, []).append(math.nan if value is None else value)
 
     def has(self, name: str) -> bool:
-        """Whether any image has a value in this column."""
         return any(math.isfinite(value) for value in self.columns.get(name, []))
 
 
@@ -83,11 +82,9 @@ class Results:
     traces: Dict[Tuple[str, str], Dict[str, Series]]
 
     def groups(self) -> List[Group]:
-        """Pairs of groups in the order of the experiment."""
         return list(dict.fromkeys(outcome.group for outcome in self.outcomes))
 
     def of(self, group: Group) -> List[Outcome]:
-        """The outcomes of a pair of groups, in the order of the experiment."""
         return [outcome for outcome in self.outcomes if outcome.group == group]
 
     def methods(self) -> List[str]:
@@ -139,7 +136,6 @@ def truth(path: Path, line: int, name: str, text: str) -> Number:
 
 
 def read_outcomes(path: Path) -> Tuple[str, List[Outcome]]:
-    """The experiment's name and the outcomes of summary.csv."""
     experiment, outcomes = '', []
     for line, row in read_rows(path, (*KEYS, *NEEDED_MEASURES)):
         experiment = experiment or row.get('experiment', '')
@@ -168,7 +164,6 @@ def read_series(path: Path, keys: Tuple[str, str], names: Tuple[str, ...]) -> Di
 
 
 def read_pairs(path: Path) -> List[Tuple[str, str]]:
-    """The pairs of recordings that were run; empty when the file is missing."""
     if not path.exists():
         return []
     rows = read_rows(path, ('train_round', 'test_round'))

@@ -1,6 +1,6 @@
-"""What the names of experiments and methods mean, and which methods to compare."""
+"""What the names of experiments and methods mean."""
 import re
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import List, NamedTuple, Optional, Tuple
 
 from .data import Group, Number, Outcome, Results
 
@@ -22,7 +22,6 @@ class GridPoint(NamedTuple):
 
 
 def group_title(group: Group) -> str:
-    """The title of a pair of groups."""
     if group in (CONSTANT, CHANGING):
         return f'{group[0]} illumination'
     return f'{group[0]} → {group[1]}'
@@ -67,7 +66,6 @@ def thresholds_of(results: Results, method: str) -> Optional[Tuple[float, float]
 
 
 def is_kidnapped(results: Results, method: str) -> bool:
-    """Whether the robot is kidnapped in the middle of the runs."""
     flag = results.settings.get(method, {}).get('kidnapped', '').lower()
     return flag in ('true', '1') or method.endswith(KIDNAPPED)
 
@@ -93,46 +91,3 @@ def by_illumination(results: Results) -> List[Outcome]:
             row.values['speed_up'] = sift / own if sift and own and row.method != 'SIFT' else None
         merged += rows
     return merged
-
-
-def marginals(values: Dict[str, float]) -> Dict[str, Dict[str, float]]:
-    """Means along each axis of a motion grid: axis, then label, then mean."""
-    points = {name: grid_point(name) for name in values}
-    result: Dict[str, Dict[str, float]] = {}
-    labels = (('rotation', lambda point: f'{point.rotation_deg:g}° rotation'),
-              ('acceleration', lambda point: f'{point.acceleration:g} acceleration'),
-              ('initial speed', lambda point: f'{point.speed:g} v_R'))
-    for axis, label in labels:
-        cells: Dict[str, List[float]] = {}
-        for name, point in points.items():
-            if point:
-                cells.setdefault(label(point), []).append(values[name])
-        result[axis] = {name: sum(cell) / len(cell) for name, cell in cells.items()}
-    return result
-
-
-def ratio_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
-    """The pairs of methods whose ratio answers the experiment's question."""
-    if experiment == 'speed':
-        pairs = [(method, f'not {method}') for method in methods]
-        for method in methods:
-            speed = speed_of(method)
-            if speed and speed[1] != 1:
-                pairs.append((method, f'{speed[0]} 1x'))
-    elif experiment == 'kidnapped':
-        pairs = [(method + KIDNAPPED, method) for method in methods]
-        pairs += [(f'adaptive, paper recovery{end}', f'not adaptive{end}') for end in ('', KIDNAPPED)]
-    else:
-        # The method that the paper proposes, relative to every other one.
-        chosen = next((name for name in ('DPSO-80', 'hybrid') if name in methods), methods[0] if methods else '')
-        pairs = [(chosen, method) for method in methods if method != chosen]
-    return [pair for pair in pairs if pair[0] in methods and pair[1] in methods]
-
-
-def tested_pairs(experiment: str, methods: List[str]) -> List[Tuple[str, str]]:
-    """The pairs of methods of which the first has the lower error by a t-test in the papers.
-
-    [J] section 7.2: PF-l-300 and DPSO-80 "outperform the PF-g methods as well as the PF-l with 100 particles".
-    """
-    pairs = [(better, worse) for better in ('DPSO-80', 'PF-l-300') for worse in ('PF-g-100', 'PF-g-300', 'PF-l-100')]
-    return [pair for pair in pairs if experiment == 'comparison' and pair[0] in methods and pair[1] in methods]

@@ -19,11 +19,9 @@ class PaperValue:
     source: str
 
     def decimals(self) -> int:
-        """Number of printed decimals."""
         return len(self.text.partition('.')[2])
 
     def rounds(self, other: 'PaperValue') -> bool:
-        """Whether this is the other number, rounded."""
         return abs(other.value - self.value) <= 0.5 * 10.0 ** -self.decimals() + 1e-9
 
 
@@ -69,7 +67,6 @@ class Papers:
         return self._sources.get(experiment, [])
 
     def all(self, experiment: str, group: Group, method: str, metric: str) -> List[PaperValue]:
-        """Every source's number."""
         for key in (group_key(group), ANY):
             found = self._values.get((experiment, key, method_key(method), metric))
             if found:

@@ -66,21 +66,17 @@ class Palette:
                 drawn[chosen] += 1
 
     def colour(self, method: str) -> str:
-        """The colour of the method's family."""
         return self._colours.get(family(method), COLOURS['black'])
 
     def line(self, method: str) -> Dict[str, Any]:
-        """Colour and style for a curve."""
         style = self._styles.get(re.sub(r', kidnapped$', '', method), '-')
         return {'color': self.colour(method), 'linestyle': style}
 
     def handles(self, methods: Sequence[str]) -> List[Line2D]:
-        """Legend entries of curves."""
         return [Line2D([], [], label=literal(method), **self.line(method)) for method in methods]
 
 
 def paper_patch() -> Patch:
-    """The legend entry of the papers' bars."""
     return Patch(facecolor=PAPER_FILL, edgecolor=PAPER_EDGE, hatch='////', label='papers')
 
 
@@ -108,12 +104,10 @@ def page(title: str, rows: int, columns: int, panel_height: float, handles: Sequ
 
 
 def shape(count: int) -> Tuple[int, int]:
-    """Rows and columns for this many panels."""
     columns = 1 if count == 1 else 3 if count in (3, 5, 6, 9) else 2
     return math.ceil(count / columns), columns
 
 
 def hide_unused(axes: Sequence[plt.Axes], used: int) -> None:
-    """Hides the unused panels."""
     for axis in axes[used:]:
         axis.set_visible(False)

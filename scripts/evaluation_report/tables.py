@@ -119,7 +119,6 @@ class PaperColumn:
         return value.text if measure.scale == 1 else f'{value.value * measure.scale:.{measure.decimals}f}'
 
     def sources(self) -> str:
-        """The line under the table."""
         known = self._papers.sources(self._experiment)
         listed = '; '.join(f'<sup>{mark}</sup> {known[mark - 1]}' for mark in sorted(self._used))
         return f'\nPapers: {listed}.\n' if listed else ''

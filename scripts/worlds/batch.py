@@ -39,7 +39,6 @@ class Batch:
 
     def triangle(self, corners: Sequence[Corner], material: 'bpy.types.Material',
                  uv: Sequence[Tuple[float, float]] = ((0, 0), (1, 0), (.5, 1))) -> None:
-        """A triangle, for gables."""
         self.faces(np.array([corners]), material, np.array([uv]))
 
     def box(self, centre: Corner, size: Corner, yaw: float, material: 'bpy.types.Material', taper: float = 1) -> None:
@@ -70,7 +69,6 @@ class Batch:
         self.prism(list(start + ring * radius), list(end + ring * end_radius), material)
 
     def disc(self, centre: Corner, normal: Corner, radius: float, material: 'bpy.types.Material') -> None:
-        """An octagon, as two quads and the rectangle between them."""
         across = np.cross(normal, (0, 0, 1))
         across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.array([1., 0, 0])
         up = np.cross(across, normal)
@@ -80,7 +78,6 @@ class Batch:
             self.quad([ring[a], ring[b], ring[c], ring[d]], material)
 
     def build(self, scene: 'bpy.types.Scene') -> None:
-        """Makes an object of each material's faces."""
         for (name, sides), faces in self._faces.items():
             corners, uvs = np.concatenate(faces.corners), np.concatenate(faces.uvs)
             count = len(corners)
@@ -99,7 +96,6 @@ class Batch:
 
 
 def frame_corners(centre: Corner, length: float, width: float, yaw: float) -> List[Corner]:
-    """The corners of a level rectangle, counter-clockwise."""
     c, s = math.cos(yaw), math.sin(yaw)
     return [(centre[0] + u * length / 2 * c - v * width / 2 * s, centre[1] + u * length / 2 * s + v * width / 2 * c,
              centre[2]) for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]

@@ -178,7 +178,6 @@ class Campus:
             meshes.wheel((x + u * c - v * s, y + u * s + v * c, .32), yaw, tyre)
 
     def _add_people(self) -> None:
-        """People walk: other places in every round."""
         rng = self._round
         for _ in range(10):
             x, distance = rng.uniform(0, BUILDING[0]), rng.choice([5.0, 13.5])

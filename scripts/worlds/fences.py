@@ -23,7 +23,6 @@ class Fences:
         self._iron = meshes.flat_material((.04, .04, .045), 'iron', .5)
 
     def add(self, kind: str, start: np.ndarray, end: np.ndarray, rng: random.Random) -> None:
-        """One kind along a line."""
         length = float(np.linalg.norm(end - start))
         if kind == 'none' or length < .5:
             return

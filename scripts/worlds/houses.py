@@ -31,7 +31,6 @@ class Site:
                 self.front[1] + u * self.along[1] + v * self.back[1], z)
 
     def outline(self, width_m: float, depth_m: float) -> np.ndarray:
-        """The corners of a house here."""
         w, d = width_m / 2, depth_m
         return np.array([self.at(u, v)[:2] for u, v in ((-w, 0), (w, 0), (w, d), (-w, d))])
 
@@ -106,7 +105,6 @@ class House:
             self._add_dormer(batch, site, eave)
 
     def _add_dormer(self, batch: Batch, site: Site, eave: float) -> None:
-        """A window in the roof."""
         u, w, v = self._dormer * self.width_m, .8, self.depth_m * .12
         low, high = eave + .1, eave + min(1.7, self.ridge_m * .8)
         batch.quad([site.at(u - w, v, low), site.at(u + w, v, low), site.at(u + w, v, high), site.at(u - w, v, high)],

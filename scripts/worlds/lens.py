@@ -79,7 +79,6 @@ class Lens:
 
 
 def write_calibration(path: Path, lens: Lens, name: str = 'stereo_left') -> None:
-    """A file as camera_calibration writes it."""
     (width, height), focal, (cx, cy) = lens.size, lens.focal_px, lens.centre
     fields = [f'image_width: {width}', f'image_height: {height}', f'camera_name: {name}',
               _matrix('camera_matrix', 3, 3, [focal, 0, cx, 0, focal, cy, 0, 0, 1]), 'distortion_model: plumb_bob',

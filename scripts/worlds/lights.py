@@ -27,7 +27,6 @@ def add_clear_sky(scene: 'bpy.types.Scene', elevation_deg: float, rotation_deg: 
 
 
 def add_overcast_sky(scene: 'bpy.types.Scene', strength: float, sun_rotation_rad: float) -> None:
-    """An even sky and a sun behind clouds."""
     background = _background(scene)
     background.inputs['Color'].default_value = (.75, .8, .88, 1)
     background.inputs['Strength'].default_value = strength
@@ -64,7 +63,6 @@ def add_clouds(scene: 'bpy.types.Scene', cover: float, brightness: float, seed: 
 
 
 def add_lamps(scene: 'bpy.types.Scene', places: Sequence[Tuple[float, float, float]], power_w: float) -> list:
-    """Warm lamps that shine downwards."""
     data = bpy.data.lights.new('lamp', 'SPOT')
     data.energy, data.color = power_w, (1, .75, .45)
     data.spot_size, data.spot_blend, data.shadow_soft_size = math.radians(150), .6, .12

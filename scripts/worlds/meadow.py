@@ -39,7 +39,6 @@ class Meadow:
         self._path = np.stack(plan.path.point(s), 1)
 
     def build(self) -> None:
-        """Builds everything but light and camera."""
         self._add_ground()
         self._add_hedges()
         self._add_trees()
@@ -52,7 +51,6 @@ class Meadow:
         return self._plan.relief.height(x, y)
 
     def _from_path(self, points: np.ndarray) -> np.ndarray:
-        """Distances of points to the path."""
         return np.concatenate([np.sqrt(((part[:, None] - self._path[None]) ** 2).sum(2).min(1))
                                for part in np.array_split(points, max(1, len(points) // 500))])
 
@@ -123,7 +121,6 @@ class Meadow:
             self._batch.faces(np.stack([feet - half, feet + half, tips], 1)[on], material, uvs[on])
 
     def _add_houses(self) -> None:
-        """A farm at the edge."""
         roofs = [meshes.image_material(roof_tiles(self._noise, (.36, .13, .07)), 'roof', .9)]
         stone = meshes.flat_material((.2, .19, .17), 'plinth', .95)
         self._farm = self._rng.uniform(.2, 4.6)  # the direction of its first house
@@ -154,7 +151,6 @@ class Meadow:
 
 
 def build(scene: 'bpy.types.Scene', spec: Spec) -> HillyDrive:
-    """The meadow of a seed in the light of its day, and the drive across it."""
     plan = MeadowPlan(spec.seed)
     Meadow(scene, plan, spec).build()
     rng = random.Random(f'meadow sky {spec.seed} {spec.day} {spec.round}')

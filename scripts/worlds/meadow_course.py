@@ -35,7 +35,6 @@ class MeadowPlan:
 
 
 def meadow_drive(plan: MeadowPlan, spec: Spec) -> HillyDrive:
-    """The drive of one round."""
     rng = random.Random(f'meadow {spec.seed} {spec.day} {spec.round}')
     mount = Mount(CAMERA_HEIGHT_M + spec.raise_m, spec.pitch_rad, .008)
     return HillyDrive(plan.path.wobbled(.3, rng), plan.relief, spec.spacing_m, rng, mount)

@@ -18,7 +18,6 @@ def image_from(array: np.ndarray, name: str) -> 'bpy.types.Image':
 
 
 def image_material(array: np.ndarray, name: str, roughness: float = .9) -> 'bpy.types.Material':
-    """A nearly matt material that shows the array."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes = material.node_tree.nodes
@@ -33,7 +32,6 @@ def image_material(array: np.ndarray, name: str, roughness: float = .9) -> 'bpy.
 
 def flat_material(rgb: Sequence[float], name: str, roughness: float = .7,
                   specular: float = .2) -> 'bpy.types.Material':
-    """A material of one colour."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     surface = material.node_tree.nodes['Principled BSDF']
@@ -56,7 +54,6 @@ def quad(corners: Sequence[Tuple[float, float, float]], material: 'bpy.types.Mat
 
 def box(x: float, y: float, bottom: float, size: Tuple[float, float, float], yaw: float,
         material: 'bpy.types.Material') -> None:
-    """A cuboid that stands at height `bottom`."""
     bpy.ops.mesh.primitive_cube_add(size=1, location=(x, y, bottom + size[2] / 2), rotation=(0, 0, yaw))
     bpy.context.object.scale = size
     bpy.context.object.data.materials.append(material)
@@ -64,12 +61,10 @@ def box(x: float, y: float, bottom: float, size: Tuple[float, float, float], yaw
 
 def cylinder(centre: Tuple[float, float, float], radius: float, depth: float, material: 'bpy.types.Material',
              vertices: int = 8, rotation: Tuple[float, float, float] = (0, 0, 0)) -> None:
-    """A cylinder, upright without rotation."""
     bpy.ops.mesh.primitive_cylinder_add(vertices=vertices, radius=radius, depth=depth, location=centre,
                                         rotation=rotation)
     bpy.context.object.data.materials.append(material)
 
 
 def wheel(centre: Tuple[float, float, float], yaw: float, material: 'bpy.types.Material') -> None:
-    """A car's wheel."""
     cylinder(centre, .32, .2, material, 12, (math.pi / 2, 0, yaw))

@@ -27,7 +27,6 @@ def leaf_textures(noise: np.random.Generator) -> list:
 
 
 def bark(noise: np.random.Generator) -> 'bpy.types.Material':
-    """Of every trunk."""
     shade = np.repeat(noise.uniform(.5, 1.5, (1, 32, 1)), 64, 0) * (.5 + fractal(64, 32, noise, 5)[..., None])
     return meshes.image_material((shade * np.array([.13, .1, .075])).clip(0, 1), 'bark', 1.0)
 
@@ -62,7 +61,6 @@ class Planter:
         self._leaves, self._bark = leaf_textures(noise), bark(noise)
 
     def blades(self) -> list:
-        """Materials for grass."""
         return [self._leaves[k] for k in (0, 2, 4)]
 
     def _blown(self, centres: np.ndarray, bottom: float, strength: float) -> np.ndarray:
@@ -112,7 +110,6 @@ class Planter:
             self.bush(foot, rng, rng.uniform(*bushes))
 
     def bush(self, foot: Corner, rng: random.Random, scale: float) -> None:
-        """Leaves down to the ground."""
         count = int(300 * scale)
         rays = self._noise.standard_normal((count, 3))
         rays *= (self._noise.uniform(.4, 1, (count, 1)) * .8 * scale) / np.linalg.norm(rays, axis=1)[:, None]
@@ -121,7 +118,6 @@ class Planter:
 
     def hedge(self, start: Tuple[float, float], end: Tuple[float, float], size: Tuple[float, float], relief,
               rng: random.Random) -> None:
-        """Leaves in a box along a line; `size`: width and height."""
         length = math.hypot(end[0] - start[0], end[1] - start[1])
         count = int(length * (2 * size[1] + size[0]) * 55)
         noise, (dx, dy) = self._noise, ((end[0] - start[0]) / length, (end[1] - start[1]) / length)

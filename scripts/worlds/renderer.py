@@ -8,7 +8,6 @@ from worlds.campus_course import CameraPose
 
 
 def add_camera(scene: 'bpy.types.Scene', field_of_view_deg: float) -> 'bpy.types.Object':
-    """A pinhole camera."""
     data = bpy.data.cameras.new('camera')
     data.lens_unit = 'FOV'
     data.angle = math.radians(field_of_view_deg)

@@ -224,13 +224,11 @@ class Furniture:
         self.lamps: List[Tuple[float, float, float]] = []
 
     def glow(self, strength: float) -> None:
-        """Switches the lamps on."""
         surface = self._glow.node_tree.nodes['Principled BSDF']
         surface.inputs['Emission'].default_value = (1, .78, .48, 1)
         surface.inputs['Emission Strength'].default_value = strength
 
     def lamp(self, site: Site) -> None:
-        """A post with an arm over the street."""
         x, y, _ = site.at(0, 0)
         z = float(self._relief.height(x, y))
         self._batch.cylinder((x, y, z), (x, y, z + 5), .075, self._pole, 7, .05)
@@ -244,7 +242,6 @@ class Furniture:
             self._plate(site, z + 2.0, .5)
 
     def sign(self, site: Site) -> None:
-        """A post with one or two plates."""
         x, y, _ = site.at(0, 0)
         z = float(self._relief.height(x, y))
         self._batch.cylinder((x, y, z), (x, y, z + 2.7), .035, self._pole, 6)
@@ -262,7 +259,6 @@ class Furniture:
                               site.at(side, a, bottom + height)], writing)
 
     def clutter(self, site: Site) -> None:
-        """A bin, a cabinet with posters, or bollards."""
         x, y, _ = site.at(0, 0)
         z = float(self._relief.height(x, y)) + .1
         yaw, kind = math.atan2(site.along[1], site.along[0]), self._rng.random()

@@ -88,7 +88,6 @@ class FacadePainter:
             y += floor_m
 
     def _add_window(self, wall: Array, top: int, bottom: int, left: int, right: int) -> None:
-        """Frame, glass, bars, sometimes a blind and a sill."""
         plan = self._plan
         wall[top - 4:bottom + 4, left - 4:right + 4] = plan.choice([.85, .2, .5, .7])
         darkness = plan.uniform(.03, .18)
@@ -106,7 +105,6 @@ class FacadePainter:
             wall[bottom:bottom + 8, left - 8:right + 8] = .75
 
     def _add_street_level(self, wall: Array, width_m: float, ppm: int) -> None:
-        """One door, pipe, sign, poster, vent or graffito."""
         plan = self._plan
         left = int(plan.uniform(.5, max(.6, width_m - 2.5)) * ppm)
         kind = plan.choice(['door', 'sign', 'poster', 'vent', 'pipe', 'graffiti'])
@@ -163,20 +161,17 @@ def ground(low_m: float, high_m: float, building: tuple, noise: np.random.Genera
 
 
 def leaves(noise: np.random.Generator) -> Array:
-    """Foliage of one tree."""
     shade = fractal(64, 64, noise, 5)
     rgb = np.stack([.06 + .1 * shade, .14 + .25 * shade, .04 + .05 * shade], -1)
     return (rgb * (noise.random((64, 64, 1)) * 1.3)).clip(0, 1).astype(np.float32)
 
 
 def wood(noise: np.random.Generator) -> Array:
-    """A distant edge of a forest."""
     shade = fractal(128, 256, noise, 7)
     rgb = np.stack([.05 + .12 * shade, .12 + .2 * shade, .04 + .06 * shade], -1)
     return (rgb * (.5 + noise.random((128, 256, 1)))).clip(0, 1).astype(np.float32)
 
 
 def street_sign(noise: np.random.Generator) -> Array:
-    """The plate on a lamp post, grey."""
     pattern = (noise.random((6, 9)) < .5) * .7 + .15
     return np.kron(pattern, np.ones((8, 8))).astype(np.float32)

@@ -51,7 +51,6 @@ class Town:
         self._lit: List[list] = []
 
     def build(self) -> List[Tuple[float, float, float]]:
-        """Builds everything but light and camera; returns where the lamps are."""
         self._add_ground()
         designs = self._designs()
         self._add_rows(designs)
@@ -120,7 +119,6 @@ class Town:
 
     @staticmethod
     def _sites(side: Side, row: List[Lot]) -> List[Site]:
-        """Where the houses of a row stand."""
         start, along, out, _ = side
         ends = JUNCTION_M + np.cumsum([lot.width_m for lot in row])
         return [Site(tuple(start + (end - lot.width_m / 2) * along + lot.setback_m * out), tuple(along), tuple(out))
@@ -246,7 +244,6 @@ class Town:
                     parking.park(*point, yaw + self._day.gauss(0, .03))
 
     def _add_people(self) -> None:
-        """They walk on the pavements: elsewhere in every round."""
         for _ in range(16):
             _, _, (start, along, out, length) = self._round.choice(self._sides)
             x, y = start + self._round.uniform(8, length - 8) * along + self._round.uniform(5.7, 6.8) * out
@@ -302,7 +299,6 @@ def overlap(a: np.ndarray, b: np.ndarray, gap_m: float = .5) -> bool:
 
 
 def add_light(scene: 'bpy.types.Scene', spec: Spec) -> None:
-    """The sky of a day."""
     rng = random.Random(f'town sky {spec.seed} {spec.day} {spec.round}')
     if spec.day in ('sunny_high', 'sunny_low'):
         elevation = rng.uniform(44, 56) if spec.day == 'sunny_high' else rng.uniform(9, 14)
@@ -317,7 +313,6 @@ def add_light(scene: 'bpy.types.Scene', spec: Spec) -> None:
 
 
 def build(scene: 'bpy.types.Scene', spec: Spec):
-    """The town of a seed in the light of its day, and the drive through it."""
     plan = TownPlan(spec.seed)
     places = Town(scene, plan, spec).build()
     add_light(scene, spec)

@@ -112,7 +112,6 @@ def round_generator(spec: Spec) -> random.Random:
 
 
 def town_drive(plan: TownPlan, spec: Spec) -> HillyDrive:
-    """The drive of one round."""
     rng = round_generator(spec)
     apart = rng.uniform(1.4, 2.1)  # the wobble of both passes comes on top
     path = plan.path(LANE_M + apart / 3, LANE_M - apart * 2 / 3).wobbled(.12, rng)

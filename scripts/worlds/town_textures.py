@@ -79,7 +79,6 @@ class HousePainter:
         return self._finished(wall)
 
     def side(self, width_m: float, floors: int) -> Wall:
-        """Another wall: fewer windows, ivy or stains."""
         wall = self._bare(width_m, floors)
         for level in range(floors):
             if level or self._plan.random() < .8:
@@ -105,7 +104,6 @@ class HousePainter:
         return Wall(rgb)
 
     def _add_plaster(self, rgb: Array) -> None:
-        """Stains and patches of newer plaster."""
         for _ in range(rgb.shape[1] // 25 + 2):
             top, left = self._noise.integers(0, rgb.shape[0]), self._noise.integers(0, rgb.shape[1])
             height, width = self._noise.integers(6, 50, 2)
@@ -120,7 +118,6 @@ class HousePainter:
         rgb[::5] = rgb[::5] * .6 + .12
 
     def _add_timber(self, rgb: Array) -> None:
-        """Dark beams, some of them askew."""
         beam = np.array([.09, .05, .03])
         height, width = rgb.shape[:2]
         floor = int(FLOOR_M * PIXELS_PER_METRE)
@@ -138,7 +135,6 @@ class HousePainter:
                     rgb[rows[keep], diagonal[keep] + thick] = beam
 
     def _add_panel(self, rgb: Array) -> None:
-        """Boards, upright."""
         width = int(self._plan.uniform(.15, .5) * PIXELS_PER_METRE)
         boards = np.repeat(self._noise.uniform(.8, 1.2, math.ceil(rgb.shape[1] / width)), width)[:rgb.shape[1]]
         rgb *= boards[None, :, None] ** 2
@@ -197,7 +193,6 @@ class HousePainter:
         box_of(rgb, middle + .85, 1.0, middle + 1.25, 1.3)[:] = np.array(plan.choice(_PAINTS)) * 1.2
 
     def _add_shop(self, wall: Wall, width_m: float) -> None:
-        """A window over the whole front, a sign above it, things on display."""
         plan, rgb = self._plan, wall.rgb
         sign = box_of(rgb, .3, 2.15, width_m - .3, 2.75)
         ink, paper = np.array(plan.choice(_PAINTS)), plan.uniform(.5, .85)
@@ -248,7 +243,6 @@ class HousePainter:
 
 
 def roof_tiles(noise: np.random.Generator, rgb: Tuple[float, float, float]) -> Array:
-    """6.4 m of tiles, seen from above."""
     size, tile = 256, 8
     tone = np.kron(noise.uniform(.65, 1.3, (size // tile, size // tile)), np.ones((tile, tile)))
     tone *= .6 + .8 * fractal(size, size, noise, 5)
@@ -259,7 +253,6 @@ def roof_tiles(noise: np.random.Generator, rgb: Tuple[float, float, float]) -> A
 
 
 def stones(noise: np.random.Generator) -> Array:
-    """A wall of rough stones, 6.4 x 1.6 m."""
     rgb = np.full((64, 256, 3), .12)
     for top in range(0, 64, 11):
         left = -int(noise.integers(0, 12))
@@ -271,13 +264,11 @@ def stones(noise: np.random.Generator) -> Array:
 
 
 def hedge(noise: np.random.Generator) -> Array:
-    """A clipped hedge, 6.4 x 1.6 m."""
     shade = fractal(64, 256, noise, 7) * noise.random((64, 256)) ** 1.5 * 2.2
     return (shade[..., None] * np.array([.1, .24, .05]) + .008).clip(0, 1).astype(np.float32)
 
 
 def slabs(noise: np.random.Generator) -> Array:
-    """A pavement of slabs, 1.6 m across and 12.8 m along."""
     tone = np.kron(noise.uniform(.75, 1.15, (40, 5)), np.ones((13, 13)))[:512, :64]
     tone[::13] *= .55
     tone[:, ::13] *= .55

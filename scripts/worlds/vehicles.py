@@ -82,7 +82,6 @@ class Parking:
 
 
 def add_person(batch: Batch, foot: Corner, yaw: float, rng: random.Random) -> None:
-    """Legs, a coat, arms, a head."""
     x, y, z = foot
     coat, trousers = (meshes.flat_material([rng.uniform(.02, .5) for _ in range(3)], 'clothes') for _ in range(2))
     skin = meshes.flat_material((.5, .33, .25), 'skin')

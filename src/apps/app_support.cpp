@@ -102,7 +102,7 @@ void ProgressBar::show(std::size_t done, std::size_t total) {
   std::fflush(stderr);
 }
 
-/// From the pace so far; nothing while that says little.
+/// Nothing while the pace so far says little.
 std::string ProgressBar::timeLeft(std::size_t done, std::size_t total) const {
   if (done == 0) return "";
   const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();

@@ -9,7 +9,6 @@
 
 #include "base/files.h"
 
-/// What several programs share.
 namespace visual_localization::apps {
 
 /// The command line asks for something that makes no sense; the program ends with exit code 2.
@@ -18,24 +17,24 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Writes one line to standard error: names and texts from outside may have control characters or no end.
+/// One line on standard error: names and texts from outside may have control characters or no end.
 void warn(const std::string& text);
 
 /// Throws UsageError, naming the option, when the file to write is one of the files to read.
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 
-/// Files that belong together, in a folder of their own: all of them, or none and no folder either.
+/// Files in a folder of their own: all of them, or none and no folder either.
 class NewFolder {
  public:
-  /// Makes the folder unless it is there and empty. Throws FileError when it cannot or something is in it.
+  /// Throws FileError unless the folder can be made or is empty.
   explicit NewFolder(std::string path);
   ~NewFolder();
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
 
-  /// Another file in it, empty. Throws FileError.
+  /// Throws FileError.
   PartialFile& add(const std::string& name);
-  /// Puts all files in their places. Throws FileError.
+  /// Throws FileError.
   void commit();
 
  private:
@@ -51,12 +50,11 @@ class NewFolder {
 /// "1.2 kB", "3.4 MB".
 std::string humanSize(double bytes);
 
-/// Runs a script that is installed beside this program with these arguments, and shows its warnings. Throws
-/// std::runtime_error, in one line, with the last line that the script wrote to its standard error.
+/// Runs a script that is installed beside this program, and shows its warnings. Throws std::runtime_error with the last
+/// line of its standard error.
 void runScript(const std::string& name, const std::vector<std::string>& arguments);
 
-/// A line on standard error that shows how far a long step is and how long it will take. It appears only on a terminal
-/// and only when the step takes more than two seconds, and leaves nothing behind.
+/// A line on standard error, on a terminal only, for steps that take more than two seconds; it leaves nothing behind.
 class ProgressBar {
  public:
   explicit ProgressBar(std::string label);

@@ -45,7 +45,7 @@ std::string sessionName(const std::string& bag, const std::vector<PlottedSession
   return unusedName(oneLine(std::filesystem::path(bag).stem().string()), used);
 }
 
-/// An image that cannot be decoded is worth one line the first time, and is counted.
+/// One line the first time, then counted.
 cv::Mat decode(const BagImage& image, const std::string& where, bool& warned) {
   try {
     return image.decode();
@@ -71,8 +71,7 @@ void addImages(MapBuilder& builder, const BagReader& bag, const std::string& top
   }
 }
 
-/// The receiver that the parameter names, or the one with the most usable fixes. What is worth a line goes to
-/// `remarks`.
+/// The one that the parameter names, or the one with the most usable fixes. What is worth a line goes to `remarks`.
 Receiver receiverOf(const BagReader& bag, const MapBuilderOptions& options, const MapBuilderConfig& config,
                     std::vector<Remark>& remarks) {
   std::vector<Receiver> receivers = bag.receivers(options.fix_topic);
@@ -102,7 +101,7 @@ Receiver receiverOf(const BagReader& bag, const MapBuilderOptions& options, cons
                  ", and no frames in the bag tell it: half a mounting would bend every turn; give both");
 }
 
-/// That of the parameters, or of the frames in the bag. How it was found goes to `remarks`.
+/// Of the parameters, or of the frames in the bag. How it was found goes to `remarks`.
 std::optional<SensorMount> mountOf(const BagReader& bag, const MapBuilderOptions& options,
                                    const MapBuilderConfig& config, const std::string& antenna_frame,
                                    std::vector<Remark>& remarks) {
@@ -127,7 +126,7 @@ std::optional<SensorMount> mountOf(const BagReader& bag, const MapBuilderOptions
   return found->mount;
 }
 
-/// That of the option, or of the bag.
+/// Of the option, or of the bag.
 SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options,
                        const std::optional<SensorMount>& mount) {
   SessionCamera camera;
@@ -239,7 +238,6 @@ void printMerged(const MergedMap& map) {
   }
 }
 
-/// The first one stays.
 void printAllMerged(const std::vector<MergedMap>& merged) {
   std::cout << oneLine(merged.front().name) << ": " << merged.front().images << " images, the reference\n";
   for (std::size_t k = 1; k < merged.size(); ++k) printMerged(merged[k]);
@@ -264,7 +262,6 @@ MapBuilder builderFor(const TrainingMap& map, const MapBuilderOptions& options, 
   return MapBuilder(config, {options.threads, output}, MapBase{map.header().datum, map.header().image_size});
 }
 
-/// Sessions as a map of their own.
 void saveSessions(MapBuilder& builder, const MapBuilderOptions& options, const MapBuilderConfig& config,
                   const std::vector<PlottedSession>& sessions, const PartialFile& file) {
   {
@@ -274,7 +271,7 @@ void saveSessions(MapBuilder& builder, const MapBuilderOptions& options, const M
   printReport(options, builder.report(), config.geometry, sessions);
 }
 
-/// What `file` has, as a map beside `map`; see addDrive for `usage`.
+/// Merges `file` beside `map`; see addDrive for `usage`.
 void mergeAndCull(const NamedMap& map, const std::string& name, const PartialFile& file, const MapUsage& usage,
                   const std::string& output, const std::string& edit, std::size_t threads) {
   const PartialFile merged(output);

@@ -60,7 +60,7 @@ void printMount(const SessionImages& session) {
   std::cout << session.name << ": " << describe(*session.camera.mount) << '\n';
 }
 
-/// Nothing for what the images do not tell.
+/// Empty for what the images do not tell.
 std::string plusMinus(double sigma) {
   if (sigma == 0.0) return " (the images do not tell it better)";
   std::ostringstream out;
@@ -104,7 +104,6 @@ void printGeometry(const SessionImages& session, const GeometryConfig& config) {
   std::cout << std::setprecision(1);
 }
 
-/// What one session brought, and whether its images were distorted to fit.
 void printImages(const SessionImages& session, cv::Size in_map) {
   std::cout << session.name << ": " << session.kept << " images";
   if (session.kept != 0) std::cout << " of " << session.recorded.width << 'x' << session.recorded.height << " px";
@@ -120,7 +119,7 @@ void printImages(const SessionImages& session, cv::Size in_map) {
   std::cout << '\n';
 }
 
-/// Images that do not have the size of most, as a camera gives them that changes its mode or starts.
+/// As of a camera that changes its mode or starts.
 void printOtherSizes(const SessionImages& session) {
   constexpr std::size_t kMostNamed = 4;
   if (session.other_sizes.empty()) return;
@@ -145,7 +144,6 @@ std::size_t fixesKept(const MapBuildReport& report) {
   return kept;
 }
 
-/// What recordings rarely have.
 void printIfAny(std::size_t images, const char* what) {
   if (images > 0) std::cout << ", " << images << ' ' << what;
 }
@@ -203,7 +201,6 @@ void printSummary(const MapBuilderOptions& options, const MapBuildReport& report
 
 namespace {
 
-/// What each session disagrees about, in one line.
 std::vector<std::string> disagreementsOf(const MapBuildReport& report, const std::vector<PlottedSession>& sessions) {
   std::vector<std::string> found;
   for (const PlottedSession& session : sessions) {

@@ -31,7 +31,7 @@ constexpr int kMostMaps = 100'000;
 constexpr double kLeastSpacing_m = 0.01;
 constexpr double kMostSpacing_m = 1000.0;
 
-/// "I/N" as part I of N; nothing for anything else.
+/// Nothing for anything but "I/N".
 std::optional<Shard> shardOf(const std::string& text) {
   Shard shard;
   const char* const end = text.data() + text.size();
@@ -42,7 +42,7 @@ std::optional<Shard> shardOf(const std::string& text) {
   return count.ec == std::errc() && count.ptr == end && possible ? std::optional<Shard>(shard) : std::nullopt;
 }
 
-/// Whether a path ends as a picture that plot_map.py can write.
+/// For plot_map.py.
 bool isPicture(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
@@ -50,7 +50,6 @@ bool isPicture(const std::string& path) {
   return ending == ".png" || ending == ".svg" || ending == ".pdf";
 }
 
-/// Refuses a value, with the requirement, unless the predicate holds.
 CLI::Validator must(bool (*allowed)(const std::string&), const std::string& requirement) {
   const auto check = [allowed, requirement](const std::string& value) {
     return allowed(value) ? std::string() : "'" + oneLine(value) + "' is not allowed: must " + requirement;
@@ -61,7 +60,6 @@ CLI::Validator must(bool (*allowed)(const std::string&), const std::string& requ
 /// CLI11 reads -1 as a huge index.
 bool isNotNegative(const std::string& text) { return text.rfind('-', 0) != 0; }
 
-/// Of a camera whose calibration is not in the recording.
 template <class Options>
 void declareCamera(CLI::App& app, Options& options, const std::string& otherwise) {
   app.add_option("--camera-info", options.camera_info,
@@ -69,7 +67,6 @@ void declareCamera(CLI::App& app, Options& options, const std::string& otherwise
   app.add_option("--mask", options.mask, "Grey PNG of the camera's size: features are used where it is white");
 }
 
-/// Where sessions come from.
 void declareRecordings(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--bag", options.bags, "Recording; repeat it for more sessions in one map")
       ->required()
@@ -108,7 +105,6 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
       ->check(must(isPicture, "end in .png, .svg or .pdf"));
 }
 
-/// One of map_edit's commands, on one map.
 CLI::App& declareCommand(CLI::App& app, MapEditOptions& options, const char* name, const char* what) {
   CLI::App& command = *app.add_subcommand(name, what);
   command.callback([&options, name] { options.command = name; });
@@ -255,7 +251,7 @@ int runBody(const CLI::App& app, void (*body)(const Options&), const Options& op
   }
 }
 
-/// Where memory is refused, also to a thread of a library, or to what would report it.
+/// Also to a thread of a library, or to what would report it.
 [[noreturn]] void endWithoutMemory() {
   constexpr char kWords[] = "out of memory\n";
   const bool refused = std::current_exception() != nullptr;
@@ -263,8 +259,7 @@ int runBody(const CLI::App& app, void (*body)(const Options&), const Options& op
   refused ? ::_exit(kFailedRun) : std::abort();
 }
 
-/// Ends the process at once: a thread of a library that waits for memory (OpenBLAS) would hold its end up for ever. A
-/// sanitizer has a last word.
+/// At once: a thread of a library that waits for memory (OpenBLAS) would hold the end up for ever.
 int ended(int code) {
   std::cout.flush();
   std::cerr.flush();

@@ -9,10 +9,10 @@
 #include "evaluation/evaluator.h"
 #include "survey/map_survey.h"
 
-/// The command lines of the programs. CLI11, which takes seconds to compile, is included by command_line.cpp alone.
+/// CLI11, which takes seconds to compile, is included by command_line.cpp alone.
 namespace visual_localization::apps {
 
-/// All processor cores, at least 1.
+/// At least 1.
 std::size_t allCores();
 
 struct MapBuilderOptions {
@@ -91,9 +91,8 @@ struct EvaluateOptions {
   bool no_report = false;
 };
 
-/// The main function of a program: reads its command line, runs `body` and returns the exit code: 0, 1 after a failed
-/// run, 2 for bad usage. Whatever goes wrong becomes one line on standard error. Unfinished output disappears, also
-/// when the program is interrupted.
+/// Reads the command line, runs `body` and returns the exit code: 0, 1 after a failed run, 2 for bad usage. Whatever
+/// goes wrong becomes one line on standard error. Unfinished output disappears, also when interrupted.
 int runProgram(int argc, char** argv, void (*body)(const MapBuilderOptions& options));
 int runProgram(int argc, char** argv, void (*body)(const MapEditOptions& options));
 int runProgram(int argc, char** argv, void (*body)(const MapInfoOptions& options));

@@ -33,7 +33,7 @@ std::string bagPath(const EvaluateOptions& options, const RoundSpec& round) {
 
 constexpr std::size_t kLargestBeside_bytes = std::size_t{64} << 20U;  ///< a calibration, or poses
 
-/// Of small files, to notice that one was edited (FNV-1a, 64 bits).
+/// To notice that a small file was edited (FNV-1a, 64 bits).
 std::string fingerprintOf(const std::string& path) {
   std::uint64_t hash = 14695981039346656037U;
   for (const char c : readFile(path, kLargestBeside_bytes))
@@ -41,8 +41,7 @@ std::string fingerprintOf(const std::string& path) {
   return std::to_string(hash);
 }
 
-/// What besides the configuration decides about the results: the bags, by their sizes, the files beside them, and this
-/// version.
+/// What besides the configuration decides about the results: sizes of the bags, the files beside them, this version.
 std::string provenanceOf(const Experiment& experiment, const EvaluateOptions& options) {
   std::string text = std::string("what,value\npackage_version,") + VISUAL_LOCALIZATION_VERSION + "\nunit_format," +
                      std::to_string(kUnitFormat) + "\n";

@@ -152,7 +152,7 @@ void print(const ErrorStatistics& errors) {
               errors.mean_m, errors.median_m, 100.0 * errors.within_5m, errors.count);
 }
 
-/// One image; nothing when it cannot be used: that does not end the run, and the first reason is kept.
+/// Nothing when it cannot be used: that does not end the run, and the first reason is kept.
 std::optional<Estimate> localizeImage(const BagImage& image, std::size_t index, Localizer& localizer,
                                       std::string& reason) {
   std::string refusal;
@@ -167,7 +167,7 @@ std::optional<Estimate> localizeImage(const BagImage& image, std::size_t index, 
   return std::nullopt;
 }
 
-/// Size of the first image that can be decoded; nothing when none can.
+/// Of the first image that can be decoded.
 std::optional<cv::Size> recordedSize(const BagImages& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     try {
@@ -178,7 +178,7 @@ std::optional<cv::Size> recordedSize(const BagImages& images) {
   return std::nullopt;
 }
 
-/// Where the drive's robot carries its camera: as the parameter says, the bag, or the map.
+/// By the parameter, the bag, or the map.
 void setMount(const LocalizeOptions& options, const NodeConfig& config, const BagReader& bag, Localizer& localizer) {
   std::optional<RobotMount> found;
   if (!config.camera_mount.empty()) {
@@ -194,8 +194,7 @@ void setMount(const LocalizeOptions& options, const NodeConfig& config, const Ba
               config.base_frame_id.c_str(), found->said.c_str());
 }
 
-/// Gives the localizer the camera and the mask that belong to the drive: those of the options, the calibration in the
-/// bag, or the map's. Says which.
+/// Of the options, the calibration in the bag, or the map. Says which.
 void setCamera(const LocalizeOptions& options, const NodeConfig& config, const BagReader& bag, const BagImages& images,
                Localizer& localizer) {
   const std::optional<cv::Size> size = recordedSize(images);
@@ -222,7 +221,7 @@ void setCamera(const LocalizeOptions& options, const NodeConfig& config, const B
   if (!other.empty()) std::printf("camera: not the map's: %s\n", other.c_str());
 }
 
-/// A metric pose of the robot, as a fix: it is as good as pose and map together.
+/// As good as pose and map together.
 Fix toFix(const Estimate& estimate) {
   Fix fix{estimate.stamp_ns, estimate.pose.geodetic, true};
   fix.sigma_m = std::sqrt(0.5 * estimate.pose.covariance_m2.trace());
@@ -241,7 +240,7 @@ void requireExtension(const LocalizeOptions& options, const LocalizerConfig& con
   const PartialFile attempt(options.extend);
 }
 
-/// The same, once map and camera are there.
+/// Once map and camera are there.
 void requireExtensible(const LocalizeOptions& options, const Localizer& localizer,
                        const std::shared_ptr<const TrainingMap>& map) {
   if (options.extend.empty()) return;
@@ -252,7 +251,6 @@ void requireExtensible(const LocalizeOptions& options, const Localizer& localize
   requireNewRecording(options.bag, options.image_topic, {options.map, map});
 }
 
-/// The map with the drive in it.
 void extend(const LocalizeOptions& options, const Localizer& localizer, std::vector<Fix> poses, const MapUsage& usage) {
   if (poses.empty()) throw std::runtime_error("--extend: no verified pose, so nothing to add to " + options.map);
   const OutputLock lock(options.extend);
@@ -280,8 +278,8 @@ OdometryFeed odometryOf(const LocalizeOptions& options, const NodeConfig& config
 struct DriveResult {
   std::string track = trackCsvHeader();
   Totals totals;
-  std::string first_refusal;     ///< of an image that cannot be used
-  std::vector<double> errors_m;  ///< of images with a true position
+  std::string first_refusal;  ///< of an image that cannot be used
+  std::vector<double> errors_m;
   MapUsage usage;
   std::vector<Fix> verified;  ///< poses
 

@@ -31,7 +31,7 @@ const char* const kHelp =
     "  --map-builder-config  config/map_builder.yaml, the same for the map builder\n\n"
     "Topics, services and parameters: doc/node.md and config/localizer.yaml.\n";
 
-/// Arguments that are not for ROS, without the program's name.
+/// Not for ROS, without the program's name.
 std::vector<std::string> ownArguments(int argc, char** argv) {
   std::vector<std::string> arguments;
   ros::removeROSArgs(argc, argv, arguments);

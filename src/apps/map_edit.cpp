@@ -55,7 +55,7 @@ void mergeFiles(const MapEditOptions& options) {
   mergeInto(options.output, maps, provenance(kProgram, options.command, names), options.build.threads);
 }
 
-/// What `read` makes of a file, which is named when it makes nothing of it.
+/// Names the file when `read` makes nothing of it.
 template <class Error, class Read>
 auto readWith(const std::string& path, Read read) {
   try {
@@ -85,7 +85,6 @@ void addBags(const MapEditOptions& options) {
               options.output, provenance(kProgram, options.command, from));
 }
 
-/// A new map of some images of one.
 template <class Choose>
 void select(const MapEditOptions& options, const std::vector<std::string>& inputs, Choose choose,
             const std::function<void(TrainingImage&)>& change = {}) {

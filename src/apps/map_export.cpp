@@ -38,10 +38,9 @@ double rounded(double value, int digits) {
   return std::strtod(text.data(), nullptr);
 }
 
-/// A length or an angle.
 double rounded(double value) { return rounded(value, 6); }
 
-/// Which images are ambiguous; empty when that was not checked.
+/// Empty when that was not checked.
 std::vector<bool> ambiguousImages(const TrainingMap& map, const MapFindings& findings) {
   std::vector<bool> ambiguous(findings.ambiguity ? map.size() : 0, false);
   if (!findings.ambiguity) return ambiguous;
@@ -61,13 +60,13 @@ json feature(const std::string& type, json where, json properties) {
           {"properties", std::move(properties)}};
 }
 
-/// Successive positions as a line, which has at least two.
+/// Of at least two positions.
 json line(json positions, json properties) {
   if (positions.size() == 1) positions.push_back(positions.front());
   return feature("LineString", std::move(positions), std::move(properties));
 }
 
-/// The features of a map, one a line, so that a large map is never a tree in memory.
+/// One feature a line, so that a large map is never a tree in memory.
 class FeatureCollection {
  public:
   void add(const json& feature) {
@@ -195,7 +194,7 @@ json toJson(const std::vector<Eigen::Vector2d>& positions_m) {
   return all;
 }
 
-/// Where a fix is drawn: one without usable coordinates where the robot was.
+/// One without usable coordinates where the robot was.
 std::optional<Eigen::Vector2d> positionOf(const Fix& fix, FixVerdict verdict, const Trajectory& path,
                                           const LocalFrame& frame) {
   if (verdict != FixVerdict::kNoFix && isValid(fix.position)) return frame.toEastNorth(fix.position);
@@ -215,7 +214,7 @@ json fixesOf(const PlottedSession& session, FixVerdict verdict, const LocalFrame
   return {{"count", count}, {"positions_m", positions}};
 }
 
-/// Where the path was left open, nothing was driven as far as the map knows: it has nothing between two points.
+/// Nothing between two points where the path was left open.
 json pathsOf(const Trajectory& trajectory) {
   const std::vector<TrajectoryPoint>& points = trajectory.points();
   json paths = json::array();
@@ -270,7 +269,7 @@ namespace {
 
 constexpr double kColmapPixel = 0.5;  ///< COLMAP's centre of the upper left pixel, in either axis
 
-/// The name of COLMAP's lens model and how many coefficients it has, in the order of sensor_msgs/CameraInfo.
+/// Name of COLMAP's lens model and number of coefficients, in the order of sensor_msgs/CameraInfo.
 std::pair<const char*, std::size_t> colmapLens(const CameraModel& camera) {
   const std::vector<double>& k = camera.intrinsics().coefficients;
   if (camera.intrinsics().distortion == Distortion::kEquidistant) return {"OPENCV_FISHEYE", 4};

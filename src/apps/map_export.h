@@ -32,7 +32,7 @@ class ColmapModel {
   explicit ColmapModel(const TrainingMap& map);
 
   std::string cameras();
-  /// Its two lines; none for an image without geometry. Throws std::runtime_error when its features cannot be read.
+  /// Two lines; none for an image without geometry. Throws std::runtime_error when its features cannot be read.
   std::string image(std::size_t i);
   std::string points();
   ColmapSummary summary() const { return summary_; }
@@ -62,20 +62,20 @@ struct MapFindings {
   std::optional<AmbiguousPlaces> ambiguity;  ///< only if it was checked
 };
 
-/// What a person wants to know about a map before a drive: sessions, coverage, density, headings and where it is weak.
-/// `path` is the map's file. However large the map, a few dozen lines.
+/// Sessions, coverage, density, headings and where the map is weak: a few dozen lines, however large the map. `path` is
+/// the map's file.
 void printMapReport(std::ostream& out, const std::string& path, const TrainingMap& map, const MapFindings& findings);
 
-/// One line per image. `weak` is 1 for few features, `ambiguous` 1 for an image that looks like one far away and empty
-/// when that was not checked.
+/// One line per image. `weak` is 1 for few features, `ambiguous` 1 for an image that looks like one far away, empty
+/// when not checked.
 std::string toCsv(const TrainingMap& map, const MapFindings& findings);
 
-/// The path of each session, weak stretches and gaps as lines, the images as points; WGS84.
+/// Paths, weak stretches and gaps as lines, images as points; WGS84.
 std::string toGeoJson(const TrainingMap& map, const MapFindings& findings);
 
-/// Writes a COLMAP text model into a folder that is new or empty: a camera for each calibrated session, the images with
-/// a geometry as SESSION/STAMP.png, the landmarks as points, in metres of the map frame. Throws std::runtime_error, in
-/// one line, when something is in the folder, the map has no landmarks or cannot be read; then it leaves nothing.
+/// Into a folder that is new or empty: a camera for each calibrated session, images with a geometry as
+/// SESSION/STAMP.png, landmarks as points, metres of the map frame. Throws std::runtime_error, in one line, when
+/// something is in the folder, the map has no landmarks or cannot be read; then it leaves nothing.
 ColmapSummary writeColmap(const TrainingMap& map, const std::string& folder);
 
 /// What the builder has to say of a recording, in one line.
@@ -94,16 +94,15 @@ struct PlottedSession {
   std::vector<Remark> remarks = {};
 };
 
-/// Gives the sessions, which are those of `map` in its order, their images and landmarks: at most 20000 of these.
+/// Sessions are those of `map` in its order; at most 20000 landmarks.
 void addMap(const TrainingMap& map, std::vector<PlottedSession>& sessions);
 
-/// What plot_map.py draws, as JSON: {"sessions": [{"name", "fixes": {verdict: {"count", "positions_m"}},
-/// "paths_m": [[[east, north], ...], ...], "length_m", "gaps_closed", "images_m", "landmarks_m"}, ...]}. A fix without
-/// coordinates lies on the path; one beyond its ends has none. A path that was left open has several parts.
+/// JSON for plot_map.py: {"sessions": [{"name", "fixes": {verdict: {"count", "positions_m"}}, "paths_m": [[[east,
+/// north], ...], ...], "length_m", "gaps_closed", "images_m", "landmarks_m"}, ...]}. A fix without coordinates lies on
+/// the path; one beyond its ends has none.
 std::string mapPlotJson(const std::vector<PlottedSession>& sessions, const LocalFrame& frame);
 
-/// Draws the sessions with plot_map.py into a PNG, SVG or PDF, by the ending of `path`: written whole or not at all.
-/// Throws std::runtime_error, in one line.
+/// PNG, SVG or PDF by the ending of `path`, whole or not at all. Throws std::runtime_error, in one line.
 void drawMapPlot(const std::string& path, const std::vector<PlottedSession>& sessions, const LocalFrame& frame);
 
 }  // namespace visual_localization::apps

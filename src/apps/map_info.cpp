@@ -19,14 +19,13 @@ AmbiguousPlaces lookForAmbiguousPlaces(const TrainingMap& map) {
   return findAmbiguousPlaces(map, {}, [&bar](std::size_t done, std::size_t total) { bar.show(done, total); });
 }
 
-/// How many images to look at for landmarks: all where that is asked for or they are in memory.
+/// All where that is asked for or they are in memory.
 std::size_t mostImages(const MapInfoOptions& options) {
   constexpr std::size_t kMostOfALargeMap = 2000;
   const bool in_memory = std::filesystem::file_size(options.map) <= MapLoading().cache_bytes;
   return options.check || in_memory ? std::numeric_limits<std::size_t>::max() : kMostOfALargeMap;
 }
 
-/// In the folder that was asked for; the line that says so.
 std::string exportColmap(const TrainingMap& map, const std::string& folder) {
   const ColmapSummary model = writeColmap(map, folder);
   std::ostringstream text;

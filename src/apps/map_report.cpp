@@ -17,8 +17,6 @@
 namespace visual_localization::apps {
 namespace {
 
-// How map_info writes names, times, lengths and positions.
-
 constexpr std::size_t kLongestName = 40;
 constexpr int kKeyWidth = 13;
 
@@ -39,12 +37,11 @@ std::string key(const std::string& name) {
   return text;
 }
 
-/// Of a session, not too long.
 std::string nameOf(const TrainingMap& map, int session) {
   return oneLine(map.header().sessions[static_cast<std::size_t>(session)].name, kLongestName);
 }
 
-/// When a session was recorded, UTC. The end on the same day needs no date.
+/// UTC; the end on the same day needs no date.
 std::string spanOf(const SessionSurvey& session) {
   const char* const date = "%Y-%m-%d";
   const bool same_day = timeOf(session.first_ns, date) == timeOf(session.last_ns, date);
@@ -82,7 +79,7 @@ constexpr std::size_t kMostStretches = 8;
 constexpr std::array<const char*, kOctants> kCompass{"east", "north-east", "north", "north-west",
                                                      "west", "south-west", "south", "south-east"};
 
-/// Whether the localizer will have all of it in memory unless told otherwise.
+/// Unless told otherwise.
 std::string whereItsFeaturesAre(double file_bytes) {
   return file_bytes <= static_cast<double>(MapLoading().cache_bytes)
              ? "features are read at start"
@@ -219,7 +216,7 @@ void printDensity(std::ostream& out, const TrainingMap& map, const MapFindings& 
   }
 }
 
-/// The longest stretches, one a line, with whatever `more` says about them.
+/// One a line, with whatever `more` says about them.
 template <class More>
 void printStretches(std::ostream& out, const TrainingMap& map, std::vector<Stretch> stretches, More more) {
   std::stable_sort(stretches.begin(), stretches.end(),

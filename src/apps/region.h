@@ -17,8 +17,8 @@ class RegionError : public std::runtime_error {
 /// Polygons on the earth, with holes.
 class Region {
  public:
-  /// Every Polygon and MultiPolygon in a GeoJSON text (RFC 7946): a geometry, a feature or a collection. Throws
-  /// RegionError when the text is no GeoJSON, has none, or one is no simple polygon.
+  /// Every Polygon and MultiPolygon of a GeoJSON text (RFC 7946). Throws RegionError when there is none, or one is no
+  /// simple polygon.
   explicit Region(const std::string& geojson);
   ~Region();
   Region(const Region&) = delete;

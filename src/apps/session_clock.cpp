@@ -17,8 +17,7 @@
 namespace visual_localization::apps {
 namespace {
 
-/// Below this an antenna ahead of or behind the wheels looks the same: 2 m at the 5 m/s of a car that turns. An
-/// adjustment of a calibrated session finds the rest.
+/// Below this an antenna ahead of the wheels looks the same: 2 m at 5 m/s. An adjustment finds the rest.
 constexpr double kSmallestOffset_s = 0.4;
 using Paths = std::vector<std::vector<StampedPosition>>;
 
@@ -56,8 +55,7 @@ void requireCommonTime(const BagReader& bag, const BagImages& images, const Time
                  " between their first stamps: two clocks, or two recordings");
 }
 
-/// What the fixes say where the robot was: all of them, and those alone that cleaning believes. It may take turns for
-/// errors, and errors hide turns.
+/// Of all fixes, and of those alone that cleaning believes: it may take turns for errors, and errors hide turns.
 Paths pathsOf(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
   std::vector<double> latitudes_deg;
   std::vector<double> longitudes_deg;
@@ -134,7 +132,6 @@ std::optional<ClockOffset> offsetOf(const std::vector<PictureShift>& pictures, c
   return best;
 }
 
-/// The same for the pictures of some time.
 std::optional<ClockOffset> offsetWithin(const std::vector<PictureShift>& pictures, const Paths& paths,
                                         std::int64_t from_ns, std::int64_t to_ns) {
   std::vector<PictureShift> part;
@@ -144,7 +141,7 @@ std::optional<ClockOffset> offsetWithin(const std::vector<PictureShift>& picture
   return offsetOf(part, paths);
 }
 
-/// Where a clock has stepped, if it has: within the longest pause of the images, or in their middle.
+/// Within the longest pause of the images, or in their middle.
 std::int64_t likelyStep_ns(const std::vector<PictureShift>& pictures) {
   constexpr double kPause_s = 10.0;
   const auto longest = std::max_element(pictures.begin(), pictures.end(), [](const auto& a, const auto& b) {
@@ -168,7 +165,6 @@ std::optional<Remark> stepOf(const std::vector<PictureShift>& pictures, const Pa
                 true};
 }
 
-/// Pictures turn with the path.
 bool agrees(const std::optional<ClockOffset>& found) { return found && (!found->along_rows || found->width_rad > 0.0); }
 
 /// Exchanged coordinates make the mirror image of a path, stretched.

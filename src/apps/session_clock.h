@@ -17,15 +17,14 @@ struct ClockCheck {
   Remark remark;
 };
 
-/// Compares turns of the path with turns of the pictures, which it reads once for that, at most four a second. Throws
-/// BagError, with both ranges of time, when fixes and images have none in common.
+/// Compares turns of the path with turns of the pictures, of which it reads at most four a second. Throws BagError,
+/// with both ranges of time, when fixes and images have none in common.
 ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::vector<Fix>& fixes,
                       const MapBuilderConfig& config, const std::optional<SensorMount>& mount, std::size_t threads);
 
-/// Where the stamps of the fixes pause for longer than cleaning bridges, or go back: one line each, of the first few.
+/// One line each, of the first few pauses longer than cleaning bridges and of stamps that go back.
 std::vector<Remark> breaksOf(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config);
 
-/// The fixes as they should have been.
 std::vector<Fix> putRight(std::vector<Fix> fixes, const ClockCheck& check);
 
 }  // namespace visual_localization::apps

@@ -29,7 +29,6 @@ std::string field(const Fields& fields, const char* name) {
   return found->second;
 }
 
-/// A number of four bytes.
 std::uint32_t word(const Fields& fields, const char* name) {
   return static_cast<std::uint32_t>(number(fields, name, 4));
 }
@@ -79,7 +78,7 @@ bool unpacksLz4(std::string& packed, std::size_t size, std::string& unpacked) {
   return result == ROSLZ4_OK && count == size;
 }
 
-/// Step by step: a few bytes may stand for any number, so memory follows what is there, not what is claimed.
+/// A few bytes may stand for any number, so memory follows what is there, not what is claimed.
 bool unpacksBz2(std::string& packed, std::size_t size, std::string& unpacked) {
   constexpr std::size_t kFirst = 1U << 20U;
   bz_stream stream{};
@@ -152,7 +151,7 @@ BagFile::BagFile(std::unique_ptr<const Bytes> bytes) : file_(std::move(bytes)) {
   readSummary(header, {index_at, file_->size()});
 }
 
-/// Everything between the header and the summary: chunks, each followed by its indices.
+/// Chunks, each followed by its indices, between header and summary.
 void BagFile::readChunks(Range range) {
   Chunk* chunk = nullptr;
   std::uint64_t chunk_at = 0;
@@ -210,7 +209,7 @@ void BagFile::readIndex(const Record& record, std::uint64_t chunk_at, Chunk& chu
   }
 }
 
-/// Connections and descriptions of chunks at the end, as many as the header says.
+/// At the end, as many as the header says.
 void BagFile::readSummary(const Record& header, Range range) {
   const std::uint64_t connections = number(header.fields, "conn_count", 4);
   const std::uint64_t chunks = number(header.fields, "chunk_count", 4);
@@ -307,7 +306,7 @@ namespace {
 
 constexpr std::size_t kLength = 4;  ///< bytes of a length
 
-/// Takes a length from the beginning of `range`: where its content lies.
+/// Takes a length from the beginning of `range`; returns where its content lies.
 Range take(const Bytes& bytes, Range range, const char* what) {
   if (range.size() < kLength) {
     throw DamagedBag(std::string("ends within ") + what + " at byte " + std::to_string(range.begin));

@@ -46,14 +46,14 @@ class Bytes {
   Bytes& operator=(const Bytes&) = delete;
   virtual ~Bytes() = default;
   virtual std::uint64_t size() const = 0;
-  /// Copies `count` bytes from `offset`; they lie within size(). Throws DamagedBag when they cannot be read.
+  /// `offset` + `count` lie within size(). Throws DamagedBag when they cannot be read.
   virtual void read(std::uint64_t offset, std::size_t count, char* to) const = 0;
 };
 
 /// Those of a file. Not mapped: a file that shrinks or a disk that fails must not end the program.
 class FileBytes : public Bytes {
  public:
-  /// Throws DamagedBag when the file cannot be opened.
+  /// Throws DamagedBag.
   explicit FileBytes(const std::string& path);
   ~FileBytes() override;
   FileBytes(const FileBytes&) = delete;
@@ -92,22 +92,22 @@ struct Record {
   Range data;  ///< where it lies; behind it the next record begins
 };
 
-/// Reads the record at the beginning of `range`. Throws DamagedBag unless it lies within it with everything in it.
+/// At the beginning of `range`. Throws DamagedBag unless it lies within it.
 Record readRecord(const Bytes& bytes, Range range);
 
-/// Throws DamagedBag when there are more than `most` bytes, so that nobody makes us allocate more.
+/// Throws DamagedBag when there are more than `most` bytes: nobody makes us allocate more.
 std::string readRange(const Bytes& bytes, Range range, std::uint64_t most, const char* what);
 
-/// Reads the fields of a header without its length. Throws DamagedBag.
+/// Without its length. Throws DamagedBag.
 Fields readFields(std::string_view header);
 
-/// The longest header of a record, and the longest description of a connection, in bytes.
+/// Bytes of a record's header, and of the description of a connection.
 constexpr std::uint64_t kLongestHeader = 1U << 24U;
 
-/// A number of exactly `size` bytes, little-endian. Throws DamagedBag when the field is missing or has another size.
+/// Little-endian. Throws DamagedBag when the field is missing or has another size.
 std::uint64_t number(const Fields& fields, const std::string& name, std::size_t size);
 
-/// `size` bytes at `offset` as a little-endian number; they must exist.
+/// Little-endian; the bytes must exist.
 std::uint64_t numberAt(std::string_view bytes, std::size_t offset, std::size_t size);
 
 /// Where messages of one kind come from.
@@ -126,17 +126,10 @@ struct Message {
 };
 
 /// A bag (format 2.0) that may come from anyone: every length, offset and number in it is checked before it is used.
-/// rosbag_storage does not check them and reads beyond its buffers when they are wrong. To check them for it takes a
-/// reader like this one, and unpacks every compressed chunk once more.
-///
-/// Opening reads all records, but neither what messages hold nor compressed chunks. A chunk is unpacked and checked
-/// when one of its messages is read, and kept with others up to kMostUnpacked: a short recording is unpacked once,
-/// however often it is read. Not for several threads at a time.
-///
-/// Processor time of `map_builder --bag B.bag --min-spacing 100` for 1.0 GB of 40 700 JPEG images and their fixes,
-/// which reads all of them but extracts one image, with rosbag_storage behind a check and with this reader:
-/// uncompressed chunks 1.01 and 0.97 s, lz4 3.1 and 1.7 s, bz2 162 and 107 s. (Medians of five runs, bz2 of three; warm
-/// page cache.)
+/// rosbag_storage does not check them and reads beyond its buffers; a check in front of it would take a reader like
+/// this one and unpack every compressed chunk once more (for 1.0 GB, processor time: lz4 3.1 instead of 1.7 s, bz2 162
+/// instead of 107 s). Opening reads all records, but neither what messages hold nor compressed chunks: a chunk is
+/// unpacked and checked when one of its messages is read, and kept with others up to kMostUnpacked. Not thread-safe.
 class BagFile {
  public:
   /// `bytes`: never null. Throws DamagedBag, or UnsupportedBag when the bag has no index, is encrypted or is of another
@@ -144,11 +137,11 @@ class BagFile {
   explicit BagFile(std::unique_ptr<const Bytes> bytes);
 
   const std::map<std::uint32_t, Connection>& connections() const { return connections_; }
-  /// The messages of these connections in the order of recording.
+  /// In the order of recording.
   std::vector<Message> messages(const std::set<std::uint32_t>& connections) const;
-  /// A serialized message. Throws DamagedBag when its chunk cannot be unpacked, or does not hold what its index says.
+  /// Throws DamagedBag when the chunk cannot be unpacked, or does not hold what its index says.
   std::string read(const Message& message);
-  /// Bytes of the unpacked chunks that are kept together; a larger chunk is kept alone.
+  /// Of the unpacked chunks together; a larger chunk is kept alone.
   static constexpr std::uint64_t kMostUnpacked = 32U << 20U;
   std::uint64_t unpackedBytes() const { return unpacked_bytes_; }
 

@@ -25,7 +25,7 @@
 
 namespace visual_localization {
 
-/// Runs `read` and gives whatever it throws the path and one line.
+/// Gives whatever `read` throws the path and one line.
 template <class Read>
 auto withBag(const std::string& path, Read read) {
   try {
@@ -55,7 +55,7 @@ Topics topicsOf(const bag::BagFile& file) {
   return topics;
 }
 
-/// For error messages, the first few: "/a (sensor_msgs/Image), /b (sensor_msgs/CompressedImage)".
+/// The first few: "/a (sensor_msgs/Image), /b (sensor_msgs/CompressedImage)".
 template <class... Messages>
 std::string listTopics(const bag::BagFile& file) {
   constexpr std::size_t kLongestList = 1000;
@@ -70,7 +70,7 @@ std::string listTopics(const bag::BagFile& file) {
   return list.empty() ? "none" : list;
 }
 
-/// All messages of one topic and type. A definition that is not ours is refused rather than misread.
+/// A definition that is not ours is refused rather than misread.
 template <class Message>
 std::vector<bag::Message> messagesOf(const bag::BagFile& file, const std::string& topic) {
   const std::set<std::uint32_t> connections = topicsOf<Message>(file).at(topic);
@@ -93,7 +93,7 @@ class Cursor {
     at_ += static_cast<std::size_t>(count);
     return *this;
   }
-  /// A string or an array: four bytes of length and then as many elements of `element_bytes`.
+  /// Four bytes of length and then as many elements.
   Cursor& skipArray(std::uint64_t element_bytes = 1) {
     const std::size_t from = at_;
     skip(4);

@@ -46,7 +46,7 @@ BagImage readImage(std::string bytes, const bag::Message& from) {
   }
 }
 
-/// That of all these messages. Throws CameraError when they do not say the same.
+/// Throws CameraError when the messages do not say the same.
 std::optional<CameraModel> singleCalibration(bag::BagFile& file, const std::vector<bag::Message>& messages,
                                              bool rectified) {
   SingleCalibration calibration(rectified);

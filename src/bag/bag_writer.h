@@ -13,23 +13,22 @@
 
 namespace visual_localization {
 
-/// A bag in `folder` that is named after the local time: "session_2026-11-22-07-15-00.bag".
+/// Named after the local time: "session_2026-11-22-07-15-00.bag".
 std::string newSessionBag(const std::string& folder);
 
-/// Writes a bag (format 2.0) that is whole after every sync(), whatever happens to the process or the machine later.
-/// rosbag_storage writes the index of a bag when it is closed: what a robot recorded until its power was lost must be
-/// repaired first. Here each sync() appends a chunk and an index of all that is before it, flushes both to the disk,
-/// and only then lets the header point to that index; older indices stay in the file unused.
+/// Writes a bag (format 2.0) that is whole after every sync(), whatever happens later; rosbag_storage writes the index
+/// when the bag is closed. Each sync() appends a chunk and an index of all that is before it, flushes both, and only
+/// then lets the header point to that index.
 class BagWriter {
  public:
-  /// Creates the file, without any message. Throws FileError, also when it exists already.
+  /// Throws FileError, also when the file exists already.
   explicit BagWriter(const std::string& path);
   ~BagWriter();
   BagWriter(const BagWriter&) = delete;
   BagWriter& operator=(const BagWriter&) = delete;
 
-  /// Keeps a message for the next sync(). False, and the message is lost, when more than 64 MiB wait already.
-  /// `latched`: who plays the bag is to latch the topic.
+  /// For the next sync(). False, and the message is lost, when more than 64 MiB wait. `latched`: who plays the bag is
+  /// to latch the topic.
   template <class Message>
   bool write(const std::string& topic, const ros::Time& received, const Message& message, bool latched = false) {
     namespace traits = ros::message_traits;
@@ -41,15 +40,15 @@ class BagWriter {
     return add(kind, received, bytes);
   }
 
-  /// Puts the messages since the last sync() into the bag. Throws FileError, for instance when the disk is full: then
-  /// the bag is as it was, and the messages wait for the next sync().
+  /// Throws FileError, for instance when the disk is full: then the bag is as it was, and the messages wait for the
+  /// next sync().
   void sync();
 
-  /// Bytes of the bag so far.
+  /// Bytes.
   std::uint64_t size() const { return end_; }
   /// Bytes of the messages since the last sync().
   std::uint64_t waiting() const { return chunk_.size(); }
-  /// Bytes that the next sync() takes for its index: it grows with each.
+  /// Bytes of the index that the next sync() writes: it grows with each.
   std::uint64_t indexSize() const { return connection_records_.size() + chunk_infos_.size(); }
   const std::string& path() const { return path_; }
 

@@ -14,8 +14,8 @@
 namespace visual_localization {
 namespace {
 
-/// An odometry says where it is in a plane, not where that plane is on the earth: near latitude and longitude 0, but
-/// not there, which is what receivers send that know nothing.
+/// An odometry does not say where its plane is on the earth: near latitude and longitude 0, but not there, which is
+/// what receivers send that know nothing.
 constexpr GeodeticPoint kNowhere{0.1, 0.1, 0.0};
 constexpr int kSomeZone = 31;                 ///< of UTM, which the message does not tell
 constexpr double kLargestLocal_m = 50'000.0;  ///< a UTM northing is beyond it but for the equator
@@ -85,7 +85,6 @@ std::ptrdiff_t usable(const Receiver& receiver) {
   return std::count_if(receiver.fixes.begin(), receiver.fixes.end(), hasPosition);
 }
 
-/// For a refusal: what a topic of that name has instead.
 std::string otherTypeOf(const bag::BagFile& file, const std::string& topic) {
   for (const auto& [id, connection] : file.connections()) {
     if (connection.topic != topic) continue;

@@ -16,9 +16,8 @@ struct MountQuery {
   std::optional<std::string> antenna_frame = {};  ///< none: the camera alone
 };
 
-/// Where the robot carries camera and antenna, by the frames in the bag, or in the first of `others` that has any: a
-/// recording that is split has /tf_static in its first part alone. Nothing when none has frames. Throws BagError that
-/// names the frames when they do not tell.
+/// By the frames in the bag, or in the first of `others` that has any: a split recording has /tf_static in its first
+/// part alone. Nothing when none has frames. Throws BagError that names the frames when they do not tell.
 std::optional<RobotMount> recordedMount(const BagReader& bag, const MountQuery& query,
                                         const std::vector<std::string>& others = {});
 

@@ -124,7 +124,7 @@ class Aligner {
     return std::nullopt;
   }
 
-  /// Cameras that have seen the same: one after the other, and of sessions that were tied when the map was made.
+  /// One after the other, and of sessions that were tied when the map was made.
   std::vector<std::pair<std::size_t, std::size_t>> neighbours() const {
     std::vector<std::pair<std::size_t, std::size_t>> pairs;
     std::vector<Neighbour> near;
@@ -224,7 +224,7 @@ MapAlignment align(const TrainingMap& map, const LocalFrame& frame, const std::v
 
 namespace {
 
-/// What tells the recordings of maps apart: their first stamp and the names of their sessions.
+/// Their first stamp and the names of their sessions.
 auto ageOf(const TrainingMap& map) {
   std::int64_t first_ns = std::numeric_limits<std::int64_t>::max();
   for (std::size_t i = 0; i < map.size(); ++i) first_ns = std::min(first_ns, map.pose(i).stamp_ns);

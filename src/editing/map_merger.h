@@ -19,12 +19,12 @@
 
 namespace visual_localization {
 
-/// From the frame of one map to that of another. Both are flat, so that it is not the same everywhere.
+/// Both frames are flat, so that the change depends on the position.
 class FrameChange {
  public:
   FrameChange(const LocalFrame& from, const LocalFrame& to);
 
-  /// Of what is at this position, east and north in the first frame.
+  /// East and north in the first frame.
   PoseCorrection at(const Eigen::Vector2d& position_m) const;
 
  private:
@@ -50,10 +50,9 @@ struct MapAlignment {
   double left_m = 0.0;   ///< and after it
 };
 
-/// Lays `map` beside the `placed` ones, which stay, in `frame`: each of its images that is near one of theirs is
-/// located by their landmarks, as a live image is, and between these its own geometry holds. Where they overlap in
-/// fewer than kLeastTied images it lies where its own fixes have it. The result does not depend on the number of
-/// threads.
+/// Lays `map` beside the `placed` ones, which stay, in `frame`: images near one of theirs are located by their
+/// landmarks, and between these the map's own geometry holds. Where fewer than kLeastTied images overlap it lies where
+/// its own fixes have it. The result does not depend on the number of threads.
 MapAlignment align(const TrainingMap& map, const LocalFrame& frame, const std::vector<PlacedMap>& placed,
                    std::size_t threads, const Progress& progress = {});
 
@@ -71,7 +70,7 @@ struct NamedMap {
   std::shared_ptr<const TrainingMap> map;
 };
 
-/// The first session of which most images have a stamp that is `known`: it is the same recording.
+/// Of which most images have a stamp that is `known`: the same recording.
 std::optional<std::size_t> knownSession(const TrainingMap& map, const std::function<bool(std::int64_t)>& known);
 
 /// Where a map came to lie in the new one.
@@ -84,16 +83,15 @@ struct MergedMap {
   double left_m = 0.0;
 };
 
-/// Those of the oldest recording first, whatever the order of the arguments was.
+/// The oldest recording first, whatever the order of the arguments.
 std::vector<NamedMap> inOrderOfTime(std::vector<NamedMap> maps);
 
-/// Makes one map of several, as a file. The first one stays as it is, and its frame is that of the new map; each other
-/// one is aligned with those before it (see align). Sessions of one name get numbers. `edit`: for MapHeader::history.
-/// Throws MergeError when images or features of two maps are of another kind, when they are too far apart, or when a
-/// session is in both; MapStoreError.
+/// The first map stays as it is, and its frame is that of the new map; each other one is aligned with those before it
+/// (see align). Sessions of one name get numbers. `edit`: for MapHeader::history. Throws MergeError when images or
+/// features are of another kind, maps are too far apart, or a session is in both; MapStoreError.
 std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const std::string& path,
                                  std::size_t threads, const Progress& progress = {});
-/// The same into a file that stays the caller's: nothing is put in place.
+/// Into a file that stays the caller's: nothing is put in place.
 std::vector<MergedMap> mergeMaps(const std::vector<NamedMap>& maps, const std::string& edit, const PartialFile& file,
                                  std::size_t threads, const Progress& progress = {});
 

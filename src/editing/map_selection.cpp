@@ -21,7 +21,6 @@ namespace {
 constexpr const char* kHeader = "stamp_ns,poses,landmarks";
 constexpr int kDirections = 4;  ///< of view that are told apart at a place
 
-/// Where an image is and where it looks, as a cell.
 using Place = std::tuple<std::int64_t, std::int64_t, int>;
 
 Place placeOf(const TrainingMap& map, std::size_t image) {
@@ -35,7 +34,7 @@ Place placeOf(const TrainingMap& map, std::size_t image) {
   throw UsageFileError("line " + std::to_string(line) + ": " + reason);
 }
 
-/// The text up to `separator`, or all of it; what follows is left.
+/// Up to `separator`, or all of it; what follows is left.
 std::string_view takeField(std::string_view& text, char separator) {
   const std::size_t end = std::min(text.find(separator), text.size());
   const std::string_view field = text.substr(0, end);
@@ -161,7 +160,7 @@ void dropUnusedLandmarks(TrainingImage& image, const MapUsage& usage, const Summ
 
 namespace {
 
-/// The header with the sessions that are left, and the new number of each.
+/// With the sessions that are left, and the new number of each.
 std::pair<MapHeader, std::vector<int>> remaining(const TrainingMap& map, const std::vector<bool>& keep) {
   std::vector<bool> used(map.header().sessions.size(), false);
   for (std::size_t i = 0; i < map.size(); ++i) {

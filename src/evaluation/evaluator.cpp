@@ -26,7 +26,7 @@ constexpr std::size_t kLargestResult_bytes = std::size_t{256} << 20U;
 /// The part of an experiment's YAML that decides about results: no comments, no words for the report.
 std::string decisivePart(const std::string& yaml, const std::string& path) {
   try {
-    return parameters::withoutKeys(yaml, {"title", "source", "discussion"});
+    return parameters::withoutKeys(yaml, {"title", "source"});
   } catch (const ParameterError&) {
     throw ResultError(path + ": is damaged: not an experiment");
   }
@@ -143,7 +143,6 @@ namespace {
 
 constexpr std::size_t kLongestPart = 60;  ///< of a file name, which has at most 255 bytes
 
-/// A name as a part of a file name.
 std::string plain(std::string name) {
   const auto isPlain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.';
@@ -215,7 +214,7 @@ class Evaluation {
   }
 
   void readRounds(const std::vector<std::size_t>& pairs) {
-    std::set<std::pair<std::size_t, bool>> roles;  // round, as a map
+    std::set<std::pair<std::size_t, bool>> roles;
     for (const std::size_t pair : pairs) {
       roles.insert({experiment_.pairs[pair].map, true});
       roles.insert({experiment_.pairs[pair].drive, false});
@@ -289,8 +288,8 @@ class Evaluation {
   std::size_t threads_;
   const StageProgress& progress_;
   std::vector<RecordedRound> rounds_;
-  std::size_t done_ = 0;   ///< runs
-  std::size_t total_ = 0;  ///< runs
+  std::size_t done_ = 0;
+  std::size_t total_ = 0;
 };
 
 }  // namespace

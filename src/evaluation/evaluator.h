@@ -23,20 +23,18 @@ class ResultError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The results of an experiment on disk, one file for each method on each pair of rounds, so that interrupted work
-/// resumes and several machines may share it. Belongs to one configuration of one set of rounds.
+/// The results of one configuration on disk, one file for each method on each pair of rounds, so that interrupted work
+/// resumes and several machines may share it.
 class ResultFolder {
  public:
-  /// Creates the folder, or opens the one of an earlier call. `yaml`, but for its comments and the words for the
-  /// report, and `provenance` identify what the results are made with. Throws ResultError when the folder holds
-  /// results of something else.
+  /// Creates or opens the folder. `yaml`, but for its comments and the words for the report, and `provenance` identify
+  /// what the results are made with. Throws ResultError when the folder holds results of something else.
   ResultFolder(std::string path, const std::string& yaml, const std::string& provenance);
-  /// Opens an existing folder to read from. Throws ResultError also when it is not a folder of results.
+  /// Opens an existing folder to read from. Throws ResultError.
   static ResultFolder open(std::string path, const std::string& yaml, const std::string& provenance);
 
   const std::string& path() const { return path_; }
   bool has(std::size_t pair, std::size_t method) const;
-  /// Has it, and can load it.
   bool hasWhole(std::size_t pair, std::size_t method) const;
   /// Throws ResultError when another experiment has taken the folder in the meantime, and FileError.
   void save(std::size_t pair, std::size_t method, const UnitResult& unit) const;
@@ -55,27 +53,25 @@ class ResultFolder {
   std::string provenance_;
 };
 
-/// Copies the results that `to` does not have whole from the folder of another shard. Throws ResultError when one of
-/// them is damaged. Returns how many were copied.
+/// Copies what `to` does not have whole from the folder of another shard; returns how many results. Throws ResultError
+/// when one is damaged.
 std::size_t mergeResults(const ResultFolder& from, const ResultFolder& to, const Experiment& experiment);
 
-/// Writes summary.csv, pairs.csv, methods.csv, steps.csv, traces.csv and trajectories/ of a complete experiment into
-/// its folder. Throws ResultError naming the first result that is missing.
+/// Writes the tables and trajectories/ of a complete experiment. Throws ResultError naming the first result that is
+/// missing.
 void writeResultTables(const Experiment& experiment, const ResultFolder& results);
 
-/// The column names of a track, with line end.
+/// With line end.
 std::string trackCsvHeader();
-/// One image of a track in full precision: every value reads back as the same double.
+/// In full precision: every value reads back as the same double.
 std::string trackCsvRow(const Estimate& estimate);
 
-/// Writes the traced runs of an experiment as TUM trajectories, for evo and the like:
-/// trajectories/METHOD__MAP__DRIVE__START.tum, and what is true beside it, ending in .truth.tum.
+/// Writes the traced runs as TUM trajectories: trajectories/METHOD__MAP__DRIVE__START.tum, and the truth in .truth.tum.
 class TrajectoryFiles {
  public:
-  /// `folder`: of the results.
   explicit TrajectoryFiles(std::string folder) : folder_(std::move(folder) + "/trajectories") {}
 
-  /// Nothing for a method that has no trace. Throws FileError.
+  /// Nothing for a method without a trace. Throws FileError.
   void write(const std::string& method, const std::string& map, const std::string& drive, const UnitResult& unit);
 
  private:
@@ -86,7 +82,7 @@ class TrajectoryFiles {
   std::set<std::string> taken_;
 };
 
-/// Part `index` of `count` of the work, from 1.
+/// Part `index` of `count`, from 1.
 struct Shard {
   std::size_t index = 1;
   std::size_t count = 1;
@@ -98,15 +94,14 @@ struct Shard {
 struct RoundSource {
   std::function<std::shared_ptr<const TrainingMap>(const RoundSpec&)> map;
   std::function<std::shared_ptr<const Drive>(const RoundSpec&)> drive;
-  /// True poses of the images of a round's map; may be missing, and its answer empty, when nothing is known.
+  /// True poses of the images of a round's map; may be missing or empty.
   std::function<std::vector<std::optional<TruePose>>(const RoundSpec&, const TrainingMap&)> map_truth = {};
 };
 
-/// Says how far a stage of the work is.
 using StageProgress = std::function<void(const std::string& stage, std::size_t done, std::size_t total)>;
 
-/// Runs the part `shard` of an experiment and stores what is not stored whole yet. Deterministic but for the times,
-/// however many threads there are. Throws ResultError when rounds do not fit together.
+/// Runs the part `shard` and stores what is not stored whole yet. Deterministic but for the times, whatever the number
+/// of threads. Throws ResultError when rounds do not fit together.
 void evaluate(const Experiment& experiment, const RoundSource& source, const ResultFolder& results, const Shard& shard,
               std::size_t threads, const StageProgress& progress);
 

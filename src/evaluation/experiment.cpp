@@ -20,7 +20,7 @@ constexpr std::size_t kMostCombinations = 10000;
 constexpr std::size_t kMostMethods = 10000;
 constexpr std::size_t kLongestName = 1000;
 
-/// A name for tables and messages. Throws ParameterError when it is none.
+/// Throws ParameterError when it is no name for tables and messages.
 std::string readName(YamlMap& yaml, const std::string& key) {
   std::string name = yaml.text(key);
   if (name.empty() || name.find('\n') != std::string::npos) yaml.refuse(key, "must be a name of one line");
@@ -61,7 +61,7 @@ Sweep readSweep(YamlMap& yaml, const ParameterValues& parameters) {
   return sweep;
 }
 
-/// All combinations of the sweep's values, the last key changing fastest; one empty combination without a sweep.
+/// The last key changes fastest; one empty combination without a sweep.
 std::vector<std::vector<Setting>> combinationsOf(const Sweep& sweep) {
   std::vector<std::vector<Setting>> combinations{{}};
   for (const auto& [key, values] : sweep) {
@@ -77,7 +77,6 @@ std::vector<std::vector<Setting>> combinationsOf(const Sweep& sweep) {
   return combinations;
 }
 
-/// The name of a method with the sweep's values in it.
 std::string withValues(std::string name, const std::vector<Setting>& settings, const YamlMap& yaml) {
   for (const auto& [key, value] : settings) {
     const std::string placeholder = "{" + key + "}";
@@ -186,8 +185,7 @@ std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
   return methods;
 }
 
-/// The methods of an experiment, those that sweeps stand for included. `base`: what they have in common. Throws
-/// ParameterError that names the key.
+/// Those that sweeps stand for included. `base`: what they have in common. Throws ParameterError that names the key.
 std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) {
   std::vector<MethodSpec> methods;
   std::set<std::string> names;
@@ -242,7 +240,7 @@ std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   return rounds;
 }
 
-/// The rounds that a name of a pair stands for: one round, or all of a group.
+/// One round, or all of a group.
 std::vector<std::size_t> roundsNamed(const std::string& name, const std::vector<RoundSpec>& rounds) {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < rounds.size(); ++i) {
@@ -314,7 +312,7 @@ LocalizerConfig localizerConfig(YamlMap& yaml) {
 Experiment parse(YamlMap yaml) {
   Experiment experiment;
   experiment.name = readName(yaml, "experiment");
-  for (const char* for_the_report : {"title", "source", "discussion"}) yaml.text(for_the_report, "");
+  for (const char* for_the_report : {"title", "source"}) yaml.text(for_the_report, "");
   YamlMap rounds = yaml.map("rounds");
   experiment.closed = rounds.flag("closed", true);
   experiment.rounds = readRounds(rounds);

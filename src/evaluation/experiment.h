@@ -11,7 +11,7 @@
 
 namespace visual_localization {
 
-/// Which images decide what is noise among the features of a drive's image.
+/// Which images decide what is noise in a drive's image.
 enum class Pruning {
   kPrevious,  ///< the one before, as on a robot (Weiss et al., section III)
   kBoth,      ///< the one before and the one after (Kronfeld et al., conference section VI, journal section 6)
@@ -21,8 +21,8 @@ enum class Pruning {
 /// One recorded round of an experiment.
 struct RoundSpec {
   std::string name;
-  std::string bag;    ///< file name as the experiment gives it
-  std::string group;  ///< rounds of one group are summed up together
+  std::string bag;  ///< file name as the experiment gives it
+  std::string group;
   std::string image_topic;
   std::string fix_topic;    ///< what a map of this round gets its positions from
   std::string truth_topic;  ///< what estimates are judged by; if it is the fix topic, its cleaned positions
@@ -37,7 +37,7 @@ struct PairSpec {
   std::size_t drive = 0;
 };
 
-/// One method under test: a tracker of the localizer, or a place recogniser beside it.
+/// A tracker of the localizer, or a place recogniser beside it.
 struct MethodSpec {
   std::string name;
   std::string tracker;        ///< "dpso", ... or a name of placeRecogniserNames()
@@ -66,12 +66,12 @@ struct Experiment {
   LocalizerConfig front_end;  ///< extraction, pruning and matching, the same for all methods
   std::vector<MethodSpec> methods;
 
-  /// Whether a method solves poses from landmarks: then drives need all their features.
+  /// From landmarks: then drives need all their features.
   bool solvesPoses() const;
 };
 
-/// The experiment that the text of a YAML file describes; `path` is for messages. Throws ParameterError, in one line
-/// that names the file and the key, for anything unknown, missing or contradictory.
+/// `path` is for messages. Throws ParameterError, in one line that names the file and the key, for anything unknown,
+/// missing or contradictory.
 Experiment parseExperiment(const std::string& yaml, const std::string& path);
 
 }  // namespace visual_localization

@@ -213,8 +213,8 @@ void VelocityFilter::begin(const Eigen::Vector2d& position_m, const Eigen::Matri
   covariance_.bottomRightCorner<2, 2>() = kSpeed_m_s * kSpeed_m_s * Eigen::Matrix2d::Identity();
 }
 
-/// White acceleration between two images (Bar-Shalom et al., Estimation with Applications to Tracking and Navigation,
-/// section 6.2.2: continuous white noise).
+/// Continuous white noise acceleration (Bar-Shalom et al., Estimation with Applications to Tracking and Navigation,
+/// 6.2.2).
 void VelocityFilter::predict(double elapsed_s) {
   Eigen::Matrix4d motion = Eigen::Matrix4d::Identity();
   motion.topRightCorner<2, 2>() = elapsed_s * Eigen::Matrix2d::Identity();

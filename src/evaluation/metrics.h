@@ -21,7 +21,6 @@ struct ErrorStatistics {
   double within_5m = 0.0;  ///< share of errors below kRight_m, 5 m
 };
 
-/// All fields zero when there is no error to summarise.
 ErrorStatistics summarise(std::vector<double> errors_m);
 
 /// One answer of a place recogniser and whether it was right.
@@ -31,20 +30,19 @@ struct Decision {
 };
 
 /// The largest share of all decisions, in [0, 1], that are accepted and correct when only those above some threshold of
-/// confidence are accepted and at least the share `precision` of these is correct. Equal confidences are accepted
-/// together. 0 when no threshold is good enough. Throws std::invalid_argument for a `precision` outside [0, 1] and for
-/// a confidence that is NaN.
+/// confidence are accepted and at least the share `precision` of these is correct. 0 when no threshold is good enough.
+/// Throws std::invalid_argument for a `precision` outside [0, 1] and for a confidence that is NaN.
 double recallAtPrecision(std::vector<Decision> decisions, double precision);
 
 /// How far a tracker's states can be trusted: counts of judged images. "Lost" is every state but TRACKING, and truly
 /// lost an estimate that is not right (kRight_m).
 struct Trust {
-  std::size_t tracking_right = 0;  ///< TRACKING, and right
-  std::size_t tracking_wrong = 0;  ///< TRACKING, but not right
-  std::size_t lost_right = 0;      ///< called lost, and truly lost
-  std::size_t lost_wrong = 0;      ///< called lost, but right
-  std::size_t off_map_right = 0;   ///< OFF_MAP, and farther than kOffMap_m from all of the map
-  std::size_t off_map_wrong = 0;   ///< OFF_MAP, but not that far
+  std::size_t tracking_right = 0;
+  std::size_t tracking_wrong = 0;
+  std::size_t lost_right = 0;     ///< called lost, and truly lost
+  std::size_t lost_wrong = 0;     ///< called lost, but right
+  std::size_t off_map_right = 0;  ///< OFF_MAP, and farther than kOffMap_m from all of the map
+  std::size_t off_map_wrong = 0;
   std::size_t off_map_missed = 0;  ///< that far, and another state
 
   /// Images without a true position and methods without states are left out.
@@ -52,7 +50,7 @@ struct Trust {
   Trust& operator+=(const Trust& other);
 
   // NaN when there is nothing to divide by.
-  double trackingShare() const;  ///< of all images
+  double trackingShare() const;
   double wrongTracking() const;  ///< share of the TRACKING claims that are wrong
   double lostPrecision() const;  ///< share of the images called lost that truly are
   double lostRecall() const;     ///< share of the truly lost images that are called so
@@ -81,7 +79,6 @@ struct PoseErrors {
   void add(const StepErrors& errors);
   PoseErrors& operator+=(const PoseErrors& other);
 
-  // NaN when there is nothing to divide by.
   double meanPosition_m() const;
   double meanHeading_deg() const;
   double recall(std::size_t threshold) const;
@@ -104,21 +101,19 @@ struct PoseFigures {
   void add(const StepRecord& step);
   PoseFigures& operator+=(const PoseFigures& other);
 
-  // NaN when there is nothing to divide by.
   double metricShare() const;
   double wrong1mShare() const;
   double wrong5mShare() const;
 };
 
-/// A Kalman filter for positions in the plane, with constant velocity and white acceleration: what a user would put
-/// behind the localizer. It takes the errors of successive positions for independent.
+/// Kalman filter for positions in the plane, with constant velocity and white acceleration: what a user would put
+/// behind the localizer. Takes the errors of successive positions for independent.
 class VelocityFilter {
  public:
-  /// A position at its time: metres, covariance of east and north. Begins anew after a pause, when time goes back, and
-  /// with a position that is no continuation of the ones before.
+  /// Metres, covariance of east and north. Begins anew after a pause, when time goes back, and with a position that is
+  /// no continuation.
   void add(std::int64_t stamp_ns, const Eigen::Vector2d& position_m, const Eigen::Matrix2d& covariance_m2);
 
-  // Of the last position added, which there must be.
   Eigen::Vector2d position_m() const { return state_.head<2>(); }
   Eigen::Matrix2d covariance_m2() const { return covariance_.topLeftCorner<2, 2>(); }
 
@@ -132,18 +127,17 @@ class VelocityFilter {
 };
 
 /// Writes into `step` how far heading and claims of an estimate are from the truth (map frame), and what of that is not
-/// the map's own error. `map_error`: none when it is not known.
+/// the map's own error. `map_error`: none when not known.
 void judgePose(const Estimate& estimate, const Eigen::Vector2d& truth_m, const std::optional<double>& true_yaw_rad,
                const std::optional<MapError>& map_error, StepRecord& step);
 
-/// What the filter makes of a METRIC pose while TRACKING; of other estimates nothing.
+/// Of METRIC poses while TRACKING only.
 void judgeFiltered(const Estimate& estimate, const Eigen::Vector2d& truth_m, const std::optional<MapError>& map_error,
                    VelocityFilter& filter, StepRecord& step);
 
-/// One step as a line of a TUM trajectory: "stamp tx ty tz qx qy qz qw", x ahead, y left, z up in the map frame. Level
-/// and at height 0 but for poses solved from landmarks.
+/// "stamp tx ty tz qx qy qz qw", x ahead, y left, z up in the map frame. Level and at height 0 but for metric poses.
 std::string tumLine(const Estimate& estimate);
-/// The same of a true pose. A heading that is not known is 0.
+/// A heading that is not known is 0.
 std::string tumLine(std::int64_t stamp_ns, const Eigen::Vector2d& position_m, double yaw_rad);
 
 }  // namespace visual_localization

@@ -28,8 +28,8 @@ std::vector<std::vector<std::ptrdiff_t>> straightLines(const SequenceConfig& con
   return lines;
 }
 
-/// How far the difference (1 - similarity) is from its mean along the route nearby, in standard deviations: the local
-/// contrast enhancement of Milford and Wyeth. Without contrast 0, which says nothing.
+/// Local contrast enhancement (Milford and Wyeth): how far the difference (1 - similarity) is from its mean along the
+/// route nearby, in standard deviations. Without contrast 0.
 double localContrast(const std::vector<double>& similarities, const Route& route, const SequenceConfig& config,
                      std::size_t image) {
   double count = 0.0;
@@ -96,7 +96,7 @@ void SequenceMatcher::remember(const std::vector<double>& similarities) {
   columns_.push_back(std::move(column));
 }
 
-/// Adds the differences along one line to `sums`, for the lines of this speed ending at every image at once.
+/// For the lines of this speed ending at every image at once.
 void SequenceMatcher::addLines(const std::vector<std::ptrdiff_t>& line, std::vector<double>& sums) const {
   const std::size_t images = route_.size();
   for (std::size_t ago = 0; ago < columns_.size(); ++ago) {
@@ -109,7 +109,6 @@ void SequenceMatcher::addLines(const std::vector<std::ptrdiff_t>& line, std::vec
   }
 }
 
-/// Mean difference along the best line ending at each image.
 void SequenceMatcher::scoreLines() {
   scores_.assign(route_.size(), std::numeric_limits<double>::infinity());
   for (const auto& line : lines_) {
@@ -126,7 +125,7 @@ double SequenceMatcher::confidence(std::size_t best) const {
     if (route_.distance(image, best) <= static_cast<std::size_t>(config_.uniqueness_radius)) continue;
     rival = std::min(rival, scores_[image]);
   }
-  // No sample of N lies further below their mean than sqrt(N - 1) standard deviations, and N is at most 2 radius + 1.
+  // No sample of N lies further below the mean than sqrt(N - 1) standard deviations; N is at most 2 radius + 1.
   const double least = -std::sqrt(2.0 * config_.normalisation_radius);
   constexpr double kRounding = 1e-9;
   if (std::isinf(rival) || rival < least + kRounding) return 0.0;
@@ -185,7 +184,7 @@ void TopologicalBayesFilter::calibrate(const std::vector<double>& similarities) 
 
 void TopologicalBayesFilter::weigh(const std::vector<double>& similarities) {
   if (lambda_ == 0.0) calibrate(similarities);
-  // Logarithms, because every likelihood where the prediction is not zero may be too small for a double.
+  // Logarithms: every likelihood may be too small for a double.
   for (std::size_t image = 0; image < posterior_.size(); ++image) {
     posterior_[image] = std::log(posterior_[image]) - lambda_ * (1.0 - similarities[image]);
   }

@@ -12,13 +12,13 @@
 
 namespace visual_localization {
 
-/// The order of the training images along the drive; on a closed route the first follows the last.
+/// Training images along the drive; on a closed route the first follows the last.
 class Route {
  public:
   Route(std::size_t images, bool closed) : images_(images), closed_(closed) {}
 
   std::size_t size() const { return images_; }
-  /// The image `steps` after `from`, or before it when negative; nothing beyond the ends of an open route.
+  /// Before it when `steps` is negative; nothing beyond the ends of an open route.
   std::optional<std::size_t> at(std::size_t from, std::ptrdiff_t steps) const;
   /// Images between two of them, the shorter way.
   std::size_t distance(std::size_t a, std::size_t b) const;
@@ -52,23 +52,21 @@ struct Recognition {
 class PlaceRecogniser {
  public:
   virtual ~PlaceRecogniser() = default;
-  /// One image further. `similarities`: of the current image to every training image, in the map's order, in [0, 1].
+  /// `similarities` of the current image to every training image, in the map's order, in [0, 1].
   virtual Recognition update(const std::vector<double>& similarities) = 0;
 };
 
-/// Refuses what no place recogniser can judge: throws std::invalid_argument, naming the value, when a row of
-/// similarities is empty, is not as long as the first one (`training_images`; 0 when there was none), or holds a
-/// number outside [0, 1], NaN included.
+/// Throws std::invalid_argument, naming the value, when a row of similarities is empty, is not as long as the first one
+/// (`training_images`; 0 when there was none), or holds a number outside [0, 1].
 void requireRow(const std::vector<double>& similarities, std::size_t training_images);
 
-/// Exhaustive search without memory: the training image most similar to the current one, the first of equals.
-/// Its similarity is the confidence.
+/// The most similar training image, the first of equals. Its similarity is the confidence.
 class BestSingleImage final : public PlaceRecogniser {
  public:
   Recognition update(const std::vector<double>& similarities) override;
 
  private:
-  std::size_t training_images_ = 0;  ///< of the first row; later ones must be as long
+  std::size_t training_images_ = 0;
 };
 
 /// Parameters of sequence matching; symbols of Milford and Wyeth (ICRA 2012).
@@ -106,22 +104,19 @@ struct PlaceRecogniserConfig {
 /// What makePlaceRecogniser knows: "exhaustive", "sequence", "topological".
 const std::vector<std::string>& placeRecogniserNames();
 
-/// The place recogniser called `name`. `closed`: the first training image follows the last. Throws
-/// std::invalid_argument for another name, naming those allowed, and for a configuration with violations.
+/// `closed`: the first training image follows the last. Throws std::invalid_argument for an unknown name or an invalid
+/// configuration.
 std::unique_ptr<PlaceRecogniser> makePlaceRecogniser(const std::string& name, const PlaceRecogniserConfig& config,
                                                      bool closed);
 
-/// Recognises short sequences instead of single images, in the manner of SeqSLAM (Milford and Wyeth, "SeqSLAM:
-/// Visual Route-Based Navigation for Sunny Summer Days and Stormy Winter Nights", ICRA 2012), but online: the answer is
-/// where the best straight line through the last images ends.
-///
-/// Ours besides: what leaves an open route, and an image that says nothing, counts as average difference; chance
-/// similarities among zeros are kept from looking like perfect contrast (min_contrast).
-/// The confidence is 1 - best / rival: mean differences of the best line and of the best one that ends elsewhere, both
-/// counted from the least that local contrast can be. It lies in [0, 1]; 0 when the map is too small for a rival.
+/// SeqSLAM (Milford and Wyeth, ICRA 2012), online: the answer is where the best straight line through the last images
+/// ends. Beyond the paper: what leaves an open route, and an image that says nothing, counts as average difference;
+/// chance similarities among zeros are kept from looking like perfect contrast (min_contrast). The confidence is 1 -
+/// best / rival in [0, 1], by the mean differences of the best line and of the best one that ends elsewhere; 0 when the
+/// map is too small for a rival.
 class SequenceMatcher final : public PlaceRecogniser {
  public:
-  /// `config` must be without violations. `closed`: the first training image follows the last.
+  /// `config` must be valid.
   SequenceMatcher(const SequenceConfig& config, bool closed);
 
   Recognition update(const std::vector<double>& similarities) override;
@@ -141,18 +136,13 @@ class SequenceMatcher final : public PlaceRecogniser {
   std::vector<double> scores_;                      ///< of the best line ending at each training image
 };
 
-/// A discrete Bayes filter whose states are the training images, in the manner of the topological filter of Xu,
-/// Suenderhauf and Milford ("Probabilistic Visual Place Recognition for Hierarchical Localization", RA-L 2021).
-///
-/// Moves between images are uniform in [min_step, max_step]; the likelihood is exp(-lambda d) with d = 1 - similarity.
-/// As there, the first image calibrates lambda = ln(delta) / (q_97.5 - q_2.5), quantiles of its differences d. Ours
-/// are the reset, so that kidnapping is survived; calibration by the first image that tells places apart, with the
-/// whole range of d where the quantiles coincide; and the answer: the most probable state of the window with the most
-/// posterior mass. The confidence is the mass of the window around that state. An image that is alike to all training
-/// images, as a dark one is, leaves the prediction as it is.
+/// Discrete Bayes filter over the training images, after Xu, Suenderhauf and Milford (RA-L 2021). Moves between images
+/// are uniform in [min_step, max_step]; the likelihood is exp(-lambda d) with d = 1 - similarity, and the first image
+/// that tells places apart calibrates lambda = ln(delta) / (q_97.5 - q_2.5). Beyond the paper: the reset, so that
+/// kidnapping is survived, and the answer: the most probable state of the window with the most posterior mass, which is
+/// the confidence. An image that is alike to all training images leaves the prediction as it is.
 class TopologicalBayesFilter final : public PlaceRecogniser {
  public:
-  /// `config` must be without violations. `closed`: the first training image follows the last.
   TopologicalBayesFilter(const TopologicalBayesConfig& config, bool closed);
 
   Recognition update(const std::vector<double>& similarities) override;

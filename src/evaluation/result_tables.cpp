@@ -30,7 +30,7 @@ std::ostringstream table(const std::string& header) {
   return out;
 }
 
-/// Mean of a figure over runs, each counted by its images.
+/// Each run counted by its images.
 template <class Figure>
 double meanOf(const std::vector<RunFigures>& runs, Figure figure) {
   double sum = 0.0;
@@ -42,7 +42,7 @@ double meanOf(const std::vector<RunFigures>& runs, Figure figure) {
   return sum / images;
 }
 
-/// The same for what is known of images with a true position only; NaN without any.
+/// Of images with a true position only; NaN without any.
 template <class Figure>
 double meanOfJudged(const std::vector<RunFigures>& runs, Figure figure) {
   double sum = 0.0;
@@ -54,7 +54,7 @@ double meanOfJudged(const std::vector<RunFigures>& runs, Figure figure) {
   return sum / judged;
 }
 
-/// Standard deviation of the runs' mean errors, as the papers' tables give it; NaN without any.
+/// As in the papers' tables; NaN without any.
 double deviationOf(const std::vector<RunFigures>& runs) {
   double sum = 0.0;
   double squares = 0.0;
@@ -97,7 +97,7 @@ std::ostream& operator<<(std::ostream& out, Known known) {
   return std::isnan(known.number) ? out : out << known.number;
 }
 
-/// What the poses of a method on several pairs come to, with a comma before each.
+/// With a comma before each.
 std::string poseMeasuresOf(const std::vector<UnitResult>& units) {
   PoseFigures poses;
   for (const UnitResult& unit : units) poses += unit.poses;
@@ -132,7 +132,6 @@ std::string poseMeasuresOf(const std::vector<UnitResult>& units) {
   return out.str();
 }
 
-/// One method on several pairs.
 std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
   std::vector<RunFigures> runs;
   for (const UnitResult& unit : units) runs.insert(runs.end(), unit.runs.begin(), unit.runs.end());
@@ -169,7 +168,7 @@ std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
 
 using Groups = std::pair<std::string, std::string>;
 
-/// Indices of pairs by the groups of their rounds, in the order of the experiment.
+/// In the order of the experiment.
 std::vector<std::pair<Groups, std::vector<std::size_t>>> pairsByGroups(const Experiment& experiment) {
   std::vector<std::pair<Groups, std::vector<std::size_t>>> sorted;
   for (std::size_t i = 0; i < experiment.pairs.size(); ++i) {

@@ -19,7 +19,7 @@ namespace {
 
 using Truth = std::function<std::optional<TruePose>(std::int64_t stamp_ns)>;
 
-/// The true poses of a recording in the frame of its true positions; none when it has no file of them.
+/// In the frame of its true positions; none when it has no file of them.
 Trajectory truePoses(const BagReader& bag, const RoundSpec& recording, const Trajectory& positions) {
   if (recording.poses.empty()) return {};
   const std::string path = besideBag(bag.path(), recording.poses);
@@ -31,7 +31,7 @@ Trajectory truePoses(const BagReader& bag, const RoundSpec& recording, const Tra
   }
 }
 
-/// True poses at any time. The topic that maps are made from is no better than a map: it is cleaned like one.
+/// The topic that maps are made from is no better than a map: it is cleaned like one.
 Truth truthOf(const BagReader& bag, const RoundSpec& recording, const TrajectoryCleanerConfig& config) {
   const std::vector<Fix> fixes = bag.fixes(recording.truth_topic);
   const auto first = std::find_if(fixes.begin(), fixes.end(), hasPosition);
@@ -52,13 +52,12 @@ Truth truthOf(const BagReader& bag, const RoundSpec& recording, const Trajectory
   };
 }
 
-/// The camera of a recording, for its images as they are recorded.
 std::optional<CameraModel> cameraOf(const BagReader& bag, const RoundSpec& recording) {
   if (recording.camera_info.empty()) return bag.camera(recording.image_topic);
   return readCameraFile(besideBag(bag.path(), recording.camera_info));
 }
 
-/// The images of a recording with their stamps, without those that cannot be used.
+/// Without those that cannot be used.
 void forEachImage(const BagReader& bag, const std::string& topic,
                   const std::function<void(std::int64_t stamp_ns, const cv::Mat& grey)>& use) {
   const BagImages images = bag.images(topic);

@@ -176,9 +176,8 @@ struct Verdict {
 class Contestant {
  public:
   virtual ~Contestant() = default;
-  /// After the image that is shown now.
   virtual Verdict process(std::int64_t stamp_ns) = 0;
-  /// Mean distance between two particles, metres; 0 for a method without particles. Not cheap.
+  /// Mean distance between two particles, metres; 0 without particles. Not cheap.
   virtual double diversity_m() const { return 0.0; }
 };
 
@@ -214,11 +213,11 @@ class TrackerContestant final : public Contestant {
   }
 
  private:
-  /// Weight of the newest image in the confidence: about five images count, as for the state.
+  /// Of the newest image: about five images count, as for the state.
   static constexpr double kNewest = 1.0 / 3.0;
 
-  /// The best match in units of what counts as recognised, so that both kinds of features can be compared; none when
-  /// the match is not where the estimate is.
+  /// In units of what counts as recognised, so that both kinds of features compare; none when the match is not where
+  /// the estimate is.
   double evidenceOf(const Estimate& estimate) const {
     const TrackerEstimate& tracked = estimate.tracked;
     if (tracked.best_distance_m > kRight_m) return 0.0;
@@ -255,8 +254,7 @@ class RecogniserContestant final : public Contestant {
   std::vector<double> row_;
 };
 
-/// Images from step `begin` on until the first of three estimates in a row that are right; all of them when that never
-/// comes.
+/// From step `begin` on, until the first of three estimates in a row that are right; all when never.
 std::size_t stepsUntilFound(const std::vector<StepRecord>& steps, double within_m, std::size_t begin, std::size_t end) {
   constexpr std::size_t kInARow = 3;
   std::size_t right = 0;
@@ -272,7 +270,7 @@ class ExtractionCounter {
  public:
   void add(const RecordedImage& image, RunRecord& record) {
     const bool compared = image.siftComparisons() > 0;
-    // Pruning needs the SIFT features of the image before; a hybrid that comes from global features has none yet.
+    // A hybrid that comes from global features has no SIFT features of the image before yet.
     if (compared) {
       record.sift_extractions += first_ || previous_had_sift_ ? 1 : 2;
     } else if (image.poseWasAsked()) {
@@ -290,7 +288,6 @@ class ExtractionCounter {
   bool previous_had_sift_ = false;
 };
 
-/// Compares the verdict with the truth, if that is known.
 void judge(const DriveImage& image, const TrainingMap& map, const std::optional<MapError>& map_error,
            const Verdict& verdict, VelocityFilter& filter, StepRecord& step) {
   if (!image.truth) return;
@@ -325,13 +322,12 @@ TraceRecord traced(std::size_t index, const DriveImage& image, const TrainingMap
   return trace;
 }
 
-/// Different for every run, the same whenever it is repeated; a seed of the localizer, which is not negative.
+/// Different for every run, the same when repeated; not negative.
 std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
   constexpr std::uint32_t kLargest = 0x7FFFFFFF;
   return (static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start)) & kLargest;
 }
 
-/// `seed` makes the runs of one method differ.
 std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::uint32_t seed, const RunContext& context,
                                            std::shared_ptr<RecordedImage> image) {
   if (!method.isTracker()) {

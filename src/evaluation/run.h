@@ -22,9 +22,8 @@ struct Kidnapping {
   std::size_t to = 0;  ///< index of the first image after it
 };
 
-/// The order in which a run sees the images of a closed drive: every step one image, starting at `start`, wrapping
-/// at the end, with an optional jump (protocol of Kronfeld et al. (journal), section 6). As many steps as the
-/// drive has images. Throws std::invalid_argument, naming the allowed range, for an index beyond the drive.
+/// Image indices of a closed drive from `start` on, wrapping, with an optional jump (Kronfeld et al. (journal), section
+/// 6). Throws std::invalid_argument for an index beyond the drive.
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const std::optional<Kidnapping>& kidnapping);
 
 /// How the runs of an experiment go through a drive.
@@ -34,11 +33,11 @@ struct RunShape {
   bool kidnapped = false;  ///< after half of the run carried by half of the drive; an open one back
 };
 
-/// The images that the run beginning at `start` sees: once around a closed drive, to the end of an open one.
+/// Once around a closed drive, to the end of an open one.
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const RunShape& shape);
 
-/// Where the runs begin: every image of a closed drive, or of the first half of an open one; `count` of them, evenly
-/// spread, unless that is 0 or more than there are.
+/// Every image of a closed drive, or of the first half of an open one; `count` of them, evenly spread, unless that is 0
+/// or too many.
 std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_t count);
 
 /// A map with some of its images left out, as when the robot leaves the recorded way.
@@ -47,8 +46,8 @@ struct PartialMap {
   std::vector<std::size_t> images;  ///< index in the whole map of each image that is left; empty when all are
 };
 
-/// Leaves out the share `gap` of the images, beginning with image 0.35 * size, and then those nearer than `spacing_m`
-/// to the last kept one of their session, as map/spacing does; all stay when both are 0. At least one stays.
+/// Leaves out the share `gap`, beginning with image 0.35 * size, then images nearer than `spacing_m` to the last kept
+/// one of their session. At least one stays.
 PartialMap partOf(std::shared_ptr<const TrainingMap> map, double gap, double spacing_m = 0.0);
 
 /// What a map has wrong at one of its training images: its pose there minus the true one.
@@ -57,9 +56,8 @@ struct MapError {
   std::optional<double> yaw_rad = {};  ///< none: the true heading is not known
 };
 
-/// For each image of `drive`, the error of the map at the training image that was taken nearest to it and faces alike,
-/// if headings are known. In a map with landmarks, of the images that have some: poses rest on those alone. `truth`: of
-/// the images of the whole map; nothing where they are not known.
+/// For each image of `drive`, at the nearest training image that faces alike, in a map with landmarks one that has
+/// some. `truth`: of the images of the whole map; nothing where not known.
 std::vector<std::optional<MapError>> mapErrors(const PartialMap& part,
                                                const std::vector<std::optional<TruePose>>& truth, const Drive& drive);
 
@@ -72,7 +70,7 @@ constexpr double kOffMap_m = 10.0;
 struct StepErrors {
   float position_m = std::numeric_limits<float>::quiet_NaN();
   float heading_deg = std::numeric_limits<float>::quiet_NaN();
-  /// Squared error of the position in units of the covariance that comes with it; of estimates that claim one.
+  /// Squared error of the position in units of its covariance.
   float nees = std::numeric_limits<float>::quiet_NaN();
 };
 
@@ -127,7 +125,7 @@ struct RunContext {
   std::vector<std::optional<MapError>> map_errors = {};  ///< of each image of the drive; empty when nothing is known
 };
 
-/// Drives from image `start` on (protocol of Kronfeld et al. (journal), section 6).
+/// From image `start` on (Kronfeld et al. (journal), section 6).
 RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace);
 
 }  // namespace visual_localization

@@ -24,12 +24,11 @@ struct TruePose {
   std::optional<double> yaw_rad = {};  ///< of the viewing direction, 0 = east, counter-clockwise; none: not known
 };
 
-/// The poses of a CSV file with at least the columns stamp_ns, east_m, north_m (metres from any origin) and yaw_rad.
-/// Throws FileError that begins with the path and names the line.
+/// CSV with the columns stamp_ns, east_m, north_m (metres from any origin) and yaw_rad. Throws FileError that names the
+/// line.
 Trajectory readPoses(const std::string& path);
 
-/// `poses` moved so that they lie on `positions`, whose origin is another one: by the median difference on either axis.
-/// Throws std::runtime_error when the two have no time in common.
+/// Moved by the median difference on either axis. Throws std::runtime_error when the two have no time in common.
 Trajectory movedOnto(const Trajectory& positions, const Trajectory& poses);
 
 /// One image of a drive, as the front end of the localizer sees it.
@@ -44,16 +43,15 @@ struct DriveImage {
 /// A recorded round as images to localise.
 struct Drive {
   std::vector<DriveImage> images;
-  cv::Size image_size;                ///< pixels
+  cv::Size image_size;
   std::optional<CameraModel> camera;  ///< for images of this size; none: not calibrated, or not asked for
   double sift_ms = 0.0;               ///< mean time to extract and prune the SIFT features of an image
   double global_ms = 0.0;             ///< mean time to extract its global features
 };
 
-/// Drops from `sift` what neither the image before nor the one after shows: Kronfeld et al. (conference), section VI,
-/// and (journal), section 6. Every image must have its `unpruned` features. A repetition has the features of what it
-/// repeats. An image farther away than `max_gap_s`, or with fewer than two features, is no neighbour; without any
-/// neighbour all features stay.
+/// Drops what neither the image before nor the one after shows: Kronfeld et al. (conference), section VI, and
+/// (journal), section 6. Every image must have its `unpruned` features. An image farther away than `max_gap_s`, or with
+/// fewer than two features, is no neighbour; without any neighbour all features stay.
 void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_ratio, double max_gap_s);
 
 /// A recorded round in the roles it plays in an experiment; a role it does not play is empty.
@@ -69,8 +67,8 @@ class ScoreTable {
   struct Entry {
     double sift = 0.0;  ///< similarity by SIFT
     double global = 0.0;
-    std::uint32_t matches = 0;  ///< behind `sift`
-    float scale = 1.0F;         ///< of these matches
+    std::uint32_t matches = 0;
+    float scale = 1.0F;  ///< of these matches
   };
 
   ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads);
@@ -96,8 +94,8 @@ class ScoreTable {
 /// Recorded images whose scores are looked up instead of computed. Counts what live images would have cost.
 class RecordedImage final : public QueryImage {
  public:
-  /// `table` must outlive it. Of its training images only `training_images` are in the map, and counted by their
-  /// index in this list, which must outlive it too; all when it is empty.
+  /// Only `training_images` are in the map, and counted by their index in this list; all when it is empty. Both must
+  /// outlive it.
   RecordedImage(const ScoreTable& table, const std::vector<std::size_t>& training_images, const MatchConfig& match,
                 const SimilarityConfig& similarity);
 
@@ -108,7 +106,7 @@ class RecordedImage final : public QueryImage {
   void row(FeatureKind kind, std::vector<double>& similarities);
   std::size_t siftComparisons() const { return sift_comparisons_; }
   std::size_t globalComparisons() const { return global_comparisons_; }
-  /// Whether a live image would have extracted SIFT features for its pose.
+  /// A live image would have extracted SIFT features for its pose.
   bool poseWasAsked() const { return pose_was_asked_; }
 
   /// There are no pixels: show() says what comes.

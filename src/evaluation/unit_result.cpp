@@ -76,7 +76,7 @@ double mostOf(std::vector<double> errors_m) {
   return quantile(errors_m, kMost);
 }
 
-/// How fast the robot truly was between two images, m/s; nothing where a true position is missing or time goes back.
+/// m/s; nothing where a true position is missing or time goes back.
 std::optional<double> robotSpeed_mps(const TraceRecord& before, const TraceRecord& now) {
   const double seconds = secondsBetween(before.estimate.stamp_ns, now.estimate.stamp_ns);
   if (!before.truth_m || !now.truth_m || seconds <= 0.0) return std::nullopt;
@@ -201,7 +201,7 @@ void read(const std::string& line, StepSums& step) {
 
 std::ptrdiff_t fieldsOf(const std::string& row) { return std::count(row.begin(), row.end(), ',') + 1; }
 
-/// Runs and steps count the same images, each in its own way: where a line is lost, they disagree.
+/// Where a line is lost, runs and steps disagree about the number of images.
 void requireConsistent(const UnitResult& unit) {
   if (unit.runs.empty()) throw std::runtime_error("has no run");
   std::size_t images = 0;

@@ -49,7 +49,7 @@ struct TracedPose {
   std::string truth;  ///< empty when it is not known
 };
 
-/// Of the text of a UnitResult: goes up whenever older results cannot be read any more.
+/// Goes up whenever older results cannot be read any more.
 constexpr int kUnitFormat = 3;
 
 /// One method on one pair of rounds: the unit of work that is stored and resumed.
@@ -66,14 +66,12 @@ struct UnitResult {
   double p95_relative_err_m = 0.0;     ///< the same in relation to the map; 0 when nothing is known of that
 };
 
-/// Sums up the runs of one method on one pair.
 UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& costs);
 
-/// Text for a file, and back. parseUnit throws std::runtime_error when the text is not whole.
+/// parseUnit throws std::runtime_error when the text is not whole.
 std::string serialise(const UnitResult& unit);
 UnitResult parseUnit(const std::string& text);
 
-/// The columns of `UnitResult::trace`.
 extern const char* const kTraceColumns;
 
 }  // namespace visual_localization

@@ -10,7 +10,7 @@
 namespace visual_localization {
 namespace {
 
-/// Runs `read` and names the parameter when its file cannot be used.
+/// Names the parameter when its file cannot be used.
 template <class Read>
 auto ofParameter(const std::string& name, Read read) {
   try {
@@ -70,7 +70,6 @@ void CameraWatch::imageFrameIs(const std::string& frame) {
   sayMountTrouble();
 }
 
-/// Once the frame of the camera is known, and the way to it from that of the robot.
 void CameraWatch::findMount() {
   if (!camera_frame_) return;
   try {
@@ -90,7 +89,7 @@ void CameraWatch::findMount() {
   }
 }
 
-/// Not at once: frames come from several publishers, one after the other.
+/// Not at once: frames come from several publishers.
 void CameraWatch::sayMountTrouble() {
   constexpr double kPatience_s = 3.0;
   if (mount_trouble_.empty() || mount_trouble_ == mount_said_) return;
@@ -148,7 +147,7 @@ void CameraWatch::mapIs(const MapHeader& map) {
   report();
 }
 
-/// Another camera than the map's is what calibration is for: people only should know.
+/// Allowed; people only should know.
 void CameraWatch::compareWithMap() {
   if (!camera_ || !of_map_) return;
   const std::string words = differences(camera_->scaledTo(map_size_), *of_map_);

@@ -19,17 +19,16 @@
 
 namespace visual_localization {
 
-/// Keeps the localizer informed about the camera: its calibration, from a file or from the topic beside the images, and
-/// its mask, and where the robot carries it: from a parameter or from /tf_static and
-/// what never changes in /tf. Says once each what it uses and how
-/// that differs from the map's camera. A calibration or a mount that cannot be used changes nothing.
+/// Keeps the localizer informed about the camera: calibration (from a file or the topic beside the images), mask, and
+/// mounting (from a parameter, /tf_static or what never changes in /tf). Says once each what it uses. What cannot be
+/// used changes nothing.
 class CameraWatch {
  public:
-  /// Tells people something; `warning`: it needs their attention.
+  /// `warning`: it needs attention.
   using Say = std::function<void(bool warning, const std::string& text)>;
 
-  /// Reads the files that `config` names; without a file of calibration subscribes to the topic beside `image_topic`.
-  /// Throws ParameterError, naming the parameter, when a file cannot be used. The others must outlive it.
+  /// Without a file of calibration subscribes to the topic beside `image_topic`. Throws ParameterError, naming the
+  /// parameter, when a file cannot be used. The others must outlive it.
   CameraWatch(ros::NodeHandle node, const NodeConfig& config, const std::string& image_topic,
               SharedLocalizer& localizer, LocalizerDiagnostics& diagnostics, Say say);
   ~CameraWatch() {
@@ -40,9 +39,7 @@ class CameraWatch {
   CameraWatch(const CameraWatch&) = delete;
   CameraWatch& operator=(const CameraWatch&) = delete;
 
-  /// The localizer has another map now.
   void mapIs(const MapHeader& map);
-  /// What images say where they were taken: /tf_static knows where the robot carries that.
   void imageFrameIs(const std::string& frame);
 
  private:

@@ -22,7 +22,7 @@ namespace {
 constexpr int kSmallestWidth_px = 480;  ///< of one half: lines in smaller ones lie too close together
 constexpr int kShiftBits = 4;           ///< OpenCV draws at sixteenths of a pixel
 
-/// Pure colours that stand out on grey, BGR.
+/// BGR.
 const std::array<cv::Scalar, 6> kLineColours{cv::Scalar(60, 220, 255), cv::Scalar(90, 200, 60),
                                              cv::Scalar(255, 170, 60), cv::Scalar(190, 110, 255),
                                              cv::Scalar(60, 140, 255), cv::Scalar(230, 230, 110)};
@@ -38,7 +38,7 @@ cv::Mat inColour(const cv::Mat& grey, const cv::Size& size) {
   return colour;
 }
 
-/// A uniform grey without a preview, or with one that cannot be decoded: whoever made the map wrote its bytes.
+/// A uniform grey without a preview, or with one that cannot be decoded.
 cv::Mat previewOf(const std::vector<std::uint8_t>& jpeg, const cv::Size& size) {
   try {
     if (!jpeg.empty()) return inColour(decodedToGrey(jpeg), size);
@@ -47,7 +47,7 @@ cv::Mat previewOf(const std::vector<std::uint8_t>& jpeg, const cv::Size& size) {
   return {size, CV_8UC3, cv::Scalar::all(48)};
 }
 
-/// To a width that lines need, but no farther than images of a map may go.
+/// No farther than images of a map may go.
 double scaleOf(const cv::Size& size) {
   const double largest = std::sqrt(static_cast<double>(kMaxImagePixels) / size.area());
   return std::max(1.0, std::min(static_cast<double>(kSmallestWidth_px) / size.width, largest));
@@ -75,7 +75,7 @@ class ImagePair {
   const cv::Mat& canvas() const { return canvas_; }
 
  private:
-  /// Centre of pixel (0, 0) of the map's image lies at 0.5 * scale - 0.5 of the enlarged one.
+  /// Pixel (0, 0) of the map's image has its centre at 0.5 * scale - 0.5 of the enlarged one.
   cv::Point shifted(const cv::Point2f& position_px, double offset_x_px) const {
     const double x_px = (static_cast<double>(position_px.x) + 0.5) * scale_ - 0.5 + offset_x_px;
     const double y_px = (static_cast<double>(position_px.y) + 0.5) * scale_ - 0.5;
@@ -120,7 +120,6 @@ cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, cons
 
 namespace {
 
-// The picture, in pixels: a header, rows of figures, a band of states.
 constexpr int kWidth = 640;
 constexpr int kHeader = 70;
 constexpr int kRowHeight = 48;
@@ -152,7 +151,7 @@ std::string format(const char* pattern, double number) {
   return text;
 }
 
-/// Writes with the baseline at `y`; the text begins at `x`, or ends there.
+/// Whether the text begins or ends at `x`.
 enum class Align { kLeft, kRight };
 void write(cv::Mat& canvas, const std::string& text, int x, int y, double scale, const cv::Scalar& colour,
            Align align = Align::kLeft, int thickness = 1) {
@@ -162,14 +161,13 @@ void write(cv::Mat& canvas, const std::string& text, int x, int y, double scale,
               thickness, cv::LINE_AA);
 }
 
-/// The i-th of the remembered images; the newest stands at the right end.
+/// The newest image stands at the right end.
 int columnOf(std::size_t i, std::size_t count) {
   const auto age = static_cast<double>(count - 1 - i);
   return cvRound(kCurveRight - age * (kCurveRight - kCurveLeft) / static_cast<double>(Dashboard::kShown - 1));
 }
 
-/// A clock that is played from a bag lags behind the stamps by a few milliseconds, which would only confuse; larger
-/// differences of the clocks show.
+/// The clock of a played bag lags behind the stamps by a few milliseconds; only larger differences show.
 std::string latencyText(double latency_ms) {
   constexpr double kSmallLag_ms = 50.0;
   if (latency_ms == -1.0) return "-";  // the image has no stamp
@@ -213,7 +211,6 @@ void drawHeader(cv::Mat& canvas, const LocalizationStatus& now) {
   write(canvas, lost, kCurveRight, 56, 0.55, kBrightColour, Align::kRight);
 }
 
-/// From zero to the largest of the shown figures.
 void drawCurve(cv::Mat& canvas, const Statuses& statuses, const Figure& figure, int top, int bottom) {
   double largest = 0.0;
   for (const auto& status : statuses) largest = std::max(largest, figure(status));

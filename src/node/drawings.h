@@ -22,18 +22,17 @@ namespace visual_localization {
 cv::Mat drawMatches(const cv::Mat& grey, const LocalFeatures& sift, const TrainingMap& map, std::size_t training,
                     const MatchConfig& match);
 
-/// The same with the landmarks of a metric pose beside the training image that shares most of them: green those that
-/// agree with the pose, red those that do not.
+/// Beside the training image that shares most landmarks: green those that agree with the pose, red those that do not.
 cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, const TrainingMap& map);
 
 /// The status as a picture for people: the state in colour, the figures that explain it, and their history over the
 /// last images. Thread-safe.
 class Dashboard {
  public:
-  static constexpr std::size_t kShown = 120;  ///< number of images that are remembered
+  static constexpr std::size_t kShown = 120;
 
   void add(const LocalizationStatus& status);
-  /// 8-bit BGR, always of the same size; dark when nothing has been added.
+  /// 8-bit BGR, always of the same size.
   cv::Mat draw() const;
 
  private:

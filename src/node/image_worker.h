@@ -33,15 +33,15 @@ class ImageSource {
  public:
   using Callback = std::function<void(ReceivedImage)>;
 
-  /// Subscribes to `image` of `node`. `transport` compressed means `<image>/compressed`, decoded here, for
-  /// which no plugin is needed. Throws ParameterError when there is no such transport.
+  /// `transport` compressed means `<image>/compressed`, decoded here without a plugin. Throws ParameterError when there
+  /// is no such transport.
   ImageSource(ros::NodeHandle node, const ros::NodeHandle& private_node, const std::string& transport,
               Callback callback);
 
   /// Returns after a callback that is running.
   void shutdown();
   const std::string& topic() const { return topic_; }
-  /// For people: the topic and how many publish it, and what else might be meant when nobody does.
+  /// For people: the topic, how many publish it, and what else might be meant when nobody does.
   std::string description();
 
  private:
@@ -57,7 +57,7 @@ class ImageSource {
 template <class Item>
 class LatestQueue {
  public:
-  /// Never blocks. Counts the item that it replaces, if there is one.
+  /// Never blocks.
   void push(Item item) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -68,7 +68,7 @@ class LatestQueue {
     available_.notify_one();
   }
 
-  /// Waits for an item; nothing once the queue is closed.
+  /// Waits; nothing once the queue is closed.
   std::optional<Item> pop() {
     std::unique_lock<std::mutex> lock(mutex_);
     available_.wait(lock, [this] { return closed_ || item_; });
@@ -86,7 +86,7 @@ class LatestQueue {
     available_.notify_all();
   }
 
-  /// Items that were replaced before anybody took them.
+  /// Replaced before anybody took them.
   std::uint64_t dropped() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return dropped_;
@@ -113,7 +113,7 @@ class StampMonitor {
 
   /// `stamp_ns` of the image that came now.
   Verdict judge(std::int64_t stamp_ns);
-  /// How much older than the newest image the last one was, seconds; zero when it was not.
+  /// Seconds behind the newest image; zero when it was not.
   double lag_s() const { return lag_s_; }
 
  private:
@@ -127,9 +127,9 @@ class StampMonitor {
 struct ImageCounts {
   std::uint64_t received = 0;
   std::uint64_t processed = 0;
-  std::uint64_t dropped = 0;      ///< replaced by a newer one before they were processed
-  std::uint64_t late = 0;         ///< older than one that was processed
-  std::uint64_t refused = 0;      ///< unusable
+  std::uint64_t dropped = 0;
+  std::uint64_t late = 0;  ///< older than one that was processed
+  std::uint64_t refused = 0;
   std::uint64_t without_map = 0;  ///< came while no map was loaded
 
   std::uint64_t ended() const { return processed + dropped + late + refused + without_map; }
@@ -162,7 +162,7 @@ class ImageWorker {
   ImageWorker(const ImageWorker&) = delete;
   ImageWorker& operator=(const ImageWorker&) = delete;
 
-  /// Images that were pushed before are waiting. `topic` names the camera in the log.
+  /// `topic` names the camera in the log.
   void start(const std::string& topic);
   /// Finishes the image that is being processed.
   void stop();

@@ -11,7 +11,7 @@
 namespace visual_localization {
 namespace {
 
-// From here on the text calls an image dark, overexposed or low in contrast; nothing is decided by these limits.
+// Only for the text: nothing is decided by these limits.
 constexpr double kDark = 20.0;
 constexpr double kBright = 235.0;
 constexpr double kLowContrast = 8.0;
@@ -52,7 +52,6 @@ std::string stretched(const ImageStatistics& image) {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-/// What the pose rests on, and how well it is known.
 void addPose(const Estimate& estimate, diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("Source of the pose", toString(estimate.source));
   status.addf("Sigma of position (m), heading (deg)", "%.2f, %.2f", estimate.sigma_m(),

@@ -17,8 +17,7 @@
 
 namespace visual_localization {
 
-/// What is wrong with the image that led to `estimate`, in one line for people; empty when nothing seems to be. An
-/// image that is recognised is all right, whatever it is like.
+/// What is wrong with the image, in one line for people; empty for one that is recognised or seems well.
 std::string imageTrouble(const Estimate& estimate);
 
 /// Rate of events over the last seconds, so that events rarer than the reports show their rate, not 1 and 0 in turn.
@@ -33,7 +32,7 @@ class RateMeter {
     forget(now);
   }
 
-  /// Hertz; zero with fewer than two events in the window.
+  /// Zero with fewer than two events in the window.
   double rate_hz(Clock::time_point now = Clock::now()) {
     forget(now);
     if (times_.size() < 2) return 0.0;
@@ -53,11 +52,10 @@ class RateMeter {
 /// What the node reports on /diagnostics: state, images, latency, map. Thread-safe.
 class LocalizerDiagnostics {
  public:
-  /// Where images should come from, for people.
   using DescribeCamera = std::function<std::string()>;
   using CountImages = std::function<ImageCounts()>;
 
-  /// `name` of the node. It is an error when no image comes for longer than the timeout.
+  /// It is an error when no image comes for longer than the timeout.
   LocalizerDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node, const std::string& name,
                        const NodeConfig& config, DescribeCamera describe_camera, CountImages count_images);
 
@@ -65,14 +63,14 @@ class LocalizerDiagnostics {
   void imageArrived();
   void imageProcessed(const Estimate& estimate, double latency_ms);
   void imageRefused(const std::string& reason);
-  /// How long no image has come, when that is longer than the timeout.
+  /// Nothing while shorter than the timeout.
   std::optional<double> silence_s();
-  /// The state has changed without an image.
+  /// Without an image.
   void stateIs(LocalizationState state);
   /// Empty when the transform was broadcast.
   void transformMissing(const std::string& reason);
   void mapLoaded(const std::string& path, std::size_t images);
-  /// What is known of the camera. `trouble`: why its last calibration is not used; empty when it is.
+  /// `trouble`: why the last calibration is not used; empty when it is.
   void cameraIs(const std::string& description, const std::string& trouble);
   void publish() { updater_.force_update(); }
 

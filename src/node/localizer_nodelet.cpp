@@ -65,7 +65,7 @@ void LocalizerNodelet::onInit() {
   try {
     start();
   } catch (const std::exception& error) {
-    // The loader frees the callback queues of a nodelet that does not start before it frees the nodelet itself.
+    // The loader frees the callback queues of a nodelet that does not start before the nodelet itself.
     stop();
     NODELET_FATAL_STREAM(getName() << " does not start: " << oneLine(error.what(), kLongestLine));
     throw nodelet::Exception(error.what());
@@ -144,8 +144,8 @@ void LocalizerNodelet::useFirstMap() {
 }
 
 void LocalizerNodelet::offerServices() {
-  // Loading a map takes a while and must not hold up the images. The multi-threaded queue of the nodelet is of no
-  // use: the loader may free it while a callback of the other queue still holds the nodelet.
+  // Loading a map must not hold up the images. Not the multi-threaded queue of the nodelet: the loader may free it
+  // while a callback of the other queue still holds the nodelet.
   ros::NodeHandle node = getNodeHandle();
   ros::NodeHandle private_node = getPrivateNodeHandle();
   node.setCallbackQueue(&service_queue_);
@@ -250,7 +250,7 @@ void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {
   guarded(log_, "diagnostics", [this] { diagnostics_->publish(); });
 }
 
-/// Without images the robot may be anywhere by now: the last state no longer holds.
+/// Without images the robot may be anywhere by now.
 void LocalizerNodelet::watchCamera() {
   const auto silence_s = diagnostics_->silence_s();
   if (silence_s && !camera_silent_)

@@ -23,9 +23,9 @@
 namespace visual_localization {
 namespace {
 
-/// How long an image waits for odometry of its stamp, in wall time: simulated time may stand still.
+/// Wall time: simulated time may stand still.
 constexpr std::chrono::milliseconds kOdometryWait{100};
-/// The same while there has never been odometry: every image would wait in vain.
+/// While there has never been odometry: every image would wait in vain.
 constexpr std::chrono::milliseconds kUnknownOdometryWait{20};
 constexpr std::chrono::milliseconds kOdometryPoll{5};
 constexpr double kSlidingSigmas = 3.0;
@@ -64,7 +64,7 @@ void SlidingCorrection::aimAt(const tf2::Transform& odom_in_map, const tf2::Tran
   way_m_ = 0.0;
 }
 
-/// The robot is moved, not the origin of the odometry: far from it a small turn would be a long way.
+/// About the robot, not about the origin of the odometry: far from it a small turn would be a long way.
 tf2::Transform SlidingCorrection::after(double elapsed_s, const tf2::Transform& base_in_odom) {
   if (base_in_odom_) way_m_ += (base_in_odom.getOrigin() - base_in_odom_->getOrigin()).length();
   base_in_odom_ = base_in_odom;
@@ -161,7 +161,7 @@ std::string TransformPublisher::hold(const ros::Time& stamp) {
   return trouble_between_;
 }
 
-/// Without images for long odometry alone says too little: who waits for the transform then stops.
+/// Odometry alone says too little then: who waits for the transform stops.
 void TransformPublisher::broadcastBetween(const ros::Time& now) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!odom_in_map_ || now == last_between_) return;  // simulated time may stand still
@@ -217,7 +217,7 @@ std_msgs::Header headerOf(const std::string& frame_id, const ros::Time& stamp) {
   return header;
 }
 
-/// -1 for an image without a stamp. In 64 bits: differences of ros::Time throw when they are longer than 68 years.
+/// -1 without a stamp. In 64 bits: differences of ros::Time throw beyond 68 years.
 double latencyOf(const LocalizedImage& image) {
   if (!image.has_stamp) return -1.0;
   const auto now_ns = static_cast<std::int64_t>(ros::Time::now().toNSec());

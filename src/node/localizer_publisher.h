@@ -31,28 +31,24 @@
 
 namespace visual_localization {
 
-/// odom_in_map, such that odometry and map agree on where the robot is.
 tf2::Transform odomInMap(const tf2::Transform& base_in_map, const tf2::Transform& base_in_odom);
 
-/// Whether `estimate` may move the robot. `metric_only`: where landmarks can verify poses, a verified one alone may.
+/// `metric_only`: where landmarks can verify poses, a verified one alone may.
 bool movesRobot(const Estimate& estimate, bool metric_only);
 
-/// odom_in_map between images. A correction within three standard deviations, of the pose that it comes from and of the
-/// way by odometry since the one before, moves the robot little by little; a larger one means that the robot is
-/// elsewhere, and moves it at once.
+/// odom_in_map between images. A correction within three standard deviations of pose and odometry slides in; a larger
+/// one means that the robot is elsewhere, and moves it at once.
 class SlidingCorrection {
  public:
-  /// `smoothing_s`: time constant; after it 37 % of a correction are left. 0: at once.
+  /// `smoothing_s`: time constant; 0: at once.
   SlidingCorrection(double smoothing_s, const OdometryConfig& odometry)
       : smoothing_s_(smoothing_s), odometry_(odometry) {}
 
-  /// What odometry drifts from now on.
   void configure(const OdometryConfig& odometry) { odometry_ = odometry; }
-  /// From now on towards this one. The standard deviations are those of the pose, of each axis and of the heading.
-  /// Heights and tilts of the odometry are never a reason to be elsewhere.
+  /// Standard deviations of the pose, of each axis and of the heading.
   void aimAt(const tf2::Transform& odom_in_map, const tf2::Transform& base_in_odom, double sigma_m,
              double sigma_yaw_rad);
-  /// The transform `elapsed_s` after the last call, with the robot at `base_in_odom`. To be called after aimAt().
+  /// `elapsed_s` after the last call, with the robot at `base_in_odom`. To be called after aimAt().
   tf2::Transform after(double elapsed_s, const tf2::Transform& base_in_odom);
 
  private:
@@ -64,29 +60,27 @@ class SlidingCorrection {
   double way_m_ = 0.0;                          ///< by odometry, since the last aim
 };
 
-/// Broadcasts the estimate on tf as NodeConfig::tf_mode says: with each image, or with map_to_odom at
-/// NodeConfig::tf_rate, from a thread of its own. When there is no odometry at an image's time it broadcasts nothing
-/// new: a guess would move the robot for everyone. After an estimate that may not move the robot, odometry goes on from
-/// the last one that might.
+/// Broadcasts the estimate as NodeConfig::tf_mode says: with each image, or with map_to_odom at NodeConfig::tf_rate,
+/// from a thread of its own. Without odometry at an image's time, and after an estimate that may not move the robot,
+/// the last transform goes on.
 class TransformPublisher {
  public:
   /// `log` must outlive it.
   TransformPublisher(const NodeParameters& parameters, const ros::NodeHandle& node, ThrottledLog& log);
   ~TransformPublisher();
 
-  /// What can change while it runs: tolerance, timeout and what odometry drifts. From any thread.
+  /// Tolerance, timeout and drift of odometry. From any thread.
   void configure(const NodeParameters& parameters);
   /// Time has gone back: the odometry in the buffer lies in the future.
   void forget();
-  /// Another map: nothing is known of the robot in it. From any thread.
+  /// Another map. From any thread.
   void forgetPose();
-  /// `stamp` of the image. Returns why nothing is broadcast; empty when something is, or should not be.
+  /// Returns why nothing is broadcast; empty when something is, or should not be.
   std::string publish(const Estimate& estimate, const ros::Time& stamp);
 
  private:
   std::string move(const PoseEstimate& pose, const ros::Time& stamp);
   std::string hold(const ros::Time& stamp);
-  /// Waits a moment for it.
   std::optional<tf2::Transform> baseInOdom(const ros::Time& stamp, std::string& reason) const;
   /// `stamp` 0: the newest. `reason`: why there is none, otherwise empty.
   std::optional<tf2::Transform> lookUpBaseInOdom(const ros::Time& stamp, std::string& reason) const;
@@ -110,7 +104,6 @@ class TransformPublisher {
   ros::Time last_between_;                            ///< broadcast
   std::chrono::steady_clock::time_point last_image_;  ///< that was no frozen camera's
   std::string trouble_between_;
-  // Of the timer.
   ros::CallbackQueue queue_;
   ros::SteadyTimer timer_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;  ///< nothing that waits for an image may hold it up
@@ -124,9 +117,9 @@ class LocalizerPublisher : public ImageOutput {
                      LocalizerDiagnostics& diagnostics, ThrottledLog& log);
 
   void publishMap(const TrainingMap& map);
-  /// What is known without an image: that there is no map, or that no image comes. Stamped with the present.
+  /// Without an image; stamped with the present.
   void publishState(LocalizationState state, const ImageCounts& counts);
-  /// What can change while it runs. From any thread.
+  /// From any thread.
   void configure(const NodeParameters& parameters) { transform_.configure(parameters); }
 
   /// No pose and no transform after an image of a frozen camera.

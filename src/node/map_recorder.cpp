@@ -139,7 +139,6 @@ Weakness RecordingWatch::weaknessOf(std::int64_t stamp_ns, std::size_t features)
   return summary_.spacing_m > config_.max_spacing_m ? Weakness::kFarApart : Weakness::kNone;
 }
 
-/// The same line in the same light shows what the map has already.
 bool RecordingWatch::isKnown(std::int64_t stamp_ns) const {
   if (!map_) return false;
   const std::vector<Neighbour> neighbours = map_->nearest(position_m_, kNeighbours);
@@ -270,7 +269,7 @@ void MapRecorder::recordImages(const std::string& topic) {
   });
 }
 
-/// What the map builder would say of it, while there is still time. The caller holds the mutex.
+/// What the map builder would say of it. The caller holds the mutex.
 void MapRecorder::watchCalibration(const sensor_msgs::CameraInfo& info) {
   try {
     if (!calibration_.add(info)) calibration_trouble_ = "the calibration changes while it records";
@@ -288,8 +287,7 @@ void MapRecorder::write(const std::string& topic, const Message& message) {
   if (bag_->waiting() >= kMostWaiting_bytes && disk_trouble_.empty()) syncBag();
 }
 
-/// Each sync writes the whole index again. After hours of small messages it is worth that only when as much waits:
-/// otherwise the bag would be mostly indices.
+/// Each sync writes the whole index again: after hours of small messages only when as much waits.
 void MapRecorder::sync(bool at_once) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (at_once || bag_->waiting() + kSmallIndex_bytes >= bag_->indexSize()) syncBag();
@@ -389,7 +387,6 @@ std_msgs::ColorRGBA colourOf(Weakness weakness) {
 
 }  // namespace
 
-/// A line along the images, coloured by what is weak there.
 void MapRecorder::publishWay() {
   visualization_msgs::Marker line;
   {
@@ -444,8 +441,8 @@ void MapRecorder::reportRecording(Wrapper& status) {
   status.addf("Images (Hz)", "%.2f", images_.rate_hz());
 }
 
-/// Why the map will not know where the robot carries camera and antenna; empty when it will, or nobody says anything of
-/// frames. The caller holds the mutex.
+/// Why the map will not know the mounting; empty when it will, or nobody says anything of frames. The caller holds the
+/// mutex.
 std::string MapRecorder::mountTrouble() const {
   if (!image_frame_ || !fix_frame_ || !builder_.camera_mount.empty()) return "";
   const auto antenna = builder_.antenna_mount.empty() ? fix_frame_ : std::nullopt;

@@ -62,13 +62,12 @@ struct RecorderConfig {
 /// What a map will lack where an image was recorded; the first that holds.
 enum class Weakness : std::uint8_t {
   kNone,
-  kNoFix,        ///< no usable fix lately
+  kNoFix,
   kPoorFix,      ///< the receiver itself doubts its fixes
   kFewFeatures,  ///< too dark, too bright, blurred, or nothing to see
   kFarApart,     ///< too fast for the rate of the camera
 };
 constexpr std::size_t kWeaknesses = 5;
-/// In a few words, for people.
 const char* describe(Weakness weakness);
 
 /// Looks at a session while it is recorded and says what will be weak in its map, as long as the robot is still there.
@@ -95,17 +94,16 @@ class RecordingWatch {
                                    ///< of this time of day, so that they add little
   };
 
-  /// `map` is the one that the session will be added to; null: none.
+  /// `map`: the one that the session will be added to; null: none.
   RecordingWatch(const WatchConfig& config, std::shared_ptr<const TrainingMap> map);
 
   void addFix(const Fix& fix);
-  /// An image that was recorded.
   void addImage(std::int64_t stamp_ns);
-  /// One of these that was looked at: a slow computer does not look at all of them.
+  /// A slow computer does not look at all images.
   void addLook(std::int64_t stamp_ns, std::size_t features);
 
   Summary summary() const { return summary_; }
-  /// Images that were looked at since the first usable fix, in their order.
+  /// Since the first usable fix, in their order.
   const std::vector<Spot>& spots() const { return spots_; }
 
  private:
@@ -137,13 +135,11 @@ struct RecordedSession {
   std::string output;
 };
 
-/// Records a session while somebody drives the robot: images, camera_info, fixes, odometry and static transforms, into
-/// a bag that is whole at any moment. Says what will be weak, on /diagnostics and in rviz, and writes the map when
-/// asked to.
+/// Records images, camera_info, fixes, odometry and static transforms into a bag that is whole at any moment. Says what
+/// will be weak, on /diagnostics and in rviz, and writes the map when asked to.
 class MapRecorder {
  public:
-  /// Writes the map of a session, as a process of its own so that the recording goes on; throws std::exception in one
-  /// line.
+  /// In a process of its own, so that the recording goes on; throws std::exception in one line.
   using BuildMap = std::function<void(const RecordedSession& session)>;
 
   /// Begins to record. Throws ParameterError, FileError or MapStoreError.

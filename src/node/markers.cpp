@@ -22,8 +22,7 @@ constexpr double kRay_m = 6.0;  ///< from the optical centre to a corner
 constexpr double kLine_m = 0.2;
 constexpr double kRoof = 0.4;  ///< its height, as a share of the image's
 
-/// Of the corners of the image: upper left, upper right, lower right, lower left. Where a lens shows nothing there, of
-/// a smaller image.
+/// Upper left, upper right, lower right, lower left; where a lens shows nothing there, of a smaller image.
 std::array<Eigen::Vector2d, 4> cornersOf(const CameraModel& camera) {
   const Eigen::Vector2d middle_px(0.5 * (camera.size().width - 1), 0.5 * (camera.size().height - 1));
   const Eigen::Vector2d half_px(0.5 * camera.size().width, 0.5 * camera.size().height);
@@ -76,7 +75,7 @@ constexpr double kImageDiameter_m = 0.6;
 constexpr double kHeadingLength_m = 1.5;
 constexpr double kHeadingWidth_m = 0.12;
 constexpr double kLandmarkSize_m = 0.25;
-/// Of a larger map only every k-th image is shown: a message of a million poses would stop rviz.
+/// A message of a million poses would stop rviz.
 constexpr std::size_t kMostShown = 20000;
 
 constexpr std::size_t kMostLandmarks = 200000;
@@ -87,11 +86,11 @@ struct Colour {
   float r, g, b;
 };
 
-/// From low to high; readable on white and for colour-blind people (the darker part of viridis).
+/// Readable on white and for colour-blind people (the darker part of viridis).
 constexpr std::array<Colour, 4> kHeightColours{
     {{0.27F, 0.00F, 0.33F}, {0.23F, 0.32F, 0.55F}, {0.13F, 0.57F, 0.55F}, {0.37F, 0.79F, 0.38F}}};
 
-/// One per session; readable on white and for colour-blind people (Okabe and Ito).
+/// Okabe and Ito.
 constexpr std::array<Colour, 6> kSessionColours{{{0.00F, 0.45F, 0.70F},
                                                  {0.84F, 0.37F, 0.00F},
                                                  {0.00F, 0.62F, 0.45F},
@@ -132,7 +131,7 @@ visualization_msgs::Marker emptyHeadings(int session, const std::string& frame_i
   return marker;
 }
 
-/// `share` of the way from low to high, clamped.
+/// `share` from low to high, clamped.
 std_msgs::ColorRGBA colourOfHeight(double share) {
   const double place = std::clamp(share, 0.0, 1.0) * static_cast<double>(kHeightColours.size() - 1);
   const std::size_t below = std::min(static_cast<std::size_t>(place), kHeightColours.size() - 2);

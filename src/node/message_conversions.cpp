@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kRow = 6;              ///< of a pose's covariance: x, y, z and three rotations
 constexpr double kUnknownAltitude_m2 = 1e6;  ///< the map knows heights, but not above which level
-// Added to a metric covariance, so that it can always be inverted; far below what images allow.
+// Makes a metric covariance invertible; far below what images allow.
 constexpr double kLeastPositionSigma_m = 1e-3;
 constexpr double kLeastRotationSigma_rad = 1e-4;
 
@@ -38,7 +38,7 @@ MetricPose::Covariance invertible(MetricPose::Covariance covariance) {
   return covariance;
 }
 
-/// Of a metric pose, map included.
+/// Map included.
 MetricPose::Covariance fullCovariance(const MetricPose& metric) {
   return invertible(metric.covariance + metric.map_covariance);
 }
@@ -86,7 +86,7 @@ std::uint32_t count(std::size_t number) {
   return static_cast<std::uint32_t>(number < kMax ? number : kMax);
 }
 
-/// What the pose rests on, and how well it is known. Sigmas stay 0 in a status that answers no image.
+/// Sigmas stay 0 in a status that answers no image.
 void addSource(const Estimate& estimate, LocalizationStatus& message) {
   message.source = static_cast<std::uint8_t>(estimate.source);
   message.source_name = toString(estimate.source);

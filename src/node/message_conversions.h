@@ -22,10 +22,10 @@
 
 namespace visual_localization {
 
-/// Rotation about z, ROS convention: 0 = along x (east), counter-clockwise.
+/// About z: 0 = along x (east), counter-clockwise.
 geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad);
 
-/// True when every number that would be published is finite.
+/// Every number that would be published.
 bool isFinite(const Estimate& estimate);
 bool isFinite(const Particle& particle);
 
@@ -34,26 +34,24 @@ bool isFinite(const Particle& particle);
 /// frame.
 geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const std_msgs::Header& header);
 
-/// The same with the covariance of the image alone, in relation to the map: for a filter, which takes what it fuses for
-/// white noise. Nothing unless a METRIC pose is TRACKING: one that is not may be at a place that looks alike, however
-/// sure it is of where.
+/// With the covariance of the image alone, in relation to the map, for a filter. Nothing unless a METRIC pose is
+/// TRACKING.
 std::optional<geometry_msgs::PoseWithCovarianceStamped> toMetricPose(const Estimate& estimate,
                                                                      const std_msgs::Header& header);
 
-/// The same position as latitude and longitude; the map knows no altitude. No fix while the position is unknown or
-/// lost. `header`: frame of the robot, as for a GPS receiver.
+/// No altitude, and no fix while the position is unknown or lost. `header`: frame of the robot, as for a GPS receiver.
 sensor_msgs::NavSatFix toFix(const Estimate& estimate, const std_msgs::Header& header);
 
-/// Everything but latency and counts of images, which only the node knows.
+/// But for latency and counts of images, which only the node knows.
 LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& header);
 
-/// Particles in the map frame. Heading is the direction of the velocity, zero for a particle at rest.
+/// Map frame. Heading is the direction of the velocity, zero at rest.
 geometry_msgs::PoseArray toPoseArray(const std::vector<Particle>& particles, const std_msgs::Header& header);
 Swarm toSwarm(const std::vector<Particle>& particles, const std_msgs::Header& header);
-/// Fields x, y, z and intensity (the weight), 32-bit floats, so that rviz can colour by weight.
+/// Fields x, y, z and intensity (the weight), 32-bit floats.
 sensor_msgs::PointCloud2 toPointCloud(const std::vector<Particle>& particles, const std_msgs::Header& header);
 
-// Between places on the earth and in the map (null: none is loaded). What is refused says why in its message.
+// Null: no map is loaded. What is refused says why in its message.
 FromLL::Response fromLL(const TrainingMap* map, const FromLL::Request& request);
 ToLL::Response toLL(const TrainingMap* map, const ToLL::Request& request);
 

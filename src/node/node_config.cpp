@@ -223,7 +223,7 @@ ParameterValues flatten(const XmlRpcValue& tree) {
 }
 
 bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values) {
-  // Not NodeHandle::setParam(): that waits without end for a master that is gone.
+  // Not NodeHandle::setParam(), which waits without end for a master that is gone.
   for (const auto& [name, value] : values) {
     XmlRpcValue request;
     XmlRpcValue response;

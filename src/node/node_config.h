@@ -36,7 +36,7 @@ struct NodeConfig {
   std::string base_frame_id = "base_link";
 
   void declare(ParameterVisitor& visitor);
-  /// How maps are opened; `warn` is told of features that cannot be read.
+  /// `warn` is told of features that cannot be read.
   MapLoading mapLoading(std::function<void(const std::string&)> warn) const;
 };
 
@@ -48,34 +48,31 @@ struct NodeParameters {
   void declare(ParameterVisitor& visitor);
 };
 
-/// doc/parameters.md: every parameter of the localizer and of the map builder, generated from their declarations.
+/// doc/parameters.md, generated from the declarations.
 std::string parametersPage();
-/// config/localizer.yaml and config/map_builder.yaml, generated from the same declarations.
 std::string localizerYaml();
 std::string mapBuilderYaml();
 
-/// The map file that `path` names when only maps below `directory` may be opened: a relative path begins there, and
-/// symbolic links and ".." are followed. Without a directory, the path as it is. Throws MapStoreError, in one line that
-/// begins with the path and names the `parameter` that asks for it, for a file that lies elsewhere.
+/// A relative path begins at `directory`, and symbolic links and ".." are followed; without a directory, the path as it
+/// is. Throws MapStoreError, in one line that begins with the path and names the `parameter`, for a file that lies
+/// elsewhere.
 std::string mapFileBelow(const std::string& directory, const std::string& path,
                          const std::string& parameter = "map_directory");
 
-/// Nested values of a parameter server as flat ones, "dpso/particles". Throws ParameterError naming the
-/// parameter for anything that is neither a struct nor a scalar.
+/// Nested values as flat ones, "dpso/particles". Throws ParameterError for anything that is neither a struct nor a
+/// scalar.
 ParameterValues flatten(const XmlRpc::XmlRpcValue& tree);
 
-/// Writes values into a node's private namespace. Returns false at the first one that no master takes.
+/// False at the first value that no master takes.
 bool storeParameters(const ros::NodeHandle& private_node, const ParameterValues& values);
 
-/// True for parameters that stand in a node's private namespace but belong to others: diagnostic_updater,
-/// bond, the nodelet manager, plugins of image_transport.
+/// Of diagnostic_updater, bond, the nodelet manager and plugins of image_transport.
 bool belongsToOthers(const std::string& name);
 
-/// Everything in the private namespace of a node but what belongs to others. Throws as flatten() does.
+/// Without what belongs to others. Throws as flatten() does.
 ParameterValues privateParameters(const ros::NodeHandle& private_node);
 
-/// Reads and checks the whole private namespace of the localizer. Throws ParameterError at the first unknown or invalid
-/// parameter.
+/// Throws ParameterError at the first unknown or invalid parameter.
 NodeParameters loadParameters(const ros::NodeHandle& private_node);
 
 }  // namespace visual_localization

@@ -28,7 +28,6 @@ TopicTypes publishedTopics() {
   return types;
 }
 
-/// What to set for images of this topic.
 std::string settingFor(const std::string& topic, const std::string& type) {
   if (type == "sensor_msgs/Image") return ": set image to " + topic + " and image_transport to raw";
   if (type != "sensor_msgs/CompressedImage") return {};

@@ -6,17 +6,17 @@
 
 namespace visual_localization {
 
-/// Types of topics that somebody publishes, by name.
+/// Published topics, by name.
 using TopicTypes = std::map<std::string, std::string>;
 
-/// What helps whoever waits for images of `type` on `topic`, behind the words that nobody publishes them: that it is of
-/// another type, that its name has a suffix too many, or that the transport is another. Empty when nothing does.
+/// Why nobody publishes images of `type` on `topic`: another type, a suffix too many, or another transport. Empty when
+/// nothing helps.
 std::string topicHint(const std::string& topic, const std::string& type, const TopicTypes& published);
 
 /// Asks the master for them. In a thread of its own: one that does not answer holds nobody up.
 class PublishedTopics {
  public:
-  /// topicHint() by the last answer; asks for the next one.
+  /// By the last answer; asks for the next one.
   std::string hint(const std::string& topic, const std::string& type);
 
  private:

@@ -24,8 +24,8 @@ void append(Parameters& parameters, const std::string& name, const Value& value)
   parameters.back().value = value;
 }
 
-/// The group of a parameter: "dpso/" of "dpso/particles". With the slash, because rqt_reconfigure takes a group "state"
-/// for the key of that name that every group has.
+/// "dpso/" of "dpso/particles": with the slash, because rqt_reconfigure takes a group "state" for the key of that name
+/// that every group has.
 std::string groupOf(const std::string& name) {
   const auto slash = name.find('/');
   return slash == std::string::npos ? "Default" : name.substr(0, slash + 1);
@@ -143,7 +143,6 @@ parameters::Declaration declarationOf(NodeParameters& parameters) {
   return [&parameters](ParameterVisitor& visitor) { parameters.declare(visitor); };
 }
 
-/// The values of `after` that differ from those of `before`.
 ParameterValues difference(NodeParameters before, NodeParameters after) {
   const ParameterValues old_values = parameters::values(declarationOf(before));
   ParameterValues values = parameters::values(declarationOf(after));
@@ -210,7 +209,7 @@ void ReconfigureServer::setMap(const std::string& path) {
   storeParameters(private_node_, {{"map", path}});
 }
 
-/// Also after a refusal the answer and the update contain the values in force.
+/// After a refusal too, answer and update contain the values in force.
 bool ReconfigureServer::onSet(dynamic_reconfigure::Reconfigure::Request& request,
                               dynamic_reconfigure::Reconfigure::Response& response) {
   const std::lock_guard<std::mutex> lock(mutex_);

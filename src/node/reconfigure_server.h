@@ -16,15 +16,13 @@
 
 namespace visual_localization {
 
-/// What tools like rqt_reconfigure need to know of every parameter that can change while the node runs: type, range,
-/// meaning and present value as default. Names are the full ones, "dpso/particles", as on the parameter server; the
-/// group "dpso/" holds all that begin with it.
+/// Of every parameter that can change while the node runs. Names are the full ones, "dpso/particles"; the group "dpso/"
+/// holds all that begin with it.
 dynamic_reconfigure::ConfigDescription toDescription(const parameters::Declaration& declare);
 
-/// The present values of the same parameters.
 dynamic_reconfigure::Config toConfig(const parameters::Declaration& declare);
 
-/// The values that a message names. Throws ParameterError, with name and value, for one that is read at the start only.
+/// Throws ParameterError, with name and value, for one that is read at the start only.
 ParameterValues toValues(const dynamic_reconfigure::Config& config, const parameters::Declaration& declare);
 
 /// The parameters while the node runs, by the protocol of dynamic_reconfigure. Its own server template needs a class
@@ -32,16 +30,14 @@ ParameterValues toValues(const dynamic_reconfigure::Config& config, const parame
 /// stored on the parameter server as well, so that `rosparam dump` shows those in force. Thread-safe.
 class ReconfigureServer {
  public:
-  /// Puts parameters into effect; throws when that cannot be done, and then nothing has changed. `changed`: the
-  /// values that differ from before, never empty.
+  /// Throws when parameters cannot be put into effect, and then nothing has changed. `changed`: never empty.
   using Apply = std::function<void(const NodeParameters& parameters, const ParameterValues& changed)>;
-  /// Is told why a request was refused.
   using Warn = std::function<void(const std::string& reason)>;
 
   /// Requests are answered in the callback queue of `private_node`.
   ReconfigureServer(const ros::NodeHandle& private_node, const NodeParameters& parameters, Apply apply, Warn warn);
 
-  /// The node has loaded another map: the parameter `map` names it from now on, so that a restart finds it.
+  /// So that a restart finds the map.
   void setMap(const std::string& path);
 
  private:

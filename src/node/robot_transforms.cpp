@@ -15,7 +15,7 @@ namespace visual_localization {
 namespace {
 
 constexpr std::uint32_t kQueue = 100;
-/// tf2 never forgets a name: after so many, of frames that took turns on the way, it starts anew.
+/// tf2 never forgets a name: after so many it starts anew.
 constexpr std::size_t kMostNames = 1000;
 
 }  // namespace
@@ -52,7 +52,7 @@ void RobotTransforms::add(geometry_msgs::TransformStamped transform, bool is_sta
   if (is_on_way) keep(transform, is_static);
 }
 
-/// Of a frame on the way. The caller holds the mutex.
+/// The caller holds the mutex.
 void RobotTransforms::keep(const geometry_msgs::TransformStamped& transform, bool is_static) {
   if (!buffer_->setTransform(transform, "tf", is_static)) return;  // not finite, no rotation, or old
   std::string& parent = parents_[transform.child_frame_id];
@@ -61,7 +61,7 @@ void RobotTransforms::keep(const geometry_msgs::TransformStamped& transform, boo
   findWay();
 }
 
-/// Up from both frames. A parent that is new on it may be a static frame that is known already.
+/// Up from both frames; a new parent may be a static frame that is known already.
 void RobotTransforms::findWay() {
   std::set<std::string> way;
   for (const std::string* end : {&child_, &parent_}) {

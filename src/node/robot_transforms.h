@@ -22,23 +22,21 @@
 
 namespace visual_localization {
 
-/// Where one frame of the robot is in another, of which tf tells. Keeps only the transforms on the way between the two:
-/// a tf2 listener keeps those of every frame that anybody names, for ever, and one stamp near the end of what a stamp
-/// can hold ends its process. Thread-safe.
+/// Where one frame of the robot is in another. Keeps only the transforms on the way between the two: a tf2 listener
+/// keeps every frame for ever, and one stamp near the end of what a stamp can hold ends its process. Thread-safe.
 class RobotTransforms {
  public:
-  /// Of `child` in `parent`; both may have the slash that tf gave frames.
+  /// Both may have the slash that tf gave frames.
   RobotTransforms(const std::string& parent, const std::string& child, ThrottledLog& log);
 
   /// Leaves out what is no transform between two frames of a robot, and says so.
   void add(const tf2_msgs::TFMessage& message, bool is_static);
-  /// Moving transforms are forgotten: time has gone back.
+  /// Time has gone back.
   void forget();
-  /// Whether lookUp() would find it. `stamp` 0: the newest.
+  /// `stamp` 0: the newest.
   bool knows(const ros::Time& stamp) const;
-  /// Throws tf2::TransformException, in words.
+  /// Throws tf2::TransformException.
   tf2::Transform lookUp(const ros::Time& stamp) const;
-  /// Frames of which something is kept.
   std::size_t frames() const;
 
  private:

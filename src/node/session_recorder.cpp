@@ -84,7 +84,6 @@ constexpr int kFastPng = 1;
 constexpr int kMapNiceness = 10;       ///< of what writes a map, while the robot drives
 constexpr std::uint32_t kThreads = 2;  ///< one for a map, one for refusals meanwhile
 
-// Topics and frames of the recorded bag.
 const char* const kImages = "/session/image";
 const char* const kPoses = "/session/verified_pose";
 const char* const kCameraFrame = "session_camera";
@@ -221,7 +220,7 @@ std::string SessionRecorder::outputOf(const std::string& path) const {
   return output;
 }
 
-/// When the disk is full, or nothing was recorded, there is nothing to write a map of.
+/// Null when the disk is full or nothing was recorded.
 std::unique_ptr<SessionRecorder::Session> SessionRecorder::take() {
   std::unique_lock<std::mutex> lock(mutex_);
   changed_.wait(lock, [this] { return waiting_.empty() && !working_; });
@@ -265,7 +264,7 @@ void SessionRecorder::publish(const LocalizedImage& image, const ImageCounts&) {
   changed_.notify_all();
 }
 
-/// Of the thread: records, and lets nothing wait longer than the period.
+/// Of the thread; nothing waits longer than the period.
 void SessionRecorder::work() {
   auto synced = std::chrono::steady_clock::now();
   std::unique_lock<std::mutex> lock(mutex_);

@@ -27,8 +27,7 @@
 
 namespace visual_localization {
 
-/// Counts what metric poses rest on, in a file beside the map, for map_edit. Saves it every minute and at its end, in a
-/// thread of its own.
+/// Counts what metric poses rest on, in a file for map_edit: every minute and at its end, in a thread of its own.
 class UsageRecorder : public ImageOutput {
  public:
   /// Goes on from what the file has. Throws UsageFileError or FileError naming it, also when another process writes it.
@@ -49,7 +48,7 @@ class UsageRecorder : public ImageOutput {
   std::future<void> saving_;
 };
 
-/// Writes a file of use. Throws FileError.
+/// Throws FileError.
 void writeUsage(const std::string& path, const MapUsage& usage);
 
 /// What a recorded session adds to a map.
@@ -63,22 +62,20 @@ struct SessionExtension {
   std::string output;
 };
 
-/// ~record_session: records images whose poses landmarks verify, with these poses as fixes, and writes the map with
-/// them as a new session. Images are encoded and written in a thread of its own; what is older than five seconds is
-/// whole on the disk, whatever happens then (see BagWriter).
+/// ~record_session: records images with verified poses, with these poses as fixes, and writes the map with them as a
+/// new session. In a thread of its own; what is older than five seconds is whole on the disk (see BagWriter).
 class SessionRecorder : public ImageOutput {
  public:
-  /// Writes the map by `map_edit`, which ends with this object; throws std::exception in one line.
+  /// By `map_edit`, which ends with this object; throws std::exception in one line.
   using Extend = std::function<void(const SessionExtension& extension, ChildProcess& map_edit)>;
 
-  /// `folder`: where everything is written, an absolute path; empty: every call is refused.
+  /// `folder`: an absolute path; empty: every call is refused.
   SessionRecorder(std::string folder, Extend extend, ThrottledLog& log);
   ~SessionRecorder() override;
 
-  /// Offers the service, in a thread of its own.
+  /// In a thread of its own.
   void offer(ros::NodeHandle private_node);
-  /// What images are localised in from now on. A session that is being recorded goes on to extend its own map, with
-  /// images that are localised in that one.
+  /// A session that is being recorded goes on to extend its own map, with images that are localised in that one.
   void mapIs(const std::string& path, std::shared_ptr<const TrainingMap> map);
 
   void publish(const LocalizedImage& image, const ImageCounts& counts) override;
@@ -95,7 +92,6 @@ class SessionRecorder : public ImageOutput {
   };
 
   bool onRecordSession(RecordSession::Request& request, RecordSession::Response& response);
-  /// The recording.
   std::string begin();
   void end(const std::string& path, RecordSession::Response& response);
   std::string outputOf(const std::string& path) const;
@@ -119,7 +115,6 @@ class SessionRecorder : public ImageOutput {
   bool writes_map_ = false;
   bool ends_ = false;
   std::condition_variable changed_;
-  // Of the service and of the thread.
   ros::CallbackQueue queue_;
   ros::ServiceServer service_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;  ///< a map takes a while, and other services must not wait for it

@@ -13,7 +13,7 @@
 namespace visual_localization {
 namespace {
 
-/// Particles stay in the map's area: a disc without area, or one that does not touch the map, leaves nothing to search.
+/// A disc without area, or one that does not touch the map, leaves nothing to search.
 void requireSearchable(const Eigen::Vector2d& centre_m, double radius_m, const Area& area) {
   if (radius_m == 0.0) throw std::invalid_argument("the radius must be above 0, in metres");
   const Eigen::Vector2d nearest_m = centre_m.cwiseMax(area.min_m).cwiseMin(area.max_m);
@@ -60,7 +60,7 @@ void SharedLocalizer::setMap(std::shared_ptr<const TrainingMap> map) {
   if (!mask_.empty()) localizer->setMask(mask_);
   if (waiting_prior_) localizer->relocalize(*waiting_prior_);
   waiting_prior_.reset();
-  // The old localizer and map now end with this function, when the lock is free again.
+  // Old localizer and map end with this function, when the lock is free again.
   localizer_.swap(localizer);
   map_.swap(map);
   has_map_ = true;
@@ -116,7 +116,7 @@ void SharedLocalizer::addOdometry(const OdometryReading& reading) {
   if (odometry_.size() > kMostWaiting) odometry_.pop_front();
 }
 
-/// To the localizer, which is locked.
+/// The localizer is locked.
 void SharedLocalizer::passOdometry() {
   std::deque<OdometryReading> readings;
   {

@@ -42,39 +42,38 @@ class SharedLocalizer {
 
   explicit SharedLocalizer(const LocalizerConfig& config) : config_(config) {}
 
-  /// Other parameters from the next image on, and for later maps; see Localizer::configure. Throws ParameterError when
-  /// `config` is invalid, and then nothing has changed.
+  /// From the next image on, and for later maps. Throws ParameterError when `config` is invalid, and then nothing has
+  /// changed.
   void configure(const LocalizerConfig& config);
 
-  /// From now on localises in `map`: anywhere, or around the guess that has been waiting for a map.
+  /// Anywhere, or around the guess that has been waiting for a map.
   void setMap(std::shared_ptr<const TrainingMap> map);
   std::shared_ptr<const TrainingMap> map() const;
-  /// Never waits, unlike map(), which waits for the end of the image that is being processed.
+  /// Never waits, unlike map(), which waits for the image that is being processed.
   bool hasMap() const { return has_map_; }
 
-  /// See Localizer: for this map and all later ones.
+  /// For this map and all later ones.
   void setCamera(const CameraModel& camera);
-  /// The same for where the robot carries the camera. Throws MountError.
+  /// Throws MountError.
   void setMount(const SensorMount& mount);
   void setMask(const Mask& mask);
 
-  /// A reading of odometry for the next image. Never waits for the one that is being processed. Throws
-  /// std::invalid_argument, in words, when a number is not finite.
+  /// For the next image. Never waits. Throws std::invalid_argument, in words, when a number is not finite.
   void addOdometry(const OdometryReading& reading);
 
-  /// See Localizer::process. Nothing without a map. Throws std::invalid_argument for an unusable image.
+  /// Nothing without a map. Throws std::invalid_argument for an unusable image.
   std::optional<Result> process(std::int64_t stamp_ns, const cv::Mat& grey);
 
-  /// See Localizer::doubt. Nothing without a map.
+  /// Nothing without a map.
   std::optional<LocalizationState> doubt();
 
   /// False without a map.
   bool relocalizeAnywhere();
-  /// False without a map. Throws std::invalid_argument, with the reason in words, for a disc that around() (see
-  /// particles.h) refuses, that has no area or that does not touch the map.
+  /// False without a map. Throws std::invalid_argument, in words, for a disc that around() refuses, that has no area or
+  /// that does not touch the map.
   bool relocalizeAround(const Eigen::Vector2d& centre_m, double radius_m);
-  /// Without a map the guess is kept for the next one, and false is returned. Throws std::invalid_argument, with the
-  /// reason in words, for a guess that normallyDistributed() (see particles.h) refuses.
+  /// Without a map keeps the guess for the next one and returns false. Throws std::invalid_argument, in words, for a
+  /// guess that normallyDistributed() refuses.
   bool relocalizeAt(const Guess& guess);
 
  private:
@@ -94,9 +93,8 @@ class SharedLocalizer {
   std::atomic<bool> has_map_{false};
 };
 
-/// Position and its covariance from an initial pose. The heading is not used: the training images give it.
-/// Throws std::invalid_argument, with the reason in words, when the frame is not `global_frame` or a number is not
-/// finite. Whether position and covariance make a guess is for relocalizeAt() to say.
+/// Position and its covariance; the training images give the heading. Throws std::invalid_argument, in words, when the
+/// frame is not `global_frame` or a number is not finite.
 SharedLocalizer::Guess guessFrom(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& global_frame);
 
 }  // namespace visual_localization

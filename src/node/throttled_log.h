@@ -23,7 +23,7 @@ class ThrottledLog {
   explicit ThrottledLog(Write write, std::chrono::milliseconds period = std::chrono::seconds(5))
       : write_(std::move(write)), period_(period) {}
 
-  /// `kind` tells which messages count as the same one, whatever their text.
+  /// `kind`: which messages count as the same one.
   void warn(const std::string& kind, const std::string& text) { add(Severity::kWarning, kind, text); }
   void error(const std::string& kind, const std::string& text) { add(Severity::kError, kind, text); }
 

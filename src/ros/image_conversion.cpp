@@ -25,8 +25,7 @@ struct Encoding {
   int to_grey;
 };
 
-/// As cv_bridge has them. Without a colour's name (8UC3) it is taken for BGR, as OpenCV would; Bayer patterns have
-/// other names in OpenCV, by the second row.
+/// As cv_bridge has them. 8UC3 is taken for BGR; Bayer patterns have other names in OpenCV, by the second row.
 constexpr std::array<Encoding, 27> kEncodings{{{"mono8", CV_8UC1, kAsItIs},
                                                {"mono16", CV_16UC1, kAsItIs},
                                                {"bgr8", CV_8UC3, cv::COLOR_BGR2GRAY},
@@ -55,7 +54,7 @@ constexpr std::array<Encoding, 27> kEncodings{{{"mono8", CV_8UC1, kAsItIs},
                                                {"16UC1", CV_16UC1, kAsItIs},
                                                {"16UC3", CV_16UC3, cv::COLOR_BGR2GRAY}}};
 
-/// Foreign text for a one-line message: short and printable.
+/// For a one-line message: short and printable.
 std::string printable(const std::string& text) {
   std::string shown = text.substr(0, 40);
   std::replace_if(
@@ -76,7 +75,7 @@ std::uint64_t rowBytes(const sensor_msgs::Image& message, const Encoding& encodi
   return std::uint64_t{message.width} * CV_ELEM_SIZE(encoding.type);
 }
 
-/// Some drivers leave it zero: then there is nothing between the rows.
+/// Zero: nothing is between the rows.
 std::uint64_t stepOf(const sensor_msgs::Image& message, const Encoding& encoding) {
   return message.step == 0 ? rowBytes(message, encoding) : message.step;
 }

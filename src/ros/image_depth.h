@@ -10,7 +10,7 @@
 
 namespace visual_localization {
 
-/// The size itself. Throws ImageError when an image of this size, pixels, is empty or too large to be taken.
+/// Throws ImageError when an image of this size, pixels, is empty or too large to be taken.
 inline cv::Size requireImageSize(std::uint64_t width, std::uint64_t height) {
   if (width == 0 || height == 0) {
     throw ImageError("image is empty (" + std::to_string(width) + "x" + std::to_string(height) + ")");
@@ -19,9 +19,8 @@ inline cv::Size requireImageSize(std::uint64_t width, std::uint64_t height) {
   return {static_cast<int>(width), static_cast<int>(height)};
 }
 
-/// A grey image of 8 or 16 bits in 8. Cameras of 10, 12 or 14 bits send them in 16 and do not say which: the fewest of
-/// these that hold the brightest pixel become the range. An image of 8 bits stays as it is. `cut`: the lower bits, as
-/// OpenCV does with a PNG, instead of rounded as cv_bridge does.
+/// Cameras of 10, 12 or 14 bits send them in 16 and do not say which: the fewest that hold the brightest pixel become
+/// the range. 8 bits stay. `cut`: the lower bits, as OpenCV does with a PNG, instead of rounded as cv_bridge does.
 inline cv::Mat inEightBits(const cv::Mat& grey, bool cut = false) {
   if (grey.depth() == CV_8U) return grey;
   double brightest = 0.0;

@@ -41,7 +41,6 @@ std::string text(double value) {
   return out.str();
 }
 
-/// Element (row, column) of a matrix with `columns` must be `value`; its name is for the message.
 template <class Matrix>
 void requireElement(const Matrix& matrix, const char* name, std::size_t columns, std::size_t row, std::size_t column,
                     double value) {
@@ -50,7 +49,7 @@ void requireElement(const Matrix& matrix, const char* name, std::size_t columns,
                                    ", must be " + text(value) + ": no camera matrix");
 }
 
-/// Reads focal lengths and principal point from K (3 columns) or P (4), whose other elements must be a camera's.
+/// From K (3 columns) or P (4), whose other elements must be a camera's.
 template <class Matrix>
 void readMatrix(const Matrix& matrix, const char* name, std::size_t columns, Intrinsics& camera) {
   requireElement(matrix, name, columns, 0, 1, 0.0);
@@ -70,7 +69,7 @@ void requireFull(const sensor_msgs::CameraInfo& info) {
                    " is not in [1, " + std::to_string(kLargestSide_px) + "]");
 }
 
-/// Cuts the region of interest out of the camera's images. One of no size is the whole image.
+/// A region of no size is the whole image.
 void cutOut(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
   const auto& roi = info.roi;
   if (roi.width == 0 && roi.height == 0) return;
@@ -85,7 +84,7 @@ void cutOut(const sensor_msgs::CameraInfo& info, Intrinsics& camera) {
   camera.cy -= roi.y_offset;
 }
 
-/// Pixels that are read together along one axis; 0 means the same as 1.
+/// 0 means the same as 1.
 void bin(std::uint32_t binning, int& side_px, double& focal_length, double& centre) {
   if (binning <= 1) return;
   requireValue(binning <= kMostBinned, "binning " + std::to_string(binning) + " is not in [0, 64]");
@@ -184,7 +183,7 @@ sensor_msgs::CameraInfo toMessage(const CameraModel& camera) {
 
 namespace {
 
-/// Some drivers compute a calibration anew for each image. At 10 000 pixels this is a hundredth of one.
+/// Some drivers compute a calibration anew for each image; at 10 000 pixels this is a hundredth of one.
 constexpr double kCalibrationRounding = 1e-6;
 
 template <class Numbers>
@@ -240,7 +239,7 @@ bool isRectified(const std::string& image_topic) { return image_topic.find("/ima
 
 namespace {
 
-/// Of a variance that the receiver claims; 0 when it claims none, or what cannot be.
+/// 0 for none, or what cannot be.
 double sigmaOf(const sensor_msgs::NavSatFix& message, double variance_m2) {
   if (message.position_covariance_type == sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) return 0.0;
   return std::isfinite(variance_m2) && variance_m2 > 0.0 ? std::sqrt(variance_m2) : 0.0;

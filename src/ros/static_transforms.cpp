@@ -17,7 +17,7 @@ Eigen::Quaterniond rotationOf(const geometry_msgs::Transform& transform) {
   return {transform.rotation.w, transform.rotation.x, transform.rotation.y, transform.rotation.z};
 }
 
-/// Why it is no rigid transform; empty when it is.
+/// Empty when it is rigid.
 std::string troubleOf(const geometry_msgs::Transform& transform) {
   const Eigen::Vector3d translation(transform.translation.x, transform.translation.y, transform.translation.z);
   const double norm = rotationOf(transform).norm();
@@ -93,7 +93,7 @@ void StaticTransforms::add(const tf2_msgs::TFMessage& message, bool is_static) {
   }
 }
 
-/// The pose of `frame` in the highest frame that fixed transforms lead to.
+/// In the highest frame that fixed transforms lead to.
 std::optional<Eigen::Isometry3d> StaticTransforms::toRoot(std::string frame, std::string& root) const {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   for (std::size_t steps = 0; steps <= links_.size(); ++steps) {
@@ -121,7 +121,7 @@ std::optional<Eigen::Isometry3d> StaticTransforms::pose(const std::string& base_
   return pose.matrix().allFinite() ? std::optional<Eigen::Isometry3d>(pose) : std::nullopt;
 }
 
-/// What ends the way from a frame upwards; empty when it is only that nobody says more.
+/// What ends the way upwards; empty when it is only that nobody says more.
 std::string StaticTransforms::troubleAbove(const std::string& frame) const {
   std::string root;
   if (!toRoot(frame, root)) return "the frames above " + framed(frame) + " make a circle";

@@ -17,28 +17,25 @@ namespace visual_localization {
 /// tf2 knows frames without the slash that tf gave them.
 std::string withoutSlash(const std::string& frame);
 
-/// Of a robot; it has tens or hundreds. Frames beyond are left out: whoever publishes them may never end.
+/// A robot has tens or hundreds; frames beyond are left out: whoever publishes them may never end.
 constexpr std::size_t kMostFrames = 4096;
 
-/// Whether it names two frames, by names of a length that names have.
+/// By names of a length that names have.
 bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform);
 
-/// Where the parts of a robot are that do not move, as /tf_static tells, and /tf by what never changes. Unlike a buffer
-/// of tf2 it knows why a frame has no place: nothing that contradicts itself is believed. Not thread-safe.
+/// What does not move on a robot, by /tf_static and by what never changes in /tf. Unlike a buffer of tf2 it knows why a
+/// frame has no place: nothing that contradicts itself is believed. Not thread-safe.
 class StaticTransforms {
  public:
-  /// Of /tf_static.
   void add(const tf2_msgs::TFMessage& message);
-  /// Of /tf: counts as fixed until it changes, and only where /tf_static says nothing.
+  /// Fixed until it changes, and only where /tf_static says nothing.
   void addPublished(const tf2_msgs::TFMessage& message);
 
   /// Of `frame` in `base_frame`; nothing when they are not connected by fixed transforms.
   std::optional<Eigen::Isometry3d> pose(const std::string& base_frame, const std::string& frame) const;
-  /// Why there is no pose, in words that name both frames and those that there are.
+  /// In words that name both frames and those that there are.
   std::string whyNone(const std::string& base_frame, const std::string& frame) const;
-  /// Whether it is a part of a fixed transform.
   bool knows(const std::string& frame) const;
-  /// Whether /tf_static had any transform.
   bool hasStatic() const { return has_static_; }
 
  private:
@@ -64,8 +61,8 @@ struct RobotMount {
   std::string said;
 };
 
-/// Nothing when there is nothing that could tell. `antenna_frame`: none when only the camera is asked for. What the
-/// frames cannot tell is refused: MountError in words that name the frames.
+/// Nothing when there is nothing that could tell. `antenna_frame`: none when only the camera is asked for. Throws
+/// MountError that names the frames when they cannot tell.
 std::optional<RobotMount> robotMount(const StaticTransforms& transforms, const std::string& base_frame,
                                      const std::string& image_frame, const std::optional<std::string>& antenna_frame);
 

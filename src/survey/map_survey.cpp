@@ -16,8 +16,7 @@
 namespace visual_localization {
 namespace {
 
-/// Of the cell `dx`, `dy` beside the one at `position_m`. A map reaches 10^6 m, so each index fits into 32 bits. The
-/// keys of a column follow each other.
+/// Of the cell `dx`, `dy` beside the one at `position_m`. A map reaches 10^6 m, so each index fits into 32 bits.
 std::uint64_t keyAt(const Eigen::Vector2d& position_m, int dx, int dy) {
   constexpr std::int64_t kZero = std::int64_t{1} << 31U;
   const auto column = static_cast<std::int64_t>(std::floor(position_m.x() / SightGrid::kCell_m)) + dx + kZero;
@@ -56,7 +55,7 @@ void addImage(const TrainingPose& pose, SessionSurvey& session) {
   ++session.images;
 }
 
-/// Lengths of steps: quantiles and the longest. Reorders.
+/// Quantiles and the longest. Reorders.
 void summarise(std::vector<Step>& steps, std::size_t most_listed, MapSurvey& result) {
   if (steps.empty()) return;
   // Of equally long ones the first in the map, so that the answer does not depend on the algorithm.
@@ -266,7 +265,7 @@ bool isMoreAlike(const Alike& a, const Alike& b) {
   return a.similarity != b.similarity ? a.similarity > b.similarity : a.image < b.image;
 }
 
-/// Keeps the `count` most alike, best first.
+/// Best first.
 void keepBest(std::size_t count, std::vector<Alike>& images) {
   const auto end = images.begin() + static_cast<std::ptrdiff_t>(std::min(count, images.size()));
   std::partial_sort(images.begin(), end, images.end(), isMoreAlike);
@@ -287,7 +286,6 @@ class Search {
 
   std::size_t images() const { return globals_.size(); }
 
-  /// Asks about the image `number` of images().
   void ask(std::size_t number) {
     const std::size_t image = number * result_.stride;
     const std::vector<Alike> near = nearImages(image);
@@ -351,7 +349,7 @@ class Search {
   double globally(const GlobalFeatures& a, const GlobalFeatures& b) const { return global_.compare(a, b).similarity; }
   double bySift(std::size_t a, std::size_t b) const { return sift_.compare(*map_.local(a), *map_.local(b)).similarity; }
 
-  /// The feature counts of the map save reading what is too much; the features themselves are what counts.
+  /// Feature counts save reading what is too much.
   bool takeWork(std::size_t image, const std::vector<Alike>& near, const std::vector<Alike>& far) {
     const auto said = [this](std::size_t i) { return map_.featureCount(i); };
     if (workOf(image, near, far, said) > work_left_) return false;
@@ -376,7 +374,7 @@ class Search {
            answer.similarity >= config_.nearly_as_good * answer.near_similarity;
   }
 
-  /// Images in between that were not asked about do not end a stretch, but for those of another session.
+  /// Images in between that were not asked about do not end a stretch.
   bool wasAmbiguous(std::size_t image) const {
     const std::size_t asked = image - image % result_.stride;
     const auto found = std::lower_bound(result_.images.begin(), result_.images.end(), asked,

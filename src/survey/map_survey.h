@@ -19,12 +19,11 @@ namespace visual_localization {
 
 constexpr int kOctants = 8;
 
-/// Which eighth of the compass, counter-clockwise: 0 is centred on east, 2 on north.
+/// Eighth of the compass, counter-clockwise: 0 is centred on east, 2 on north.
 int octantOf(double yaw_rad);
 
-/// Which sessions have looked which way at which position: cells of a grid, eight directions in each. "Here" is a cell
-/// and those around it, so within about 4 m. Takes time in proportion to the logarithm of the number of cells, wherever
-/// they lie.
+/// Which sessions have looked which way where: cells of a grid, eight directions in each. "Here" is a cell and those
+/// around it, within about 4 m.
 class SightGrid {
  public:
   static constexpr double kCell_m = 2.5;
@@ -32,11 +31,8 @@ class SightGrid {
   void add(const Eigen::Vector2d& position_m, double yaw_rad, int session);
   /// Another session looks about the same way here.
   bool otherSession(const Eigen::Vector2d& position_m, double yaw_rad, int session) const;
-  /// A session before this one does.
   bool earlierSession(const Eigen::Vector2d& position_m, double yaw_rad, int session) const;
-  /// Any session looks about the opposite way here.
   bool oppositeWay(const Eigen::Vector2d& position_m, double yaw_rad) const;
-  /// Cells with an image.
   std::size_t cells() const { return cells_.size(); }
 
  private:
@@ -49,7 +45,7 @@ class SightGrid {
   template <class Predicate>
   bool anyHere(const Eigen::Vector2d& position_m, int octant, Predicate holds) const;
 
-  /// Sorted and not hashed: whoever makes a map chooses the keys, and could make all of them collide.
+  /// Sorted and not hashed: whoever makes a map could make all keys collide.
   std::map<std::uint64_t, Cell> cells_;
 };
 
@@ -63,7 +59,7 @@ struct SessionSurvey {
   double shared_m = 0.0;      ///< of it: another session has driven the same way there
 };
 
-/// Successive images of one session that have something in common.
+/// Images of one session in a row with something in common.
 struct Stretch {
   int session = 0;
   std::size_t first = 0;  ///< images of the map
@@ -109,11 +105,9 @@ struct MapSurvey {
 
 MapSurvey survey(const TrainingMap& map, const SurveyConfig& config = {});
 
-/// Whether an image belongs into a stretch.
 using OfImage = std::function<bool(std::size_t image)>;
 
-/// Successive images of each session for which `belongs` holds, in order of the map. A gap ends a stretch. Those for
-/// which `seen_elsewhere` holds are counted.
+/// Of each session, in order of the map, where `belongs` holds. A gap ends a stretch.
 std::vector<Stretch> stretchesOf(const TrainingMap& map, double gap_m, const OfImage& belongs,
                                  const OfImage& seen_elsewhere = {});
 
@@ -123,9 +117,8 @@ struct LandmarkPoint {
   int session = 0;                                       ///< of the first image that shows it
 };
 
-/// Each landmark once, where the first image that shows it has it, in the order of the images. Of a map with more than
-/// `most_images` every second image is read, or every third, and so on; of more than `most_points` landmarks likewise.
-/// Both at least 1.
+/// Each landmark once, where the first image that shows it has it. Of a map with more than `most_images` every k-th
+/// image is read; of more than `most_points` landmarks likewise. Both at least 1.
 std::vector<LandmarkPoint> landmarkPoints(const TrainingMap& map, std::size_t most_images, std::size_t most_points);
 
 /// What the landmarks of a map amount to. Their images are known without reading, all else is of the images read.
@@ -137,7 +130,7 @@ struct LandmarkSurvey {
   std::optional<std::size_t> landmarks;  ///< different ones; unknown unless all images were read
 };
 
-/// `most_images`: at least 1; of a map that has more, at most so many are read, evenly spread.
+/// `most_images`: at least 1; of a map that has more, so many are read, evenly spread.
 LandmarkSurvey landmarkSurvey(const TrainingMap& map, std::size_t most_images);
 
 /// When two images look alike although they are far apart, and how much work may go into finding them.
@@ -172,9 +165,8 @@ struct AmbiguousPlaces {
   std::size_t global_only = 0;  ///< images that are ambiguous when only global features are compared
 };
 
-/// Looks for images whose best match far away is nearly as good as the best of their neighbours that face alike, of
-/// whichever session: a twin of another session at the same place is no rival. Global features make a shortlist of far
-/// images, SIFT decides.
+/// Images whose best match far away is nearly as good as the best of their neighbours that face alike, of whichever
+/// session. Global features make a shortlist, SIFT decides.
 AmbiguousPlaces findAmbiguousPlaces(const TrainingMap& map, const AmbiguityConfig& config = {},
                                     const Progress& progress = {});
 

@@ -20,8 +20,6 @@ touch "$tree/etc/of_debian"
 
 
 class BareTreeTest(unittest.TestCase):
-    """Each test has a folder of its own."""
-
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)

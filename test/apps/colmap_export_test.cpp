@@ -23,7 +23,6 @@ using testing::UnorderedElementsAre;
 
 constexpr std::array<double, 4> kOffsets_px{0.5, -0.25, 1.0, 0.0};  ///< of a feature from its landmark's projection
 
-/// What COLMAP reads of one line.
 std::vector<std::string> wordsOf(const std::string& line) {
   std::istringstream in(line);
   return {std::istream_iterator<std::string>(in), std::istream_iterator<std::string>()};
@@ -125,7 +124,7 @@ TEST(ColmapExport, ImagesHaveNamesWithoutSpacesAndAllTheirFeatures) {
   }
 }
 
-/// Where COLMAP sees a point, by the words of the lines of a camera (OPENCV) and an image.
+/// By the words of the lines of a camera (OPENCV) and an image.
 Eigen::Vector2d seenByColmap(const std::vector<std::string>& camera, const std::vector<std::string>& image,
                              const Eigen::Vector3d& point_m) {
   const auto number = [](const std::string& word) { return std::stod(word); };

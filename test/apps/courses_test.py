@@ -79,8 +79,6 @@ def every_seed(test):
 
 
 class TownCourseTest(unittest.TestCase):
-    """Each property for every seed."""
-
     @every_seed
     def test_is_about_700_m_long(self, plan, drive):
         self.assertAlmostEqual(drive.length_m, 700, delta=20)
@@ -169,8 +167,6 @@ class PoseTest(unittest.TestCase):
 
 
 class MeadowCourseTest(unittest.TestCase):
-    """Every seed."""
-
     def test_is_300_images_long_and_smooth(self):
         for seed in SEEDS:
             with self.subTest(seed=seed):

@@ -30,7 +30,6 @@ SECONDS = 12.0
 def short_sample() -> str:
     """The sample experiment with few methods and starts."""
     yaml = SAMPLE.read_text(encoding='utf-8').replace('starts: 8', 'starts: 2')
-    yaml = yaml.partition('\ndiscussion:')[0] + '\n'  # of methods that are left out
     yaml = re.sub(r'bag: \S+/(\w+\.bag)', r'bag: \1', yaml)
     lines = [line for line in yaml.splitlines()
              if not line.startswith('  - {name: ') or any(f'name: {name},' in line for name in METHODS)]
@@ -105,7 +104,6 @@ class EvaluateTest(ProgramTest):
         self.assertEqual(list(self.output.rglob('*.partial')), [])
 
     def edited(self, part: str, replacement: str) -> Path:
-        """The short sample with one part replaced."""
         text = short_sample()
         self.assertIn(part, text)
         config = self.folder / 'edited.yaml'

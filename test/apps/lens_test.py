@@ -25,8 +25,6 @@ def rays_of(lens: Lens) -> np.ndarray:
 
 
 class LensTest(unittest.TestCase):
-    """Each test makes its lenses."""
-
     def assert_projects_back(self, lens: Lens):
         """Each ray falls on its own pixel by cv2.projectPoints."""
         camera = np.array([[lens.focal_px, 0, lens.centre[0]], [0, lens.focal_px, lens.centre[1]], [0, 0, 1]])

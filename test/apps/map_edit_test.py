@@ -18,8 +18,6 @@ MAP, SUNNY, CLOUDY, MAP_ERROR = (Path(argument) for argument in sys.argv[2:6])
 
 
 class MapEditTest(ProgramTest):
-    """Edits of the map of the sunny sample recording."""
-
     @classmethod
     def setUpClass(cls):
         """The sunny map with the cloudy recording, and a drive on it."""

@@ -28,7 +28,6 @@ MapFindings findingsOf(const TrainingMap& map) {
   return findings;
 }
 
-/// Features of one geometry whose property has this value.
 std::vector<json> featuresOf(const json& collection, const std::string& geometry, const std::string& property,
                              const json& value) {
   std::vector<json> found;

@@ -34,7 +34,6 @@ std::vector<Fix> fixesUntil(int seconds) {
   return fixes;
 }
 
-/// The only session of a plot, as its script reads it.
 json drawn(const PlottedSession& session) { return json::parse(mapPlotJson({session}, kFrame)).at("sessions").at(0); }
 
 void expectNear(const json& position_m, double east_m, double north_m, double tolerance_m) {

@@ -33,8 +33,6 @@ def run(*arguments, **environment) -> subprocess.CompletedProcess:
 
 
 class PlotMapTest(unittest.TestCase):
-    """Each test has a folder of its own."""
-
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -43,11 +41,9 @@ class PlotMapTest(unittest.TestCase):
         self.data, self.picture = self.folder / 'data.json', self.folder / 'plot.png'
 
     def write(self, *sessions: dict) -> None:
-        """The file that the script reads."""
         self.data.write_text(json.dumps({'sessions': sessions}), encoding='utf-8')
 
     def draw(self, *sessions: dict) -> list:
-        """The panels."""
         self.write(*sessions)
         with plt.rc_context(plot_map.STYLE):
             figure = plot_map.draw(plot_map.read_sessions(self.data))
@@ -64,13 +60,11 @@ class PlotMapTest(unittest.TestCase):
 
     @staticmethod
     def paths(panel, colour: str) -> list:
-        """The lines of a colour."""
         return [line.get_xydata().tolist() for line in panel.lines
                 if line.get_color() == colour and line.get_linestyle() == '-']
 
     @staticmethod
     def legend(panel) -> list:
-        """The texts of a panel's legend."""
         return [text.get_text() for text in panel.get_legend().get_texts()]
 
     def assert_refused(self, result: subprocess.CompletedProcess, code: int, *words: str) -> None:

@@ -35,7 +35,6 @@ def status_at(seconds: float, state: str = 'TRACKING', **figures: float):
 
 
 def run(*arguments, **environment) -> subprocess.CompletedProcess:
-    """Runs the script to its end; no display unless one is given."""
     inherited = {name: value for name, value in os.environ.items()
                  if name not in ('DISPLAY', 'WAYLAND_DISPLAY', 'ROS_MASTER_URI')}
     return subprocess.run([sys.executable, str(SCRIPT), *map(str, arguments)], capture_output=True, text=True,
@@ -112,7 +111,6 @@ class PlotTest(unittest.TestCase):
                 bag.write(topic, status_at(1000.0 + second, state), rospy.Time(1000 + second))
 
     def plot(self, *arguments, **environment) -> subprocess.CompletedProcess:
-        """Of the bag."""
         return run('--bag', self.bag, '--output', self.output, *arguments, **environment)
 
     def assert_refused(self, result: subprocess.CompletedProcess, code: int, *words: str) -> None:

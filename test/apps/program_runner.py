@@ -13,7 +13,6 @@ TIMEOUT_S = 200 * int(os.environ.get('VISUAL_LOCALIZATION_TEST_SLOWNESS', '1')) 
 
 
 def run(program: str, *arguments, **options) -> subprocess.CompletedProcess:
-    """Runs a program to its end."""
     command = [str(PROGRAMS / program), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False, **options)
 
@@ -30,8 +29,6 @@ def first_images(bag: Path, count: int, part: Path) -> Path:
 
 
 class ProgramTest(unittest.TestCase):
-    """Each test has a folder of its own."""
-
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)

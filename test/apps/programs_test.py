@@ -18,7 +18,6 @@ TIMES = ('extract_ms', 'match_ms', 'update_ms')
 
 
 def read_track(path: Path) -> list:
-    """Rows of a track as dictionaries."""
     with open(path, newline='', encoding='utf-8') as file:
         return list(csv.DictReader(file))
 
@@ -39,7 +38,6 @@ class ProgramsTest(ProgramTest):
         cls.short = first_images(DRIVE, 80, Path(folder.name) / 'short.bag')
 
     def localize(self, *arguments, bag=DRIVE) -> list:
-        """A run over a drive; its rows."""
         track = self.folder / 'track.csv'
         result = run('localize', '--map', MAP, '--bag', bag, '--output', track, *arguments)
         self.assertEqual(result.returncode, 0, result.stderr)

@@ -45,7 +45,6 @@ class RecordingTest(ProgramTest):
         return result.stdout
 
     def kept(self, said: str) -> int:
-        """Images of the map."""
         return int(re.search(r'^images: (\d+) kept', said, re.M).group(1))
 
 
@@ -119,7 +118,6 @@ class ClocksTest(RecordingTest):
 
 
 def copy_of(message, **changes):
-    """The same fix with other values."""
     other = copy.deepcopy(message)
     for name, value in changes.items():
         setattr(other, name, value)

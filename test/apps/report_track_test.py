@@ -12,15 +12,12 @@ METRES_PER_DEGREE = 111000.0  # nearly, of latitude
 
 
 class ReportTrackTest(unittest.TestCase):
-    """Each test has a folder of its own."""
-
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
 
     def write(self, name: str, rows: list) -> Path:
-        """A CSV file."""
         path = self.folder / name
         with open(path, 'w', newline='', encoding='utf-8') as file:
             writer = csv.DictWriter(file, rows[0].keys())
@@ -40,7 +37,6 @@ class ReportTrackTest(unittest.TestCase):
              'true_latitude_deg': 48.5 + i / METRES_PER_DEGREE, 'true_longitude_deg': 9.0} for i in range(30)])
 
     def report(self, *arguments) -> subprocess.CompletedProcess:
-        """The script to its end."""
         return subprocess.run([sys.executable, str(SCRIPT), *map(str, arguments)], capture_output=True, text=True,
                               timeout=100, check=False)
 

@@ -36,8 +36,6 @@ def circle() -> list:
 
 
 class RoundBagTest(unittest.TestCase):
-    """Each test has a folder of its own."""
-
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -57,13 +55,11 @@ class RoundBagTest(unittest.TestCase):
             write_calibration(self.folder / 'camera.yaml', Lens((32, 24), 62, DISTORTION))
 
     def run_script(self, *options: str) -> subprocess.CompletedProcess:
-        """The script to its end."""
         return subprocess.run([sys.executable, str(SCRIPTS / 'make_round_bag.py'), str(self.folder),
                                str(self.folder / 'round.bag'), *options], capture_output=True, text=True, timeout=100,
                               check=False)
 
     def messages(self, *options: str) -> dict:
-        """What the bag holds, by topic."""
         result = self.run_script(*options)
         self.assertEqual(result.returncode, 0, result.stderr)
         topics = {}

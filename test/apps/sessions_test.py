@@ -54,7 +54,6 @@ class SessionsTest(ProgramTest):
         return said
 
     def info(self, *arguments) -> str:
-        """What map_info says of the map."""
         result = run('map_info', self.map, *arguments)
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stdout

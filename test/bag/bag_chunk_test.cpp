@@ -34,7 +34,6 @@ std::string record(const std::vector<std::string>& fields, const std::string& da
   return number(header.size(), 4) + header + number(data.size(), 4) + data;
 }
 
-/// An index of connection 0 with messages at these offsets.
 std::string indexOf(const std::vector<std::size_t>& offsets) {
   std::string entries;
   for (const std::size_t offset : offsets) entries += number(0, 8) + number(offset, 4);
@@ -42,7 +41,6 @@ std::string indexOf(const std::vector<std::size_t>& offsets) {
                 entries);
 }
 
-/// A bag of fixes in one chunk with an index.
 std::string oneChunk(const std::string& compression, std::size_t size, const std::string& packed,
                      const std::string& index = indexOf({0})) {
   using Traits = sensor_msgs::NavSatFix;

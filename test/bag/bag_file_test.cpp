@@ -68,7 +68,7 @@ auto patch(const std::string& pattern, std::size_t after, const std::string& val
   };
 }
 
-/// Copies `count` bytes that stand `after` the first `pattern` to the same place of the last one.
+/// From `after` the first `pattern` to the same place of the last one.
 auto repeat(const std::string& pattern, std::size_t after, std::size_t count) {
   return [=](std::string& bytes) {
     const std::size_t first = bytes.find(pattern);

@@ -27,7 +27,7 @@ geometry_msgs::TransformStamped transform(const std::string& parent, const std::
   return message;
 }
 
-/// An optical frame in that of a camera that looks along x.
+/// In the frame of a camera that looks along x.
 geometry_msgs::TransformStamped optical(const std::string& camera) {
   geometry_msgs::TransformStamped message = transform(camera, camera + "_optical", 0.0, 0.0, 0.0);
   message.transform.rotation.x = message.transform.rotation.z = -0.5;

@@ -224,7 +224,7 @@ TEST_F(BagReaderTest, AnotherMessageDefinitionIsRefused) {
 
 TEST_F(BagReaderTest, AnImageWhoseLengthLiesIsUnusable) {
   std::string bytes = test::readAll(path_);
-  // The length of the JPEG stands behind the format, a string with its own length.
+  // Behind the format, a string with its own length, stands the length of the JPEG.
   const std::string format("\x04\0\0\0jpeg", 8);
   const std::size_t at = bytes.find(format);
   ASSERT_NE(at, std::string::npos);

@@ -130,7 +130,7 @@ TEST(CameraInfo, WhatCannotBeIsRefusedByName) {
               HasSubstr("is not in the image of 640 x 480"));
 }
 
-// As of a driver that sends memory it never wrote (introlab/rtabmap_ros#297).
+// Memory that a driver never wrote (introlab/rtabmap_ros#297).
 TEST(CameraInfo, OfStrayMemoryIsRefusedByName) {
   EXPECT_THAT(refusalOf([](auto& info) {
                 info.K = {772.868570835972, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.94825075394135e-310, 2.5e-323};
@@ -297,7 +297,7 @@ TEST_F(BagCamera, ThatChangesOrCannotBeIsRefused) {
 TEST_F(BagCamera, WhoseLengthsLieIsRefused) {
   write({example()});
   std::string bytes = test::readAll(path_);
-  // The number of coefficients stands behind the model, a string with its own length.
+  // Behind the model, a string with its own length, stands the number of coefficients.
   const std::string model("\x09\0\0\0plumb_bob", 13);
   const std::size_t at = bytes.find(model);
   ASSERT_NE(at, std::string::npos);

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Cleaned positions at the image stamps against the exact ones.
+/// Against the exact positions at the image stamps.
 void expectCleanTrajectory(const fs::path& path) {
   SCOPED_TRACE(path.filename());
   const BagReader bag(path.string());

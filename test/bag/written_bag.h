@@ -72,7 +72,6 @@ class BagFileTest : public testing::Test {
     return std::make_unique<bag::MemoryBytes>(bytes);
   }
 
-  /// Why a bag cannot be read from its beginning to its end.
   static std::string refusal(const std::string& path) {
     return test::refusalOf<bag::DamagedBag>([&path] {
       bag::BagFile bag(std::make_unique<bag::FileBytes>(path));
@@ -82,7 +81,7 @@ class BagFileTest : public testing::Test {
     });
   }
 
-  /// From now on this process gets at most so many bytes of memory beyond those that it has.
+  /// Bytes beyond those that the process has.
   static void limitMemory(std::size_t most_bytes) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // these need far more addresses
     std::size_t pages = 0;
@@ -93,7 +92,7 @@ class BagFileTest : public testing::Test {
 #endif
   }
 
-  /// The signal that ended a process that read the bag; 0 when it came to an end by itself.
+  /// 0 when it came to an end by itself.
   static int signalWhileReading(const std::string& path) {
     const pid_t child = ::fork();
     if (child == 0) {
@@ -108,7 +107,6 @@ class BagFileTest : public testing::Test {
   }
 
  private:
-  /// `action`; a bag or an image may be refused.
   template <class Action>
   static void allowRefusal(Action action) {
     try {
@@ -118,7 +116,7 @@ class BagFileTest : public testing::Test {
     }
   }
 
-  /// What programs do with a bag, and they go on where a program would not.
+  /// What programs do with a bag, going on where a program would not.
   static void use(const std::string& path) {
     const BagReader bag(path);
     allowRefusal([&] { bag.fixes("/gps/fix"); });

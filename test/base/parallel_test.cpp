@@ -36,7 +36,6 @@ class NoThreads {
   pthread_attr_t before_{};
 };
 
-/// How often each of `count` tasks is done.
 std::vector<int> timesDone(std::size_t count, std::size_t threads) {
   std::vector<std::atomic<int>> times(count);
   parallelFor(count, threads, [&times](std::size_t i) { ++times[i]; });

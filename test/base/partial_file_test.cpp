@@ -218,7 +218,7 @@ TEST(PartialFile, DisappearsWhenTheProcessIsInterrupted) {
   }
 }
 
-/// Makes files and gives them up, in several threads, until the process ends.
+/// Gives them up again, in several threads, until the process ends.
 [[noreturn]] void makeFilesWithoutEnd(const std::string& target) {
   const auto work = [&target] {
     while (true) const PartialFile file(target);

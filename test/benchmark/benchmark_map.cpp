@@ -43,7 +43,6 @@ double resident_mib() {
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
-/// Takes the file out of the system's cache.
 void forget(const std::string& path) {
   const int file = ::open(path.c_str(), O_RDONLY);
   ::fdatasync(file);

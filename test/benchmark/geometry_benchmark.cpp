@@ -1,5 +1,4 @@
-// Landmarks and poses of a session, by its number of images: time should grow as it does. And verification of the
-// matches of two images, beside OpenCV's.
+// Landmarks and poses of a session by its number of images, and verification of matches beside OpenCV's.
 #include <benchmark/benchmark.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/version.hpp>

@@ -1,4 +1,4 @@
-// Global features of an image of 320 x 240 pixels: ours, and the same quantities from OpenCV's building blocks.
+// Global features of 320 x 240 pixels: ours, and the same quantities from OpenCV's building blocks.
 #include <cmath>
 
 #include <benchmark/benchmark.h>
@@ -40,7 +40,7 @@ void bothHistograms(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(extractor.extract(image));
 }
 
-/// Gradients, magnitude and angle of all pixels: without weights and histograms.
+/// Without weights and histograms.
 void opencvGradients(benchmark::State& state) {
   const cv::Mat image = texture();
   cv::setNumThreads(1);
@@ -54,7 +54,7 @@ void opencvGradients(benchmark::State& state) {
   }
 }
 
-/// The relational kernel over ten rotations by shifted images: without weights and histograms.
+/// Ten rotations by shifted images, without weights and histograms.
 void opencvInvariants(benchmark::State& state) {
   cv::Mat image;
   texture().convertTo(image, CV_32F, 1.0 / 255.0);

@@ -58,7 +58,6 @@ void similarity(benchmark::State& state) {
   countMacs(state);
 }
 
-/// Mutual nearest neighbours and votes for a common displacement.
 void votes(benchmark::State& state) {
   const Pair pair = pairOf(state);
   const LocalSimilarity sift{{kRatio, "votes"}, SimilarityConfig()};
@@ -66,7 +65,7 @@ void votes(benchmark::State& state) {
   countMacs(state);
 }
 
-/// OpenCV's brute force with cross-check, without the votes.
+/// With cross-check, without votes.
 void opencvMutual(benchmark::State& state) {
   const Pair pair = pairOf(state);
   const cv::Mat a = floatRows(pair.a);
@@ -103,7 +102,7 @@ void nearestPlainLoop(benchmark::State& state) {
   countMacs(state);
 }
 
-/// The usual way with OpenCV: two nearest in both directions, ratio of distances, cross-check.
+/// Two nearest in both directions, ratio of distances, cross-check.
 void opencvMatch(benchmark::State& state, const cv::DescriptorMatcher& matcher) {
   const Pair pair = pairOf(state);
   const cv::Mat a = floatRows(pair.a);
@@ -127,7 +126,6 @@ void opencvMatch(benchmark::State& state, const cv::DescriptorMatcher& matcher) 
 void opencvBruteForce(benchmark::State& state) { opencvMatch(state, cv::BFMatcher(cv::NORM_L2)); }
 void opencvFlann(benchmark::State& state) { opencvMatch(state, cv::FlannBasedMatcher()); }
 
-/// One matrix product of unit vectors and a plain loop over it.
 void eigenProduct(benchmark::State& state) {
   using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Pair pair = pairOf(state);

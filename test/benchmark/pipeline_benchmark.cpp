@@ -1,6 +1,5 @@
-// The whole path from an image to a pose, on the rounds that ship: each benchmark drives the first images of the cloudy
-// round again and again through a localizer with the map of the sunny one. Beside it, what OpenCV's extraction alone
-// takes for the same images.
+// From an image to a pose, on the rounds that ship: images of the cloudy round, again and again, in the map of the
+// sunny one. Beside it OpenCV's extraction alone.
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,7 +23,6 @@ struct Scene {
   std::vector<cv::Mat> images;
 };
 
-/// Recorded once, when the first benchmark asks.
 const Scene& scene() {
   static const Scene recorded = [] {
     cv::setNumThreads(1);
@@ -40,7 +38,7 @@ const Scene& scene() {
   return recorded;
 }
 
-/// Time per image. `at` counts on from pass to pass: images to and fro, so that the robot never jumps.
+/// To and fro, so that the robot never jumps.
 const cv::Mat& imageAt(std::size_t at) {
   const std::size_t place = at % (2 * kImages);
   return scene().images[place < kImages ? place : 2 * kImages - 1 - place];

@@ -61,7 +61,6 @@ std::vector<NamedImages> imageSets() {
   return sets;
 }
 
-/// One iteration is one image.
 void extractImages(benchmark::State& state, const NamedImages& set, const char* backend) {
   cv::setNumThreads(1);
   const auto extractor = makeSiftExtractor(SiftConfig(), backend);

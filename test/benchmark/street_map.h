@@ -19,13 +19,12 @@
 
 namespace visual_localization::benchmark {
 
-/// A city that exists only as numbers: a grid of streets 100 m apart with an image every metre. Each image shows the
-/// landmarks around it, an eighth of them new, so that images eight metres apart share none. What an image looks like
-/// depends on its number, the visit and the seed alone.
+/// A grid of streets 100 m apart with an image every metre. Each image shows the landmarks around it, an eighth of them
+/// new, so that images eight metres apart share none. All depends on number, visit and seed alone.
 class StreetMap {
  public:
   /// `images`, `features` (of an image): at least 1. `located`: landmarks have positions, and features are where they
-  /// project to; otherwise anywhere.
+  /// project to.
   StreetMap(std::size_t images, std::size_t features, std::uint64_t seed, bool located = false)
       : features_(features), new_features_(features / 8 + 1), seed_(seed), located_(located) {
     while (2 * streets_ * (streets_ - 1) * kBlock_m < images) ++streets_;
@@ -44,14 +43,13 @@ class StreetMap {
     return header;
   }
 
-  /// That of a map with one session, recorded by a camera of 62 degrees.
+  /// One session, a camera of 62 degrees.
   static MapHeader locatedHeader(const std::string& session) {
     MapHeader located = header();
     located.sessions = {{session, camera()}};
     return located;
   }
 
-  /// Training image `i`.
   TrainingImage image(std::size_t i) const {
     TrainingImage image;
     static_cast<TrainingPose&>(image) = place(i);
@@ -60,8 +58,8 @@ class StreetMap {
     return image;
   }
 
-  /// The same as a recording of its own has it, with landmarks: at another time, and with a receiver that is off by up
-  /// to 0.3 m along each axis. `visit`: from 1.
+  /// In a recording of its own: at another time, with a receiver that is off by up to 0.3 m along each axis. `visit`:
+  /// from 1.
   TrainingImage locatedImage(std::size_t i, std::uint64_t visit) const {
     constexpr std::int64_t kVisit_ns = 1'000'000'000'000'000;
     TrainingImage image;
@@ -161,7 +159,7 @@ class StreetMap {
     return last.position_m + last.rotation * Eigen::Vector3d(beside_m, -up_m, ahead_m);
   }
 
-  /// Where image `i` shows it; not where the street has turned since.
+  /// Nothing where the street has turned since.
   std::optional<Eigen::Vector2d> pixelOf(std::uint64_t landmark, std::size_t i) const {
     static const CameraModel lens = camera();
     const Eigen::Vector3d point = cameraAt(i).toCamera(position_m(landmark));

@@ -1,4 +1,4 @@
-// One step of a tracker without the comparisons: all scores are at hand.
+// Without comparisons: all scores are at hand.
 #include <cmath>
 #include <memory>
 

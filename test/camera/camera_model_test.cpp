@@ -40,7 +40,6 @@ std::string refusalOfLens(const Intrinsics& intrinsics) {
   return test::refusalOf<CameraError>([&] { const CameraModel camera(intrinsics); });
 }
 
-/// What OpenCV says about a point in front of the camera.
 Eigen::Vector2d projectedByOpenCv(const Intrinsics& values, const Eigen::Vector3d& point) {
   const cv::Matx33d camera(values.fx, 0.0, values.cx, 0.0, values.fy, values.cy, 0.0, 0.0, 1.0);
   const std::vector<cv::Point3d> points = {{point.x(), point.y(), point.z()}};

@@ -20,7 +20,6 @@ CameraModel cameraWith(const std::string& name, const Coefficients& coefficients
   return CameraModel({{640, 480}, 500.0, 500.0, 320.0, 240.0, lens.distortion, lens.coefficients});
 }
 
-/// Where a ray beside the axis is seen.
 Eigen::Vector2d seen(const std::string& name, const Coefficients& coefficients) {
   return cameraWith(name, coefficients).project({0.4, -0.3, 1.0});
 }

@@ -11,7 +11,7 @@
 
 namespace visual_localization::test {
 
-/// Maps of drives along one street, each made on its own.
+/// Drives along one street, each made into a map on its own.
 class EditedStreet {
  public:
   EditedStreet() {
@@ -19,7 +19,7 @@ class EditedStreet {
     world_ = pointsAlong(drive({}), 12.0, random);
   }
 
-  /// A drive on day `day`, whose fixes are all off by `bias_m`, and the map of images [begin, end) of it.
+  /// Of images [begin, end) of a drive whose fixes are all off by `bias_m`.
   std::shared_ptr<const TrainingMap> mapOfDay(int day, const Eigen::Vector2d& bias_m, std::size_t begin = 0,
                                               std::size_t end = 45) const {
     std::mt19937 random(static_cast<std::uint32_t>(100 + day));
@@ -39,7 +39,6 @@ class EditedStreet {
     return std::make_shared<const TrainingMap>(std::move(header), std::move(images));
   }
 
-  /// Where the camera was in truth.
   static Eigen::Vector3d truth_m(int day, std::size_t image) {
     const DrivenPose pose = drive({})[image];
     return pose.camera.position_m + pose.camera.rotation * Eigen::Vector3d(0.2 * day, 0.0, 0.0);

@@ -8,12 +8,11 @@ namespace {
 
 using test::EditedStreet;
 
-/// As the first map of a new one.
 PlacedMap placed(const std::shared_ptr<const TrainingMap>& map) {
   return {map, std::vector<PoseCorrection>(map->size())};
 }
 
-/// How far both have the same apart: the mean of the difference of their errors over the images of the second.
+/// Mean difference of their errors over the images of the second.
 double apart_m(const TrainingMap& first, const TrainingMap& second, const std::vector<PoseCorrection>& corrections,
                std::size_t begin) {
   double sum_m = 0.0;

@@ -26,7 +26,6 @@ std::size_t unitsIn(const ResultFolder& results) {
   return units;
 }
 
-/// What one uninterrupted run gives.
 const std::string& expectedTables() {
   static const std::string kTables = [] {
     const test::TemporaryFolder folder;

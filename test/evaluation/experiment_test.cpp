@@ -159,7 +159,7 @@ TEST(Experiment, RefusesAFileThatIsNoExperiment) {
 }
 
 TEST(Experiment, RefusesUnknownMissingAndRepeatedKeys) {
-  expectRefused({{"starts: 3", "start: 3", "'start' is unknown; allowed here: discussion, experiment, found_within"},
+  expectRefused({{"starts: 3", "start: 3", "'start' is unknown; allowed here: experiment, found_within"},
                  {"starts: 3", "starts: 3\nstarts: 4", "'starts' appears twice"},
                  {"rounds:\n", "rounds:\n  colsed: true\n", "'rounds/colsed' is unknown"},
                  {"bag: a1.bag", "bug: a1.bag", "'rounds/bags[0]/bag' is missing"},

@@ -10,7 +10,7 @@
 
 namespace visual_localization::test {
 
-/// A drive along a route of places that look alike only near each other: what the robot at `at` sees.
+/// Places look alike only near each other.
 inline std::vector<double> rowAt(std::size_t at, std::size_t images, bool closed) {
   std::vector<double> row(images);
   for (std::size_t image = 0; image < images; ++image) {
@@ -21,7 +21,7 @@ inline std::vector<double> rowAt(std::size_t at, std::size_t images, bool closed
   return row;
 }
 
-/// Similarities that say nothing true: uniform up to `most` everywhere, added to the row.
+/// Uniform up to `most`, added to the row.
 inline std::vector<double> noisy(std::vector<double> row, double most, std::mt19937& generator) {
   for (double& similarity : row) {
     similarity += most * static_cast<double>(generator()) / static_cast<double>(std::mt19937::max());
@@ -29,7 +29,7 @@ inline std::vector<double> noisy(std::vector<double> row, double most, std::mt19
   return row;
 }
 
-/// The answer to the last of `steps` images of a drive from `from`, one training image an image.
+/// The answer to the last of `steps` images from `from`, one training image an image.
 inline Recognition drive(PlaceRecogniser& recogniser, std::size_t from, std::size_t steps, std::size_t images,
                          bool closed) {
   Recognition answer;

@@ -8,7 +8,6 @@
 namespace visual_localization {
 namespace {
 
-/// An image of a tracker.
 StepRecord stepOf(LocalizationState state, float error_m, float heading_err_deg = std::nanf(""),
                   float nees = std::nanf("")) {
   StepRecord record;

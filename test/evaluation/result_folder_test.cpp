@@ -45,7 +45,7 @@ TEST_F(ResultFolderTest, KeepsWhatIsSaved) {
 
 TEST_F(ResultFolderTest, CommentsAndWordsForTheReportMayChange) {
   withAResult();
-  const std::string other = "# a remark\n" + test::smallYaml() + "title: A title\ndiscussion: All is well.\n";
+  const std::string other = "# a remark\n" + test::smallYaml() + "title: A title\nsource: A paper\n";
   EXPECT_EQ(refusalToOpen(other), "accepted");
   EXPECT_EQ(test::readAll(path_ + "/experiment.yaml"), other);
 }

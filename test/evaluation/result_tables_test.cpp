@@ -24,7 +24,6 @@ class ResultTables : public ::testing::Test {
     }
   }
 
-  /// The rows of one method in a table.
   std::vector<Row> rowsOf(const std::string& name, const std::string& method) const {
     writeResultTables(test::smallExperiment(), results_);
     std::istringstream lines(test::readAll(results_.path() + "/" + name));

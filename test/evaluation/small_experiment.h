@@ -14,7 +14,7 @@
 
 namespace visual_localization::test {
 
-/// Three rounds, four pairs, three methods of each kind; done in a moment.
+/// Three rounds, four pairs, three methods of each kind.
 inline std::string smallYaml() {
   return R"(experiment: small
 rounds:
@@ -32,7 +32,7 @@ methods:
 )";
 }
 
-/// The small YAML with one part replaced, which must be there.
+/// The part must be there.
 inline std::string smallYamlWith(const std::string& part, const std::string& replacement) {
   std::string yaml = smallYaml();
   return yaml.replace(yaml.find(part), part.size(), replacement);
@@ -83,7 +83,6 @@ class SyntheticRounds {
 
 inline void ignoreProgress(const std::string&, std::size_t, std::size_t) {}
 
-/// The folder `path` for the small experiment.
 inline ResultFolder smallResults(const std::string& path) { return ResultFolder(path, smallYaml(), "rounds"); }
 
 inline void runSmall(const ResultFolder& results, const Shard& shard = {}, std::size_t threads = 2) {
@@ -91,7 +90,7 @@ inline void runSmall(const ResultFolder& results, const Shard& shard = {}, std::
   evaluate(smallExperiment(), rounds.source(), results, shard, threads, ignoreProgress);
 }
 
-/// A table without the columns that no two runs agree on.
+/// Columns that no two runs agree on.
 inline std::string withoutTimes(const std::string& table) {
   std::istringstream lines(table);
   std::vector<bool> is_time;
@@ -111,7 +110,7 @@ inline std::string withoutTimes(const std::string& table) {
   return kept;
 }
 
-/// All tables of the small experiment in one text, without times.
+/// In one text, without times.
 inline std::string tablesOf(const ResultFolder& results) {
   writeResultTables(smallExperiment(), results);
   std::string text;
@@ -121,7 +120,6 @@ inline std::string tablesOf(const ResultFolder& results) {
   return text;
 }
 
-/// The file of one result.
 inline std::string unitFile(const ResultFolder& results, int pair, int method) {
   return results.path() + "/units/pair" + std::to_string(pair) + "_method" + std::to_string(method) + ".csv";
 }

@@ -36,7 +36,6 @@ UnitResult exampleUnit() {
   return summariseRuns({traced, runWithErrors(0, {4.0F, kUnknown})}, {20.0, 2.0, 0.5, 0.01});
 }
 
-/// The fields of a row of a trace, by their columns.
 std::map<std::string, std::string> fieldsOf(const std::string& row) {
   const std::vector<std::string> names = csvFields(kTraceColumns);
   const std::vector<std::string> values = csvFields(row);

@@ -14,7 +14,6 @@ PROGRAMS = PREFIX / 'lib/visual_localization'
 
 
 def run(*command, **options) -> subprocess.CompletedProcess:
-    """Runs a command to its end."""
     return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=500, check=False, **options)
 
 

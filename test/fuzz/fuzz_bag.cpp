@@ -1,4 +1,4 @@
-/// A bag file: its structure, its fixes, odometry and images, the camera and where the robot carries it.
+/// Structure, fixes, odometry and images, camera and mounting.
 #include <cstdint>
 #include <memory>
 #include <optional>

@@ -1,4 +1,4 @@
-/// What map_edit reads beside maps: records of use, and areas as GeoJSON.
+/// Records of use, and areas as GeoJSON.
 #include <cstdint>
 #include <string>
 

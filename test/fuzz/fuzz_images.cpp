@@ -1,4 +1,4 @@
-/// Images as anyone on the network may send them, raw and compressed. The first byte chooses.
+/// Raw and compressed; the first byte chooses.
 #include <cstdint>
 #include <string>
 

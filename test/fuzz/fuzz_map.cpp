@@ -77,7 +77,6 @@ void requireFitting(const ImageGeometry& geometry, std::size_t features) {
   }
 }
 
-/// What a localizer asks a map for.
 void use(const TrainingMap& map) {
   constexpr std::size_t kMost = 20;
   for (std::size_t i = 0; i < map.size() && i < kMost; ++i) {

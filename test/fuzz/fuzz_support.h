@@ -16,7 +16,6 @@
 
 #include "base/text.h"
 
-/// What the fuzz targets share.
 namespace visual_localization::fuzz {
 
 /// Ends the program, as a sanitizer does: libFuzzer then keeps the input.
@@ -43,7 +42,6 @@ inline Outcomes& outcomes() {
   return so_far;
 }
 
-/// The target has read something and checked it.
 inline void countRead() { ++outcomes().read; }
 
 /// What was accepted must not be refused by what follows.
@@ -93,7 +91,6 @@ class Input {
     return text;
   }
 
-  /// All that is left.
   std::string rest() const { return std::string(reinterpret_cast<const char*>(data_), size_); }
   bool isEmpty() const { return size_ == 0; }
 

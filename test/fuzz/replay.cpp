@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 namespace visual_localization {
 namespace {
 
-/// The regular files in these folders and below, in order.
+/// And below, in order.
 std::vector<std::string> filesIn(const std::vector<std::string>& folders) {
   std::vector<std::string> paths;
   for (const std::string& folder : folders) {

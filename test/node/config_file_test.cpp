@@ -16,7 +16,7 @@ std::string textOf(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-/// A file lists every parameter with its default, and is valid itself.
+/// Lists every parameter with its default, and is valid itself.
 template <class Config>
 void expectListsEveryParameter(const std::string& path) {
   Config config;

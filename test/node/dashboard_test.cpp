@@ -18,7 +18,7 @@ LocalizationStatus statusOf(std::uint8_t state, double similarity = 0.2) {
   return status;
 }
 
-/// Pixels of a picture that have the colour of a state, within `area` of it.
+/// Within `area`.
 int pixelsOf(const cv::Mat& picture, std::uint8_t state, const cv::Rect& area) {
   cv::Mat same;
   cv::inRange(picture(area), colourOfState(state), colourOfState(state), same);

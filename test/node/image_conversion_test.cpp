@@ -39,7 +39,6 @@ sensor_msgs::CompressedImage compressed(const std::string& extension) {
   return message;
 }
 
-/// Bytes of a number, the highest first.
 std::vector<std::uint8_t> bigEndian(std::size_t value, int count) {
   std::vector<std::uint8_t> bytes;
   for (int i = count - 1; i >= 0; --i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
@@ -128,7 +127,6 @@ TEST(ImageConversion, BayerOfSixteenBitsIsTheOneOfEight) {
   }
 }
 
-/// A ramp of a camera of so many bits.
 cv::Mat rampOf(int bits) {
   cv::Mat ramp(48, 64, CV_16UC1);
   const int full = (1 << bits) - 1;

@@ -60,7 +60,6 @@ class ImageWorkerTest : public testing::Test {
     worker_.start("/camera");
   }
 
-  /// Pushes one image and waits for its end.
   void show(ReceivedImage image) {
     worker_.push(std::move(image));
     waitUntilAllHaveEnded();
@@ -74,7 +73,7 @@ class ImageWorkerTest : public testing::Test {
     }
   }
 
-  /// Counts at the end, when nothing more is published.
+  /// When nothing more is published.
   ImageCounts finish() {
     worker_.stop();
     return worker_.counts();
@@ -204,7 +203,7 @@ TEST_F(ImageWorkerTest, AnImageThatCannotBePublishedIsNotRefusedAsWell) {
   EXPECT_THAT(lines_, testing::Contains(HasSubstr("no subscriber likes it")));
 }
 
-/// A mix of all, from several threads, while another one looks at the counts.
+/// From several threads, while another one looks at the counts.
 TEST_F(ImageWorkerTest, EveryReceivedImageComesToOneEnd) {
   worker_.start("/camera");
   std::atomic<bool> done{false};

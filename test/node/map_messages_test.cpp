@@ -37,7 +37,7 @@ TrainingMap mapOf(std::vector<TrainingImage> images) {
   return TrainingMap(header, std::move(images));
 }
 
-/// The markers of landmarks: one or none.
+/// One or none.
 std::vector<Marker> landmarksOf(const TrainingMap& map) {
   std::vector<Marker> found;
   for (const Marker& marker : toMarkers(map, "map").markers) {

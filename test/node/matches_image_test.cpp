@@ -14,14 +14,13 @@
 namespace visual_localization {
 namespace {
 
-/// Pixels of `area` that are not grey: where something is drawn.
+/// Where something is drawn.
 int colouredPixels(const cv::Mat& canvas, const cv::Rect& area) {
   cv::Mat channels[3];
   cv::split(canvas(area & cv::Rect({}, canvas.size())), channels);
   return cv::countNonZero(channels[0] != channels[2]);
 }
 
-/// Of the left half.
 int colouredPixels(const cv::Mat& canvas) { return colouredPixels(canvas, {0, 0, canvas.cols / 2, canvas.rows}); }
 
 TEST(MatchesImage, ShowsBothImagesSideBySide) {
@@ -96,7 +95,7 @@ TEST(MatchesImage, DrawsTheMatchesOfTheMode) {
   EXPECT_TRUE(isJoined(one_way, sift, 1));
 }
 
-/// Pixels that are clearly more green than red, or the other way round.
+/// Clearly more of one channel than of the other.
 int pixelsMoreOf(const cv::Mat& canvas, int channel, int than) {
   cv::Mat channels[3];
   cv::split(canvas, channels);

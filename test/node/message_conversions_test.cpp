@@ -54,7 +54,7 @@ Estimate metricEstimate() {
   return estimate;
 }
 
-/// Any single number of a metric pose that is not finite must be seen.
+/// Each that is not finite must be seen.
 std::vector<std::function<double&(MetricPose&)>> numbersOf() {
   return {[](MetricPose& pose) -> double& { return pose.base.translation().z(); },
           [](MetricPose& pose) -> double& { return pose.base.linear()(1, 2); },

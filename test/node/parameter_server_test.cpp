@@ -12,7 +12,7 @@ namespace {
 
 using XmlRpc::XmlRpcValue;
 
-/// The message of the ParameterError that `values` causes; empty without one.
+/// Empty without one.
 std::string errorOf(const ParameterValues& values) {
   NodeParameters parameters;
   try {

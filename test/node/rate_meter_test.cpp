@@ -7,7 +7,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// The rate a moment after the last of events that come every `interval`.
+/// A moment after the last event.
 double rateOf(milliseconds interval, int count) {
   RateMeter meter;
   RateMeter::Clock::time_point now;

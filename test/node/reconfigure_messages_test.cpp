@@ -21,7 +21,6 @@ class ReconfigureMessages : public ::testing::Test {
   parameters::Declaration declare_ = [this](ParameterVisitor& visitor) { parameters_.declare(visitor); };
 };
 
-/// Names of all parameters of a message's groups.
 std::set<std::string> namesOf(const dynamic_reconfigure::ConfigDescription& description) {
   std::set<std::string> names;
   for (const auto& group : description.groups) {

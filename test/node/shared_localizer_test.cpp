@@ -82,7 +82,7 @@ TEST(SharedLocalizer, AGuessThatIsNoneIsRefusedAndNotKept) {
   EXPECT_NO_THROW(localizer.setMap(test::smallMap()));
 }
 
-/// The reason for refusing a disc in the small map; empty when it was searched.
+/// In the small map; empty when it was searched.
 std::string refusalOfDisc(const Eigen::Vector2d& centre_m, double radius_m) {
   SharedLocalizer localizer{test::swarmConfig()};
   localizer.setMap(test::smallMap());
@@ -119,7 +119,7 @@ TEST(SharedLocalizer, AnUnusableImageChangesNothing) {
   EXPECT_TRUE(localizer.process(kSecond_ns, noise()).has_value());
 }
 
-/// Positions of all particles, to see whether they moved.
+/// To see whether the particles moved.
 std::vector<Eigen::Vector2d> cloudOf(const std::optional<SharedLocalizer::Result>& result) {
   std::vector<Eigen::Vector2d> positions;
   for (const Particle& particle : result->particles) positions.push_back(particle.position_m);

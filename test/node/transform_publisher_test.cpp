@@ -30,7 +30,7 @@ constexpr double kSigma_m = 0.2;
 constexpr double kSigma_rad = 0.05;
 const tf2::Transform kFarInOdom = transform(800.0, -300.0, 2.0);  // of a robot that has driven for long
 
-/// How far the robot, at kFarInOdom, is from where `odom_in_map` has it.
+/// From where `odom_in_map` has the robot, at kFarInOdom.
 double apart_m(const tf2::Transform& shown, const tf2::Transform& odom_in_map) {
   return ((shown * kFarInOdom).getOrigin() - (odom_in_map * kFarInOdom).getOrigin()).length();
 }

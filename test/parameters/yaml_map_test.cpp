@@ -18,7 +18,7 @@ using ::testing::Not;
 using ::testing::Pair;
 using ::testing::StartsWith;
 
-/// What `use` refuses in the mapping `text`, in a file called f.yaml.
+/// In a file called f.yaml.
 std::string refusalOfText(
     const std::string& text, const std::function<void(YamlMap&)>& use = [](YamlMap&) {}) {
   return test::refusalOf<ParameterError>([&] {

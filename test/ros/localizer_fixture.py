@@ -43,15 +43,12 @@ def wait_for(condition, timeout_s, what):
 
 
 def distance_m(a, b):
-    """Between two fixes that are close together."""
     north = math.radians(a.latitude - b.latitude)
     east = math.radians(a.longitude - b.longitude) * math.cos(math.radians(b.latitude))
     return EARTH_RADIUS_M * math.hypot(north, east)
 
 
 class Recorder:
-    """Keeps every message of a topic."""
-
     def __init__(self, topic, message_type):
         self._lock = threading.Lock()
         self._messages = []
@@ -78,8 +75,6 @@ class Recorder:
 
 
 class LogRecorder(Recorder):
-    """What all nodes log."""
-
     def __init__(self):
         super().__init__('/rosout', Log)
 
@@ -168,7 +163,6 @@ def wait_for_silence(localizer, seconds=1.0):
 
 
 def memory_mb(node):
-    """Resident memory of a node's process."""
     _, _, pid = xmlrpc.client.ServerProxy(rosnode.get_api_uri(rosgraph.Master('/test'), node)).getPid('/test')
     with open('/proc/%d/status' % pid) as status:
         return [float(line.split()[1]) / 1024.0 for line in status if line.startswith('VmRSS')][0]
@@ -188,7 +182,6 @@ def images_of(bag_path, first=0, count=None):
 
 
 def image_of(pixels, encoding, stamp):
-    """Pixels as a raw image."""
     pixels = np.ascontiguousarray(pixels)
     image = Image(height=pixels.shape[0], width=pixels.shape[1], step=pixels.strides[0], encoding=encoding)
     image.header.stamp = stamp
@@ -206,8 +199,6 @@ def share_below(errors, limit_m):
 
 
 class Player:
-    """`rosbag play` as a child process."""
-
     def __init__(self, bag_path, rate, start_s=0.0, duration_s=None):
         command = ['rosbag', 'play', '--quiet', '-d', '1', '-r', str(rate), '-s', str(start_s), bag_path]
         if duration_s is not None:

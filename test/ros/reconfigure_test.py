@@ -23,7 +23,6 @@ DYNPARAM = ['rosrun', 'dynamic_reconfigure', 'dynparam']
 
 
 def run(*command):
-    """What a command line tool prints."""
     return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True,
                           timeout=60, check=True).stdout
 

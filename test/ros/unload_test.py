@@ -20,8 +20,6 @@ RATE_HZ = 25.0
 
 
 class Camera:
-    """Publishes the images of a bag again and again."""
-
     def __init__(self, images):
         self._publisher = rospy.Publisher('/camera/compressed', CompressedImage, queue_size=1)
         self._images = itertools.cycle(images)

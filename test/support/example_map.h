@@ -30,12 +30,12 @@ inline GlobalFeatures::Histogram randomHistogram(std::mt19937& random) {
   return histogram;
 }
 
-/// A calibrated camera of 320 x 240 pixels.
+/// 320 x 240 pixels.
 inline CameraModel exampleCamera() {
   return CameraModel({{320, 240}, 266.25, 266.5, 159.5, 119.5, Distortion::kPlumbBob, {-0.1, 0.01, 1e-4, -1e-4, 0.0}});
 }
 
-/// Of 320 x 240 pixels; the robot is seen in the lowest rows.
+/// 320 x 240 pixels; the robot is seen in the lowest rows.
 inline Mask exampleMask() {
   cv::Mat grey(240, 320, CV_8U, cv::Scalar(255));
   grey.rowRange(200, 240).setTo(0);

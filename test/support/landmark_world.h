@@ -91,7 +91,7 @@ std::shared_ptr<const TrainingMap> mapOf(const RecordedDrive& drive);
 /// Reflected signals: from `begin` to `end` (shares of the drive) the fixes bend aside, by `most_m` in the middle.
 void bendFixes(RecordedDrive& drive, double begin, double end, double most_m);
 
-/// Horizontal distances of these positions from the truth: their root mean square.
+/// Horizontal root mean square.
 double pathError_m(const std::vector<Eigen::Vector2d>& positions_m, const std::vector<DrivenPose>& truth);
 
 }  // namespace visual_localization::test

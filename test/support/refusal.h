@@ -6,7 +6,7 @@
 
 namespace visual_localization::test {
 
-/// The line with which an exception of this class refuses an action; "accepted" if nothing does.
+/// "accepted" if no exception of this class refuses the action.
 template <class Error, class Action>
 std::string refusalOf(const Action& action) {
   try {

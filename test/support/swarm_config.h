@@ -4,8 +4,8 @@
 
 namespace visual_localization::test {
 
-/// The swarm with the papers' similarity, and TRACKING by thresholds on it: what most rules of the localizer were
-/// written for, and what these tests ask about. The defaults have tests of their own.
+/// The papers' similarity, and TRACKING by thresholds on it: what most rules of the localizer were written for. The
+/// defaults have tests of their own.
 inline LocalizerConfig swarmConfig() {
   LocalizerConfig config;
   config.tracker = "dpso";

@@ -12,7 +12,7 @@
 
 namespace visual_localization::test {
 
-/// A descriptor with the given values in its first bins and zeros behind.
+/// Zeros behind the first bins.
 std::vector<std::uint8_t> descriptor(const std::vector<int>& first_bins);
 /// Features with these descriptors at keypoints (0, 0), (1, 0), ...
 LocalFeatures featuresOf(const std::vector<std::vector<std::uint8_t>>& descriptors);
@@ -21,14 +21,14 @@ LocalFeatures randomFeatures(std::size_t count, std::uint32_t seed);
 
 /// A map of images without features at these positions, heading from each to the next.
 std::shared_ptr<const TrainingMap> mapAt(const std::vector<Eigen::Vector2d>& positions_m);
-/// `count` positions on a circle, counter-clockwise from the east.
+/// Counter-clockwise from the east.
 std::vector<Eigen::Vector2d> circle(std::size_t count, double radius_m);
-/// `count` positions on the east axis.
+/// On the east axis.
 std::vector<Eigen::Vector2d> street(std::size_t count, double spacing_m);
 
-/// A long wall with random blocks on it, 8-bit grey: a street to drive along, seen from the side.
+/// Random blocks, 8-bit grey: a street seen from the side.
 cv::Mat wall(int width_px, int height_px, std::uint32_t seed);
-/// What a camera of 320 x 240 pixels sees of the wall from `left_px` on.
+/// 320 x 240 pixels from `left_px` on.
 cv::Mat viewOf(const cv::Mat& wall, int left_px);
 
 }  // namespace visual_localization::test

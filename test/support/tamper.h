@@ -7,7 +7,7 @@
 
 namespace visual_localization::test {
 
-/// Changes a stored map with SQL, as an attacker could.
+/// As an attacker could.
 inline void tamper(const std::string& path, const std::string& sql) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);

@@ -55,10 +55,9 @@ class World {
   SessionChoice sessions_;
 };
 
-/// A round of 30 m radius with an image every 0.94 m.
+/// Radius 30 m, an image every 0.94 m.
 inline World roundWorld() { return World(mapAt(circle(200, 30.0))); }
 
-/// The place `arc_m` along that round.
 inline Eigen::Vector2d onCircle(double arc_m) {
   return 30.0 * Eigen::Vector2d(std::cos(arc_m / 30.0), std::sin(arc_m / 30.0));
 }

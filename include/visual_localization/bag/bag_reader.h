@@ -49,8 +49,8 @@ class BagImages {
   const std::string& topic() const;
   /// Throws BagError when the bag is damaged there.
   BagImage read(std::size_t i) const;
-  /// The size of most images, by the headers of at most a hundred that are spread evenly; the smaller one of equals.
-  /// Empty when none of them is usable. Throws like read().
+  /// The size of most images, by the headers of at most a hundred, evenly spread; the smaller one of equals. Empty when
+  /// none is usable. Throws like read().
   cv::Size usualSize() const;
 
  private:
@@ -74,39 +74,36 @@ class BagReader {
  public:
   /// Throws BagError when there is no readable, indexed bag at `path`.
   explicit BagReader(const std::string& path);
-  /// The same for a bag that lies in `bytes` (never null); `name` takes the place of the path.
+  /// A bag in `bytes` (never null); `name` takes the place of the path.
   BagReader(std::string name, std::unique_ptr<const bag::Bytes> bytes);
 
-  /// Finds `topic` as sensor_msgs/Image, or `topic` or `<topic>/compressed` as sensor_msgs/CompressedImage, in
-  /// this order. Throws BagError naming the image topics that the bag does have.
+  /// `topic` as sensor_msgs/Image, or `topic` or `<topic>/compressed` as sensor_msgs/CompressedImage, in this order.
+  /// Throws BagError naming the image topics of the bag.
   BagImages images(const std::string& topic) const;
 
-  /// What is on a topic of positions, sensor_msgs/NavSatFix or nav_msgs/Odometry, by the frames that its messages are
-  /// about: those with the most usable fixes first. Throws BagError that names the topics that the bag does have, or
-  /// the topic's own type.
+  /// Of sensor_msgs/NavSatFix or nav_msgs/Odometry, by the frames that the messages are about: those with the most
+  /// usable fixes first. Throws BagError that names the topics of the bag, or the topic's own type.
   std::vector<Receiver> receivers(const std::string& topic) const;
 
-  /// All fixes of a sensor_msgs/NavSatFix topic in the order of recording, believable or not. Throws BagError
-  /// naming the fix topics that the bag does have.
+  /// Of sensor_msgs/NavSatFix in the order of recording, believable or not. Throws BagError naming the fix topics of
+  /// the bag.
   std::vector<Fix> fixes(const std::string& topic) const;
 
-  /// All readings of a nav_msgs/Odometry topic in the order of recording, of the robot's frame `base_frame`. Throws
-  /// BagError naming the odometry topics that the bag does have, or why a message is none.
+  /// Of nav_msgs/Odometry in the order of recording, of the robot's frame `base_frame`. Throws BagError naming the
+  /// odometry topics of the bag, or why a message is none.
   std::vector<OdometryReading> odometry(const std::string& topic, const std::string& base_frame,
                                         const std::string& map_frame) const;
 
-  /// Whether it has such a topic.
   bool hasFixes(const std::string& topic) const;
 
-  /// Calibration of the camera whose images are on `image_topic`, raw or compressed: the sensor_msgs/CameraInfo beside
-  /// them, by image_transport's naming. Nothing when the bag has none or the camera is not calibrated. Throws BagError
-  /// when the calibration cannot be used, or when it changes within the bag: then it holds for a part of the images.
+  /// The sensor_msgs/CameraInfo beside the images of `image_topic` (raw or compressed), by image_transport's naming.
+  /// Nothing when there is none or the camera is not calibrated. Throws BagError when the calibration cannot be used,
+  /// or changes within the bag.
   std::optional<CameraModel> camera(const std::string& image_topic) const;
 
-  /// What does not move on the robot, as /tf_static tells; `published`: and what never changes in /tf.
+  /// Of /tf_static; `published`: and what never changes in /tf.
   std::shared_ptr<const StaticTransforms> transforms(bool published) const;
-  /// Frame of the first image of a topic, raw or compressed, or of the calibration beside it; empty when neither names
-  /// one.
+  /// Of the first image, or of the calibration beside it; empty when neither names one.
   std::string imageFrame(const std::string& image_topic) const;
 
   const std::string& path() const { return path_; }

@@ -16,28 +16,26 @@ class ImageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// 8-bit grey image of a message. Its encoding is mono, bgr, rgb, bgra, rgba or bayer_* of 8 or 16 bits, yuv422 (uyvy),
-/// yuv422_yuy2 (yuyv), or one of OpenCV's names for such pixels. Sixteen bits become eight by the depth of the camera,
-/// 10, 12, 14 or 16 bits: the least that holds the brightest pixel. Throws ImageError for any other encoding, for more
-/// than 16 777 216 pixels (4096 x 4096) or 16384 a side, and when size, step and data do not agree.
+/// 8-bit grey of mono, bgr, rgb, bgra, rgba or bayer_* of 8 or 16 bits, yuv422 (uyvy), yuv422_yuy2 (yuyv), or OpenCV's
+/// names for such pixels. Sixteen bits become eight by the least depth of 10, 12, 14 or 16 bits that holds the
+/// brightest pixel. Throws ImageError for any other encoding, for more than 16 777 216 pixels (4096 x 4096) or 16384 a
+/// side, and when size, step and data do not agree.
 cv::Mat toGrey(const sensor_msgs::Image& message);
 
-/// 8-bit grey image of a JPEG or PNG message; bytes behind its end do not matter. Throws ImageError when it is neither,
-/// broken, cut off or larger than a raw one may be; the decoder's own reading of the header says so before it takes
-/// memory for the pixels.
+/// 8-bit grey of a JPEG or PNG; bytes behind its end do not matter. Throws ImageError when it is neither, broken, cut
+/// off or larger than a raw one may be, before it takes memory for the pixels.
 cv::Mat toGrey(const sensor_msgs::CompressedImage& message);
 
-/// Size of such an image in pixels by its header; nothing is decoded. Throws ImageError where toGrey finds the message
-/// unusable without decoding it.
+/// Pixels, by the header; nothing is decoded. Throws ImageError where toGrey finds the message unusable without
+/// decoding it.
 cv::Size sizeOf(const sensor_msgs::Image& message);
 cv::Size sizeOf(const sensor_msgs::CompressedImage& message);
 
-/// Size of a JPEG or a PNG by its header, pixels; nothing is decoded. Throws ImageError when it is neither, empty or
-/// too large.
+/// Pixels, by the header of a JPEG or PNG. Throws ImageError when it is neither, empty or too large.
 cv::Size compressedSize(const std::vector<std::uint8_t>& file);
 
-/// 8-bit grey image of a JPEG or a PNG. Throws ImageError when it is neither, broken, cut off or too large. It takes no
-/// memory for pixels before the decoder itself has read how many there are, and none for texts in the file.
+/// 8-bit grey of a JPEG or PNG. Throws ImageError when it is neither, broken, cut off or too large. Takes no memory for
+/// pixels before the decoder has read how many there are, and none for texts in the file.
 cv::Mat decodedToGrey(const std::vector<std::uint8_t>& file);
 
 }  // namespace visual_localization
