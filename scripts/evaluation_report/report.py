@@ -9,7 +9,8 @@ from .discussion import discussed
 from .figures import Figures
 from .files import written_whole
 from .papers import Papers
-from .tables import escape, filtered_tables, pose_tables, relative_tables, result_tables, tracking_tables, trust_tables
+from .tables import (claims_tables, escape, filtered_tables, pose_tables, relative_tables, reliability_table,
+                     result_tables, tracking_tables, trust_tables)
 from .words import in_words
 
 
@@ -45,7 +46,9 @@ def introduction(results: Results) -> str:
 def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]]) -> str:
     """The whole report in Markdown."""
     text = introduction(results) + '## Results\n\n' + result_tables(results, papers)
-    for title, tables in (('Poses: recall within position and heading', pose_tables(results)),
+    for title, tables in (('Right places and wrong claims', claims_tables(results)),
+                          ('Not wrong, % (images), by the probability around the estimate', reliability_table(results)),
+                          ('Poses: recall within position and heading', pose_tables(results)),
                           ('Poses in relation to the map', relative_tables(results)),
                           ('Poses behind a filter', filtered_tables(results))):
         text += f'\n## {title}\n\n{tables}' if tables else ''
