@@ -61,6 +61,9 @@ clang libclang-rt-dev llvm: fuzzing
 python3-clang: mutation testing'
 readonly PACKAGING='
 file dpkg-dev: the libraries that a Debian package needs'
+readonly MODELS='
+python3-torch: export of learned features
+python3-onnx: the tiny model of the tests'
 readonly RVIZ='
 rviz xvfb: rviz and a virtual display
 python3-tk: the window of plot_status.py'
@@ -73,13 +76,14 @@ readonly -A DEBIAN_11=(
 usage() {
   cat <<'USAGE'
 Usage: install_dependencies.sh [--with-lint] [--with-rviz] [--with-clang] [--with-packaging]
-                               [--core-only | --run-only] [--list] [--log FILE]
+                               [--with-models] [--core-only | --run-only] [--list] [--log FILE]
 Installs with apt what is missing; does nothing when everything is there. Needs root or sudo only to install.
 Before it installs, it prints what is missing, what for, and the command for root.
   --with-lint       also clang-format, clang-tidy and shellcheck
   --with-rviz       also rviz, a virtual display and what the window of plot_status.py needs
   --with-clang      also clang with its sanitizers and libFuzzer
   --with-packaging  also what build_deb.sh needs
+  --with-models     also what export_features.py and its test need (0.2 GB)
   --core-only       only what the library without ROS needs
   --run-only        only what the built package runs, beside the libraries that it is linked with
   --list            print the packages, one a line, and install nothing
@@ -180,6 +184,7 @@ main() {
       --with-clang) extra+=("$CLANG") ;;
       --with-rviz) extra+=("$RVIZ") ;;
       --with-packaging) extra+=("$PACKAGING") ;;
+      --with-models) extra+=("$MODELS") ;;
       --core-only) tables=("$CORE") ;;
       --run-only) tables=("$ROS_RUN" "$PLOTS") ;;
       --list) list=true ;;

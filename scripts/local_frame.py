@@ -1,6 +1,6 @@
 """East and north near a position of the WGS84 ellipsoid, and those of a map."""
 import math
-from typing import Dict, Tuple
+from typing import Dict, Sequence, Tuple
 
 import numpy as np
 
@@ -30,3 +30,20 @@ class LocalFrame:
         """Rows of east and north, metres."""
         return np.column_stack(((longitude - self.tie[1]) * self.east_m + self.tie[2],
                                 (latitude - self.tie[0]) * self.north_m + self.tie[3]))
+
+
+def geodetic(datum: Sequence[float], east: float, north: float, up: float) -> Tuple[float, float, float]:
+    """Latitude and longitude in degrees and altitude of a position in metres from `datum`, which is given so too."""
+    latitude, longitude = math.radians(datum[0]), math.radians(datum[1])
+    sin_lat, cos_lat, sin_lon, cos_lon = math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
+    radius = SEMI_MAJOR_M / math.sqrt(1 - ECCENTRICITY2 * sin_lat ** 2)
+    outwards = (radius + datum[2] + up) * cos_lat - north * sin_lat  # from the Earth's axis, on the datum's meridian
+    x, y = outwards * cos_lon - east * sin_lon, outwards * sin_lon + east * cos_lon
+    z = (radius * (1 - ECCENTRICITY2) + datum[2] + up) * sin_lat + north * cos_lat
+    distance = math.hypot(x, y)
+    latitude = math.atan2(z, distance * (1 - ECCENTRICITY2))
+    for _ in range(5):  # each step gains more than two digits
+        radius = SEMI_MAJOR_M / math.sqrt(1 - ECCENTRICITY2 * math.sin(latitude) ** 2)
+        latitude = math.atan2(z + ECCENTRICITY2 * radius * math.sin(latitude), distance)
+    altitude = distance * math.cos(latitude) + z * math.sin(latitude) - SEMI_MAJOR_M ** 2 / radius
+    return math.degrees(latitude), math.degrees(math.atan2(y, x)), altitude

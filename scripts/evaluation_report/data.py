@@ -3,7 +3,7 @@ import csv
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 import yaml
 
@@ -70,6 +70,15 @@ class Series:
         return any(math.isfinite(value) for value in self.columns.get(name, []))
 
 
+class Claim(NamedTuple):
+    """Images of a method whose probability lies in a bin."""
+    method: str
+    begin: float
+    images: float
+    probability: float  # mean
+    not_wrong: float  # share
+
+
 @dataclass
 class Results:
     """The content of the folder."""
@@ -80,6 +89,7 @@ class Results:
     settings: Dict[str, Dict[str, str]]
     steps: Dict[Group, Dict[str, Series]]
     traces: Dict[Tuple[str, str], Dict[str, Series]]
+    claims: List[Claim] = field(default_factory=list)
 
     def groups(self) -> List[Group]:
         return list(dict.fromkeys(outcome.group for outcome in self.outcomes))
@@ -179,6 +189,19 @@ def read_settings(path: Path) -> Dict[str, Dict[str, str]]:
     return settings
 
 
+def read_claims(path: Path) -> List[Claim]:
+    """The rows of reliability.csv, of all pairs of groups; empty when the file is missing."""
+    columns = ('from', 'images', 'mean_probability', 'not_wrong_share')
+    claims: List[Claim] = []
+    if path.exists():
+        for line, row in read_rows(path, ('method', *columns)):
+            values = [number(path, line, name, row[name]) for name in columns]
+            if None in values:
+                raise DataError(path, f'line {line}: {columns[values.index(None)]} is empty')
+            claims.append(Claim(row['method'], *values))
+    return claims
+
+
 def read_description(path: Path) -> Dict[str, Any]:
     """The experiment's YAML; empty when the file is missing."""
     if not path.exists():
@@ -209,4 +232,5 @@ def read_results(folder: Path) -> Results:
         pairs=read_pairs(folder / 'pairs.csv'),
         settings=read_settings(folder / 'methods.csv'),
         steps=read_series(folder / 'steps.csv', ('train_group', 'test_group'), CURVES),
-        traces=read_series(folder / 'traces.csv', ('train_round', 'test_round'), TRACES))
+        traces=read_series(folder / 'traces.csv', ('train_round', 'test_round'), TRACES),
+        claims=read_claims(folder / 'reliability.csv'))

@@ -11,6 +11,7 @@ from .experiments import HYBRID
 from .files import written_whole
 from .grids import motion_figure
 from .papers import Papers
+from .reliability import reliability_figure
 from .style import STYLE, Palette, literal, plt
 
 # With more methods than this, bars are unreadable; such experiments have other figures.
@@ -81,7 +82,9 @@ class Figures:
 
     def _general(self) -> List[Drawing]:
         return self._error_bars() + self._comparison_bars() + (
-            self._steps() if len(self._results.methods()) <= MOST_BARS else [])
+            self._steps() if len(self._results.methods()) <= MOST_BARS else []) + [
+                Drawing('reliability', 'How often estimates are right by the probability around them, all pairs',
+                        lambda title: reliability_figure(self._results, self._palette, title))]
 
     def _speed(self) -> List[Drawing]:
         return [Drawing('speed', 'Mean error at different simulated speeds',

@@ -7,7 +7,8 @@ from .data import DataError, Results, read_results
 from .figures import Figures
 from .files import written_whole
 from .papers import Papers
-from .tables import escape, filtered_tables, pose_tables, relative_tables, result_tables, tracking_tables, trust_tables
+from .tables import (claims_tables, escape, filtered_tables, pose_tables, relative_tables, reliability_table,
+                      result_tables, tracking_tables, trust_tables)
 
 # What somebody wrote into a report by hand stays when it is written again.
 DISCUSSION = re.compile(r'^## Discussion\n.*?(?=^## |\Z)', re.DOTALL | re.MULTILINE)
@@ -38,7 +39,9 @@ def introduction(results: Results) -> str:
 
 def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]], discussion: str) -> str:
     text = introduction(results) + '## Results\n\n' + result_tables(results, papers)
-    for title, tables in (('Poses: recall within position and heading', pose_tables(results)),
+    for title, tables in (('Right places and wrong claims', claims_tables(results)),
+                          ('Not wrong, % (images), by the probability around the estimate', reliability_table(results)),
+                          ('Poses: recall within position and heading', pose_tables(results)),
                           ('Poses in relation to the map', relative_tables(results)),
                           ('Poses behind a filter', filtered_tables(results))):
         text += f'\n## {title}\n\n{tables}' if tables else ''

@@ -5,6 +5,7 @@ from .data import Group, Number, Outcome, Results, plain
 from .experiments import (CHANGING, CONSTANT, HYBRID, GridPoint, by_illumination, grid_point, group_title,
                           speed_of, thresholds_of)
 from .papers import PaperValue, Papers
+from .reliability import pooled
 
 
 class Measure(NamedTuple):
@@ -64,6 +65,11 @@ FILTERED_POSES = (Measure('filtered_err_m', 'mean error [m]', 2),
                   Measure('relative_filtered_err_m', 'to the map: mean error [m]', 3),
                   Measure('relative_filtered_inside_95_share', 'inside the 95 % ellipse [%]', 1, 100),
                   Measure('relative_filtered_nees', 'NEES', 2))
+CLAIMS = (Measure('right_share', 'right [%]', 1, 100),
+          Measure('tracking_share', 'TRACKING [%]', 1, 100),
+          Measure('wrong_claims', 'wrong of these [%]', 2, 100),
+          Measure('comparisons_per_image', 'comparisons per image', 1),
+          Measure('steps_to_localise', 'images until localised', 1))
 ERROR = MAIN[0]
 NOTHING = '–'
 
@@ -246,6 +252,32 @@ def result_tables(results: Results, papers: Papers) -> str:
     """The experiment's tables in the papers' layout; the general table when no method fits it."""
     shaped = SHAPES.get(results.experiment, lambda *_: '')(results, papers)
     return (shaped or group_tables(results, papers, MAIN)).rstrip() + '\n'
+
+
+def claims_tables(results: Results) -> str:
+    """What is right and what is wrongly claimed, where the experiment says what that is."""
+    rounds = results.description.get('rounds')
+    rounds = rounds if isinstance(rounds, dict) else {}
+    bags = [bag for bag in rounds.get('bags') or [] if isinstance(bag, dict)]
+    if not any('right' in part or 'wrong' in part for part in [rounds, *bags]):
+        return ''
+    return group_tables(results, Papers(None), CLAIMS)
+
+
+def reliability_table(results: Results) -> str:
+    """Images and share that is not wrong, by the probability around the estimate; empty without one."""
+    methods = {method: pooled([claim for claim in results.claims if claim.method == method])
+               for method in results.methods()}
+    begins = sorted({claim.begin for claim in results.claims})
+    if not begins:
+        return ''
+    names = [f'{begin:g} to {end:g}' for begin, end in zip(begins, begins[1:] + [1])]
+    rows = []
+    for method, bins in methods.items():
+        cells = {claim.begin: f'{100 * claim.not_wrong:.1f} ({claim.images:.0f})' for claim in bins}
+        if cells:
+            rows.append([escape(method), *(cells.get(begin, NOTHING) for begin in begins)])
+    return markdown(['method', *names], rows)
 
 
 def tracking_tables(results: Results) -> str:

@@ -237,6 +237,9 @@ class Evaluation {
 
   std::vector<std::size_t> startsOf(std::size_t pair) const {
     const Drive& drive = *rounds_[experiment_.pairs[pair].drive].drive;
+    if (experiment_.start_every > 0) {
+      return startImagesEvery(drive.images.size(), experiment_.closed, experiment_.start_every, experiment_.run_images);
+    }
     return startImages(drive.images.size(), experiment_.closed, experiment_.starts);
   }
   std::size_t runsOf(std::size_t pair) const { return startsOf(pair).size(); }
@@ -260,7 +263,10 @@ class Evaluation {
                                table,
                                experiment_.closed,
                                experiment_.found_within_m,
-                               mapErrors(partial, rounds_[spec.map].map_truth, drive)};
+                               mapErrors(partial, rounds_[spec.map].map_truth, drive),
+                               experiment_.rounds[spec.drive].accuracy,
+                               experiment_.run_images,
+                               experiment_.judge_from};
       results_.save(pair, method, summariseRuns(runMethod(context, how, startsOf(pair)), costs));
     }
   }

@@ -211,6 +211,16 @@ Pruning readPruning(YamlMap& yaml) {
   return Pruning::kNone;
 }
 
+Accuracy readAccuracy(YamlMap& yaml, const Accuracy& common) {
+  const Accuracy accuracy{yaml.real("right", common.right_m, 0.001, 1e5),
+                          yaml.real("wrong", common.wrong_m, 0.001, 1e5)};
+  if (accuracy.wrong_m < accuracy.right_m) {
+    yaml.refuse("wrong", "= " + parameters::toString(accuracy.wrong_m) +
+                             " must not be below right = " + parameters::toString(accuracy.right_m));
+  }
+  return accuracy;
+}
+
 std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   std::vector<RoundSpec> rounds;
   RoundSpec common;
@@ -218,6 +228,7 @@ std::vector<RoundSpec> readRounds(YamlMap& yaml) {
   common.fix_topic = yaml.text("fix_topic", "/gps/fix");
   common.truth_topic = yaml.text("truth_topic", common.fix_topic);
   common.camera_info = yaml.text("camera_info", "");
+  common.accuracy = readAccuracy(yaml, common.accuracy);
   std::set<std::string> names;
   for (YamlMap& bag : yaml.maps("bags")) {
     RoundSpec round;
@@ -229,6 +240,7 @@ std::vector<RoundSpec> readRounds(YamlMap& yaml) {
     round.truth_topic = bag.text("truth_topic", common.truth_topic);
     round.camera_info = bag.text("camera_info", common.camera_info);
     round.poses = bag.text("poses", "");
+    round.accuracy = readAccuracy(bag, common.accuracy);
     round.pruning = readPruning(bag);
     bag.requireNoMore();
     const bool usable = !round.name.empty() && round.name.find_first_of("/ ,\"\n") == std::string::npos;
@@ -319,6 +331,10 @@ Experiment parse(YamlMap yaml) {
   rounds.requireNoMore();
   experiment.pairs = readPairs(yaml, experiment.rounds);
   if (yaml.text("starts", "all") != "all") experiment.starts = yaml.count("starts", 0, 1, kMostStarts);
+  experiment.start_every = yaml.count("start_every", 0, 0, kMostStarts);
+  if (experiment.start_every > 0 && experiment.starts > 0) yaml.refuse("start_every", "and starts exclude each other");
+  experiment.run_images = yaml.count("run_images", 0, 0, kMostStarts);
+  experiment.judge_from = yaml.count("judge_from", 0, 0, kMostStarts);
   experiment.found_within_m = yaml.real("found_within", experiment.found_within_m, 0.001, 1000.0);
   experiment.trace_start = yaml.count("trace_start", 0, 0, kMostStarts);
   experiment.map = configured(yaml, "map_parameters", placesOnly());

@@ -18,6 +18,12 @@ enum class Pruning {
   kNone,      ///< none: all features stay, also where the round is the map
 };
 
+/// What is right and what is wrong, as far as the true positions of a round allow to say.
+struct Accuracy {
+  double right_m = 5.0;   ///< an estimate nearer to the truth is right
+  double wrong_m = 10.0;  ///< one farther from it is wrong
+};
+
 /// One recorded round of an experiment.
 struct RoundSpec {
   std::string name;
@@ -28,6 +34,7 @@ struct RoundSpec {
   std::string truth_topic;  ///< what estimates are judged by; if it is the fix topic, its cleaned positions
   std::string camera_info;  ///< calibration, a file beside the bag; empty: the bag's camera_info
   std::string poses;        ///< true poses of the camera, a file beside the bag; empty: not known
+  Accuracy accuracy = {};   ///< of its true positions: what counts as right where it is driven
   Pruning pruning = Pruning::kPrevious;
 };
 
@@ -60,6 +67,9 @@ struct Experiment {
   std::vector<RoundSpec> rounds;
   std::vector<PairSpec> pairs;
   std::size_t starts = 0;       ///< runs per pair, spread evenly over the start images; 0 = one for every image
+  std::size_t start_every = 0;  ///< instead: a run from every so many images; 0: no
+  std::size_t run_images = 0;   ///< the longest run; 0: to the end of an open drive, once around a closed one
+  std::size_t judge_from = 0;   ///< image of a run from which on estimates are judged
   double found_within_m = 5.0;  ///< how near the truth an estimate is that counts as localised
   std::size_t trace_start = 0;  ///< the run whose track is written out
   MapBuilderConfig map;

@@ -98,6 +98,39 @@ double Trust::lostRecall() const { return share(lost_right, tracking_wrong); }
 double Trust::offMapPrecision() const { return share(off_map_right, off_map_wrong); }
 double Trust::offMapRecall() const { return share(off_map_right, off_map_missed); }
 
+void Claims::add(const StepRecord& step) {
+  if (std::isnan(step.error_m)) return;
+  ++images;
+  right += step.right ? 1 : 0;
+  if (step.state == LocalizationState::kTracking) {
+    ++tracking;
+    tracking_wrong += step.wrong ? 1 : 0;
+  }
+  if (std::isnan(step.probability)) return;
+  const auto probability = static_cast<double>(step.probability);
+  const auto behind = std::upper_bound(kBins.begin() + 1, kBins.end(), probability);
+  Bin& bin = bins[static_cast<std::size_t>(behind - kBins.begin()) - 1];
+  ++bin.images;
+  bin.wrong += step.wrong ? 1 : 0;
+  bin.probability += probability;
+}
+
+Claims& Claims::operator+=(const Claims& other) {
+  images += other.images;
+  right += other.right;
+  tracking += other.tracking;
+  tracking_wrong += other.tracking_wrong;
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    bins[i].images += other.bins[i].images;
+    bins[i].wrong += other.bins[i].wrong;
+    bins[i].probability += other.bins[i].probability;
+  }
+  return *this;
+}
+
+double Claims::rightShare() const { return mean(right, images); }
+double Claims::wrongClaims() const { return mean(tracking_wrong, tracking); }
+
 void PoseErrors::add(const StepErrors& errors) {
   const auto position = static_cast<double>(errors.position_m);
   if (std::isnan(position)) return;

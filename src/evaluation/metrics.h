@@ -58,6 +58,32 @@ struct Trust {
   double offMapRecall() const;
 };
 
+/// How often a method is right and how likely it says it is, by the accuracy of the true positions: counts of judged
+/// images.
+struct Claims {
+  struct Bin {
+    std::size_t images = 0;
+    std::size_t wrong = 0;
+    double probability = 0.0;  ///< sum
+  };
+  /// Where the bins of the probability begin; the last one is what TRACKING asks for by default.
+  static constexpr std::array<double, 11> kBins{0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97};
+
+  std::size_t images = 0;
+  std::size_t right = 0;
+  std::size_t tracking = 0;  ///< of a method with states
+  std::size_t tracking_wrong = 0;
+  std::array<Bin, kBins.size()> bins{};
+
+  /// Images without a true position are left out.
+  void add(const StepRecord& step);
+  Claims& operator+=(const Claims& other);
+
+  // NaN when there is nothing to divide by.
+  double rightShare() const;
+  double wrongClaims() const;  ///< share of the TRACKING claims
+};
+
 /// An error within both is a success of the long-term localisation benchmark (Sattler et al., 2018).
 struct RecallThreshold {
   double position_m;

@@ -19,7 +19,9 @@ const char* const kMeasures =
     "metric_share,p95_err_m,recall_025m_2deg,recall_05m_5deg,recall_5m_10deg,nees,relative_err_m,relative_p95_err_m,"
     "relative_heading_err_deg,relative_recall_025m_2deg,relative_recall_05m_5deg,relative_recall_5m_10deg,"
     "relative_nees,filtered_err_m,filtered_inside_95_share,filtered_nees,relative_filtered_err_m,"
-    "relative_filtered_inside_95_share,relative_filtered_nees,steps_to_localise_p95,steps_to_relocalise_p95";
+    "relative_filtered_inside_95_share,relative_filtered_nees,steps_to_localise_p95,steps_to_relocalise_p95,right_"
+    "share,"
+    "wrong_claims";
 
 constexpr int kDigits = 6;
 constexpr double kMostRuns = 0.95;
@@ -132,6 +134,12 @@ std::string poseMeasuresOf(const std::vector<UnitResult>& units) {
   return out.str();
 }
 
+Claims claimsOf(const std::vector<UnitResult>& units) {
+  Claims claims;
+  for (const UnitResult& unit : units) claims += unit.claims;
+  return claims;
+}
+
 std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
   std::vector<RunFigures> runs;
   for (const UnitResult& unit : units) runs.insert(runs.end(), unit.runs.begin(), unit.runs.end());
@@ -163,6 +171,8 @@ std::string measuresOf(const std::vector<UnitResult>& units, bool kidnapped) {
   }
   out << poseMeasuresOf(units) << ',' << nearestRank(localised, kMostRuns) << ',';
   if (kidnapped) out << nearestRank(relocalised, kMostRuns);
+  const Claims claims = claimsOf(units);
+  out << ',' << Known{claims.rightShare()} << ',' << Known{claims.wrongClaims()};
   return out.str();
 }
 
@@ -207,9 +217,20 @@ void addSteps(const std::vector<StepSums>& steps, const std::string& prefix, std
   }
 }
 
+void addReliability(const Claims& claims, const std::string& prefix, std::ostringstream& out) {
+  for (std::size_t i = 0; i < claims.bins.size(); ++i) {
+    const Claims::Bin& bin = claims.bins[i];
+    if (bin.images == 0) continue;
+    const auto images = static_cast<double>(bin.images);
+    out << prefix << ',' << Claims::kBins[i] << ',' << bin.images << ',' << bin.probability / images << ','
+        << 1.0 - static_cast<double>(bin.wrong) / images << '\n';
+  }
+}
+
 void writeGroupTables(const Experiment& experiment, const ResultFolder& results) {
   std::ostringstream summary = table(std::string("experiment,train_group,test_group,method,") + kMeasures);
   std::ostringstream steps = table("train_group,test_group,method,step,mean_err_m,comparisons,sift_share");
+  std::ostringstream reliability = table("train_group,test_group,method,from,images,mean_probability,not_wrong_share");
   for (const auto& [groups, pairs] : pairsByGroups(experiment)) {
     for (std::size_t method = 0; method < experiment.methods.size(); ++method) {
       const MethodSpec& spec = experiment.methods[method];
@@ -218,9 +239,11 @@ void writeGroupTables(const Experiment& experiment, const ResultFolder& results)
       const std::string prefix = csvField(groups.first) + ',' + csvField(groups.second) + ',' + csvField(spec.name);
       summary << csvField(experiment.name) << ',' << prefix << ',' << measuresOf(units, spec.kidnapped) << '\n';
       addSteps(sumOfSteps(units), prefix, steps);
+      addReliability(claimsOf(units), prefix, reliability);
     }
   }
   writeFile(results.path() + "/steps.csv", steps.str());
+  writeFile(results.path() + "/reliability.csv", reliability.str());
   writeFile(results.path() + "/summary.csv", summary.str());
 }
 

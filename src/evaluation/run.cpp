@@ -70,7 +70,8 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start,
 std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const RunShape& shape) {
   if (images == 0) return {};
   requireIndex("start index", start, images);
-  const std::size_t ahead = shape.closed ? images : images - start;
+  const std::size_t left = shape.closed ? images : images - start;
+  const std::size_t ahead = shape.longest == 0 ? left : std::min(left, shape.longest);
   const auto travelledAt = [&shape](std::size_t step) {
     return static_cast<std::size_t>(std::floor(static_cast<double>(step) * shape.speed));
   };
@@ -92,6 +93,14 @@ std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_
   const std::size_t runs = count == 0 ? possible : std::min(count, possible);
   std::vector<std::size_t> starts(runs);
   for (std::size_t i = 0; i < runs; ++i) starts[i] = i * possible / runs;
+  return starts;
+}
+
+std::vector<std::size_t> startImagesEvery(std::size_t images, bool closed, std::size_t every, std::size_t longest) {
+  std::size_t possible = closed ? images : (images + 1) / 2;
+  if (!closed && longest > 0 && images >= longest) possible = std::max(possible, images - longest + 1);
+  std::vector<std::size_t> starts;
+  for (std::size_t i = 0; i < possible; i += every) starts.push_back(i);
   return starts;
 }
 
@@ -288,11 +297,13 @@ class ExtractionCounter {
   bool previous_had_sift_ = false;
 };
 
-void judge(const DriveImage& image, const TrainingMap& map, const std::optional<MapError>& map_error,
-           const Verdict& verdict, VelocityFilter& filter, StepRecord& step) {
+void judge(const DriveImage& image, const TrainingMap& map, const Accuracy& accuracy,
+           const std::optional<MapError>& map_error, const Verdict& verdict, VelocityFilter& filter, StepRecord& step) {
   if (!image.truth) return;
   const Eigen::Vector2d truth_m = map.frame().toEastNorth(image.truth->position);
   step.error_m = static_cast<float>((verdict.position_m - truth_m).norm());
+  step.right = static_cast<double>(step.error_m) <= accuracy.right_m;
+  step.wrong = !(static_cast<double>(step.error_m) <= accuracy.wrong_m);
   step.off_map = map.nearest(truth_m).distance_m > kOffMap_m;
   if (map_error) {
     step.relative.position_m = static_cast<float>((verdict.position_m - truth_m - map_error->position_m).norm());
@@ -300,6 +311,15 @@ void judge(const DriveImage& image, const TrainingMap& map, const std::optional<
   if (!verdict.estimate) return;
   judgePose(*verdict.estimate, truth_m, image.truth->yaw_rad, map_error, step);
   judgeFiltered(*verdict.estimate, truth_m, map_error, filter, step);
+}
+
+/// As if its true position were not known.
+void leaveUnjudged(StepRecord& step) {
+  const StepRecord unknown;
+  step.error_m = unknown.error_m;
+  step.heading_err_deg = unknown.heading_err_deg;
+  step.nees = unknown.nees;
+  step.relative = step.filtered = step.relative_filtered = StepErrors();
 }
 
 StepRecord stepOf(const Verdict& verdict) {
@@ -310,6 +330,8 @@ StepRecord stepOf(const Verdict& verdict) {
   if (!verdict.estimate) return step;
   step.state = verdict.estimate->state;
   step.source = verdict.estimate->source;
+  const std::optional<double>& probability = verdict.estimate->evidence.probability;
+  if (probability) step.probability = static_cast<float>(*probability);
   return step;
 }
 
@@ -343,8 +365,8 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
   const auto image = std::make_shared<RecordedImage>(context.table, context.map.images, method.localizer.match,
                                                      method.localizer.similarity);
   const auto contestant = makeContestant(method, seedOf(method, start), context, image);
-  const std::vector<std::size_t> order =
-      imageOrder(context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped});
+  const std::vector<std::size_t> order = imageOrder(
+      context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped, context.longest});
   RunRecord record;
   record.start = start;
   ExtractionCounter counter;
@@ -361,8 +383,8 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
     counter.add(*image, record);
     const TrainingMap& map = *context.map.map;
     record.steps.push_back(stepOf(verdict));
-    judge(shown, map, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]], verdict, filter,
-          record.steps.back());
+    judge(shown, map, context.accuracy, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]],
+          verdict, filter, record.steps.back());
     if (trace && verdict.estimate) {
       record.trace.push_back(traced(order[i], shown, map, contestant->diversity_m(), *verdict.estimate));
     }
@@ -370,6 +392,7 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
   const std::size_t half = method.kidnapped ? order.size() / 2 : order.size();
   record.steps_to_localise = stepsUntilFound(record.steps, context.found_within_m, 0, half);
   record.steps_to_relocalise = stepsUntilFound(record.steps, context.found_within_m, half, order.size());
+  for (std::size_t i = 0; i < std::min(context.judge_from, order.size()); ++i) leaveUnjudged(record.steps[i]);
   return record;
 }
 

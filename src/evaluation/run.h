@@ -28,9 +28,10 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const
 
 /// How the runs of an experiment go through a drive.
 struct RunShape {
-  bool closed = true;      ///< indices wrap; an open drive is followed to its end
-  double speed = 1.0;      ///< images of the drive per step: at 2 every other one, at 1/2 each one twice
-  bool kidnapped = false;  ///< after half of the run carried by half of the drive; an open one back
+  bool closed = true;       ///< indices wrap; an open drive is followed to its end
+  double speed = 1.0;       ///< images of the drive per step: at 2 every other one, at 1/2 each one twice
+  bool kidnapped = false;   ///< after half of the run carried by half of the drive; an open one back
+  std::size_t longest = 0;  ///< images of the drive that a run covers at most; 0: all
 };
 
 /// Once around a closed drive, to the end of an open one.
@@ -39,6 +40,9 @@ std::vector<std::size_t> imageOrder(std::size_t images, std::size_t start, const
 /// Every image of a closed drive, or of the first half of an open one; `count` of them, evenly spread, unless that is 0
 /// or too many.
 std::vector<std::size_t> startImages(std::size_t images, bool closed, std::size_t count);
+/// The same, `every` so many images. Runs of `longest` images (0: any length) may also begin that far before the end of
+/// an open drive.
+std::vector<std::size_t> startImagesEvery(std::size_t images, bool closed, std::size_t every, std::size_t longest);
 
 /// A map with some of its images left out, as when the robot leaves the recorded way.
 struct PartialMap {
@@ -90,6 +94,9 @@ struct StepRecord {
   /// the truth with that of the map added.
   StepErrors filtered = {};
   StepErrors relative_filtered = {};
+  bool right = false;  ///< by the accuracy of the round's true positions, as is the next
+  bool wrong = false;
+  float probability = std::numeric_limits<float>::quiet_NaN();  ///< of being around the estimate; NaN: not known
 };
 
 /// A closer look at one step, for the track of a single run.
@@ -123,6 +130,9 @@ struct RunContext {
   bool closed = true;
   double found_within_m = kRight_m;                      ///< of three estimates in a row: then the robot is localised
   std::vector<std::optional<MapError>> map_errors = {};  ///< of each image of the drive; empty when nothing is known
+  Accuracy accuracy = {};                                ///< of the drive's true positions
+  std::size_t longest = 0;                               ///< see RunShape
+  std::size_t judge_from = 0;                            ///< estimates before are not judged, but count as found
 };
 
 /// From image `start` on (Kronfeld et al. (journal), section 6).

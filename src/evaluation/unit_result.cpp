@@ -123,6 +123,7 @@ UnitResult summariseRuns(const std::vector<RunRecord>& runs, const StageCosts& c
       const StepRecord& step = run.steps[i];
       add(step, unit.steps[i]);
       unit.trust.add(step);
+      unit.claims.add(step);
       unit.poses.add(step);
       if (!std::isnan(step.relative.position_m)) relative_m.push_back(static_cast<double>(step.relative.position_m));
       if (std::isnan(step.error_m)) continue;
@@ -220,6 +221,27 @@ void requireConsistent(const UnitResult& unit) {
   }
 }
 
+void write(const Claims& claims, std::ostringstream& out) {
+  out << "\nclaims\n"
+      << claims.images << ',' << claims.right << ',' << claims.tracking << ',' << claims.tracking_wrong << '\n';
+  for (const Claims::Bin& bin : claims.bins) out << bin.images << ',' << bin.wrong << ',' << bin.probability << '\n';
+}
+
+void readClaims(SectionReader& sections, Claims& claims) {
+  std::string line;
+  sections.next(line);
+  NumberReader counts(line);
+  counts >> claims.images >> claims.right >> claims.tracking >> claims.tracking_wrong;
+  counts.finish();
+  for (Claims::Bin& bin : claims.bins) {
+    sections.next(line);
+    NumberReader numbers(line);
+    numbers >> bin.images >> bin.wrong >> bin.probability;
+    numbers.finish();
+  }
+  if (sections.next(line)) throw std::runtime_error("has more lines of claims than bins");
+}
+
 void write(const PoseErrors& errors, std::ostringstream& out) {
   out << errors.positions << ',' << errors.position_m << ',' << errors.headings << ',' << errors.heading_deg;
   for (const std::size_t recalled : errors.recalled) out << ',' << recalled;
@@ -289,6 +311,7 @@ std::string serialise(const UnitResult& unit) {
   out << "\ntrust\n"
       << trust.tracking_right << ',' << trust.tracking_wrong << ',' << trust.lost_right << ',' << trust.lost_wrong
       << ',' << trust.off_map_right << ',' << trust.off_map_wrong << ',' << trust.off_map_missed << '\n';
+  write(unit.claims, out);
   write(unit.poses, out);
   out << "\nall\n"
       << unit.median_err_m << ',' << unit.recall_at_p99 << ',' << unit.p95_err_m << ',' << unit.p95_relative_err_m
@@ -319,6 +342,8 @@ UnitResult parseUnit(const std::string& text) {
       trust.off_map_right >> trust.off_map_wrong >> trust.off_map_missed;
   trusted.finish();
   if (sections.next(line)) throw std::runtime_error("has more than one line of trust");
+  sections.expect("claims");
+  readClaims(sections, unit.claims);
   sections.expect("poses");
   readPoses(sections, unit.poses);
   sections.expect("all");

@@ -50,13 +50,14 @@ struct TracedPose {
 };
 
 /// Goes up whenever older results cannot be read any more.
-constexpr int kUnitFormat = 3;
+constexpr int kUnitFormat = 4;
 
 /// One method on one pair of rounds: the unit of work that is stored and resumed.
 struct UnitResult {
   std::vector<RunFigures> runs;
   std::vector<StepSums> steps;
   Trust trust;
+  Claims claims;
   PoseFigures poses;
   std::vector<std::string> trace;      ///< rows of traces.csv from its column `start` on
   std::vector<TracedPose> trajectory;  ///< of the same images

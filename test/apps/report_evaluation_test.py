@@ -12,7 +12,7 @@ from pathlib import Path
 SCRIPT = Path(sys.argv[1])
 SUMMARY = ('experiment,train_group,test_group,method,runs,mean_err_m,std_err_m,comparisons_per_image,ms_per_image,'
            'sift_share,median_err_m,within_5m,steps_to_localise,steps_to_relocalise,recall_at_p99,extract_ms,match_ms,'
-           'update_ms').split(',')
+           'update_ms,right_share,tracking_share,wrong_claims').split(',')
 TRACES = ('train_round,test_round,method,start,step,image,err_m,v0,speed_ema,quantum_share,phi2,recovering,spread_x_m,'
           'spread_y_m,diversity_m,similarity,comparisons,features,swarm_mps,robot_mps').split(',')
 PAPERS = 'experiment,source,train_group,test_group,method,metric,value'.split(',')
@@ -140,6 +140,31 @@ class ReportTest(unittest.TestCase):
         self.assertIn('| DPSO-80 | 3.00 ± 0.50 | 2.54 <sup>1</sup> | 20.0 | 25.9 <sup>1</sup> |', text)
         self.assertIn('Papers: <sup>1</sup> Kronfeld et al. (journal), Table 1.', text)
         self.assertIn('a paper \\| its Table', text)
+
+    def test_claims_and_their_probability(self):
+        evaluation = self.evaluation('own')
+        evaluation.method(SAME, 'a', 1.5, 20, right_share=.9, tracking_share=.8, wrong_claims=.005)
+        evaluation.method(OTHER, 'a', 2.5, 20, right_share=.7, tracking_share='', wrong_claims='')
+        evaluation.write()
+        self.assertNotIn('Right places', self.report(), 'the experiment does not say what is right')
+        with open(self.folder / 'experiment.yaml', 'a', encoding='utf-8') as file:
+            file.write('rounds: {right: 4, bags: [{name: x, bag: x.bag}]}\n')
+        rows = [(SAME, .2, 30, .25, .5), (OTHER, .2, 10, .29, .9), (SAME, .97, 400, .99, .995)]
+        write_csv(self.folder / 'reliability.csv',
+                  ['train_group', 'test_group', 'method', 'from', 'images', 'mean_probability', 'not_wrong_share'],
+                  [{'train_group': group[0], 'test_group': group[1], 'method': 'a', 'from': begin, 'images': images,
+                    'mean_probability': probability, 'not_wrong_share': share}
+                   for group, begin, images, probability, share in rows])
+        text = self.report(figures=('reliability',))
+        self.assertIn('## Right places and wrong claims\n\n### sunny → sunny\n\n'
+                      '| method | right [%] | TRACKING [%] | wrong of these [%] | comparisons per image |', text)
+        self.assertIn('| a | 90.0 | 80.0 | 0.50 | 20.0 |', text)
+        self.assertIn('| method | 0.2 to 0.97 | 0.97 to 1 |', text)
+        self.assertIn('| a | 60.0 (40) | 99.5 (400) |', text)
+        (self.folder / 'report.md').unlink()
+        (self.folder / 'reliability.csv').write_text(
+            'method,from,images,mean_probability,not_wrong_share\na,0.2,3,,1\n', encoding='utf-8')
+        self.assert_refused(1, 'reliability.csv', 'line 2', 'mean_probability is empty')
 
     def test_what_was_written_by_hand_stays(self):
         evaluation = self.evaluation('own')
@@ -375,7 +400,7 @@ class ReportTest(unittest.TestCase):
         damages = {'has no rows': summary.splitlines()[0], 'is empty': '',
                    'line 2: mean_err_m is "much", not a number': re.sub(',400,[^,]*', ',400,much', summary),
                    'has no column method': summary.replace('method', 'way', 1),
-                   'line 2: has 19 fields, the header 18': summary.rstrip() + ',1\n'}
+                   f'line 2: has {len(SUMMARY) + 1} fields, the header {len(SUMMARY)}': summary.rstrip() + ',1\n'}
         for what, text in damages.items():
             with self.subTest(what):
                 (self.folder / 'summary.csv').write_text(text, encoding='utf-8')

@@ -62,6 +62,22 @@ TEST(Experiment, SaysWhatTheFileSays) {
   EXPECT_THAT(experiment.methods[0].settings, ::testing::Contains(Pair("dpso/particles", "20")));
 }
 
+TEST(Experiment, RunsAndAccuracyOfTheTruth) {
+  std::string yaml = test::smallYamlWith("starts: 3", "start_every: 7\nrun_images: 60\njudge_from: 10");
+  yaml.replace(yaml.find("rounds:\n"), 8, "rounds:\n  right: 3\n");
+  yaml.replace(yaml.find("bag: a2.bag"), 11, "bag: a2.bag, right: 4, wrong: 8");
+  const Experiment experiment = parseExperiment(yaml, "e.yaml");
+  EXPECT_EQ(experiment.start_every, 7U);
+  EXPECT_EQ(experiment.run_images, 60U);
+  EXPECT_EQ(experiment.judge_from, 10U);
+  EXPECT_EQ(experiment.rounds[0].accuracy.right_m, 3.0);
+  EXPECT_EQ(experiment.rounds[0].accuracy.wrong_m, 10.0);
+  EXPECT_EQ(experiment.rounds[1].accuracy.right_m, 4.0);
+  EXPECT_EQ(experiment.rounds[1].accuracy.wrong_m, 8.0);
+  expectRefused({{"bag: a1.bag", "bag: a1.bag, right: 11", "wrong' = 10 must not be below right = 11"},
+                 {"starts: 3", "starts: 3\nstart_every: 7", "start_every"}});
+}
+
 TEST(Experiment, AGroupStandsForAllOfItsRounds) {
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   for (const PairSpec& pair : test::smallExperiment().pairs) pairs.emplace_back(pair.map, pair.drive);

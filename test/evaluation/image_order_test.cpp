@@ -35,6 +35,22 @@ TEST(ImageOrder, RefusesIndicesBeyondTheRound) {
   EXPECT_TRUE(imageOrder(0, 0, RunShape{}).empty());
 }
 
+TEST(ImageOrder, ARunHasItsLength) {
+  EXPECT_THAT(imageOrder(8, 2, RunShape{kOpen, 1.0, false, 3}), ElementsAre(2, 3, 4));
+  EXPECT_THAT(imageOrder(8, 6, RunShape{kOpen, 1.0, false, 3}), ElementsAre(6, 7));
+  EXPECT_THAT(imageOrder(8, 6, RunShape{kClosed, 1.0, false, 3}), ElementsAre(6, 7, 0));
+  EXPECT_THAT(imageOrder(8, 0, RunShape{kOpen, 2.0, false, 5}), ElementsAre(0, 2, 4));
+}
+
+TEST(StartImages, EverySoMany) {
+  EXPECT_THAT(startImagesEvery(25, kClosed, 10, 0), ElementsAre(0, 10, 20));
+  EXPECT_THAT(startImagesEvery(25, kOpen, 10, 0), ElementsAre(0, 10));
+  EXPECT_THAT(startImagesEvery(101, kOpen, 10, 60), ElementsAre(0, 10, 20, 30, 40, 50));
+  EXPECT_THAT(startImagesEvery(100, kOpen, 10, 20), ElementsAre(0, 10, 20, 30, 40, 50, 60, 70, 80));
+  EXPECT_THAT(startImagesEvery(50, kOpen, 10, 60), ElementsAre(0, 10, 20));
+  EXPECT_THAT(startImagesEvery(1, kOpen, 10, 1), ElementsAre(0));
+}
+
 TEST(ImageOrder, OnAnOpenRoundTheRobotIsCarriedBack) {
   RunShape shape{kOpen};
   shape.kidnapped = true;

@@ -114,6 +114,25 @@ TEST_F(ResultTables, PosesAreMeansOverTheImagesOfAllPairs) {
   for (const auto& [column, value] : expected) EXPECT_EQ(row[column], value) << column;
 }
 
+TEST_F(ResultTables, ClaimsAreCountedOverAllPairs) {
+  UnitResult unit = test::unitOf(4, 4, 2.0);
+  unit.claims = {};
+  unit.claims.images = 4;
+  unit.claims.right = 1;
+  unit.claims.tracking = 2;
+  unit.claims.tracking_wrong = 1;
+  unit.claims.bins[10] = {2, 1, 1.96};
+  for (const std::size_t pair : {0U, 1U}) results_.save(pair, 0, unit);
+  Row row = rowsOf("summary.csv", "swarm").front();
+  EXPECT_EQ(row["right_share"], "0.25");
+  EXPECT_EQ(row["wrong_claims"], "0.5");
+  const std::vector<Row> bins = rowsOf("reliability.csv", "swarm");
+  ASSERT_EQ(bins.size(), 1U) << "bins without images are left out";
+  row = bins.front();
+  EXPECT_EQ(row["from"] + " " + row["images"], "0.97 4");
+  EXPECT_EQ(row["mean_probability"] + " " + row["not_wrong_share"], "0.98 0.5");
+}
+
 TEST_F(ResultTables, MethodsWithoutPosesLeaveTheirFieldsEmpty) {
   Row row = rowsOf("summary.csv", "best").front();
   for (const char* column : {"heading_err_deg", "wrong_1m_share", "wrong_5m_share", "inside_95_share", "metric_share",

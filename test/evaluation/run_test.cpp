@@ -54,6 +54,28 @@ TEST(Run, OffTheMapIsWhereAllImagesAreFar) {
   EXPECT_FALSE(record.steps[55].off_map);
 }
 
+TEST(Run, WhatComesBeforeIsNotJudgedAndItsPlacesAreRightByTheirOwnAccuracy) {
+  const SyntheticRounds rounds(60);
+  const ScoreTable table(*rounds.drive(), *rounds.map(), MatchConfig(), 1);
+  MethodSpec method;
+  method.tracker = "exhaustive";
+  const PartialMap whole = partOf(rounds.map(), 0.0);
+  RunContext context{whole, *rounds.drive(), table, true};
+  context.longest = 30;
+  context.judge_from = 10;
+  context.accuracy = {1e-6, 1e-3};
+  const RunRecord record = run(context, method, 5, false);
+  ASSERT_EQ(record.steps.size(), 30U);
+  EXPECT_TRUE(std::isnan(record.steps[9].error_m));
+  ASSERT_FALSE(std::isnan(record.steps[10].error_m));
+  EXPECT_EQ(record.steps_to_localise, 1U) << "found before it is judged";
+  for (const StepRecord& step : record.steps) {
+    if (std::isnan(step.error_m)) continue;
+    EXPECT_EQ(step.right, static_cast<double>(step.error_m) <= 1e-6);
+    EXPECT_EQ(step.wrong, static_cast<double>(step.error_m) > 1e-3);
+  }
+}
+
 TEST(Run, ACoveredCameraRecognisesNothing) {
   const SyntheticRounds rounds(60);
   const RunRecord record = runWith(rounds, 0.0, 0.2);

@@ -80,6 +80,14 @@ TEST(UnitResult, AnImageWithoutTruePositionIsNotJudged) {
 TEST(UnitResult, ReadsBackAsItWasWritten) {
   const std::string text = serialise(exampleUnit());
   EXPECT_EQ(serialise(parseUnit(text)), text);
+  UnitResult claimed = exampleUnit();
+  claimed.claims.tracking_wrong = 3;
+  claimed.claims.bins[4] = {7, 2, 3.25};
+  const Claims claims = parseUnit(serialise(claimed)).claims;
+  EXPECT_EQ(claims.images, 4U);
+  EXPECT_EQ(claims.tracking_wrong, 3U);
+  EXPECT_EQ(claims.bins[4].wrong, 2U);
+  EXPECT_DOUBLE_EQ(claims.bins[4].probability, 3.25);
   EXPECT_EQ(parseUnit(text).trace, exampleUnit().trace);
   const std::vector<TracedPose> trajectory = parseUnit(text).trajectory;
   ASSERT_EQ(trajectory.size(), 3U);
@@ -132,6 +140,7 @@ TEST(UnitResult, ATraceHasTheSpeedsOfSwarmAndRobot) {
 TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
   const std::string good =
       "runs\n0,1,1,2,1,7,1,1,1,0,0,0\n\nsteps\n1,1,2,7,1\n\ntrace\n\ntrajectory\n\ntrust\n1,2,3,4,5,6,7\n\n"
+      "claims\n4,3,2,1\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n0,0,0\n3,1,2.9\n\n"
       "poses\n9,8,6,5\n1,2,3,4,5,6,7,8,9,10\n0,0,0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0,0,0.5\n\n"
       "all\n2,1,3,0\n\n";
   ASSERT_EQ(refusalOfUnit(good), "accepted");
@@ -143,7 +152,7 @@ TEST(UnitResult, RefusesLinesThatAreNoNumbers) {
         with("0,0,0\n", "0,0,0,0\n"), with("7,1\n", "7,1 \n"), with("2,1,3,0\n", "2,1,3\n"),
         with("2,1,3,0\n", "2,1,3,0,4\n"), with("2,1,3,0\n", "1e999,1,3,0\n"), with("9,8,6,5\n", "9,8,6\n"),
         with("9,10\n", "9\n"), with("0.5\n", "nan\n"), with("1,2,3,4,5,6,7", "1,2,3,4,5,6"),
-        with("0,1,1,2", "99999999999999999999999,1,1,2")}) {
+        with("0,1,1,2", "99999999999999999999999,1,1,2"), with("3,1,2.9", "3,1"), with("4,3,2,1", "4,3,2")}) {
     EXPECT_THAT(refusalOfUnit(bad), HasSubstr("no list of numbers")) << bad;
   }
   EXPECT_THAT(refusalOfUnit(with("trace\n", "trace\n1,2\n")), HasSubstr("trace that is not whole"));

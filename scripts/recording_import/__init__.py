@@ -1,0 +1,1 @@
+"""Recordings of others, read from their files and written as a bag."""

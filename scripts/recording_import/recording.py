@@ -1,0 +1,156 @@
+"""What a recording consists of, and the bag that it becomes."""
+import copy
+import heapq
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Iterator, List, NamedTuple, Optional, Tuple
+
+import cv2
+import genpy
+import numpy as np
+import rosbag
+from evaluation_report.data import DataError
+from evaluation_report.files import written_whole
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import CameraInfo, CompressedImage, NavSatFix, NavSatStatus
+
+IMAGES, CALIBRATION, FIXES, POSES = ('/stereo/left/image_raw/compressed', '/stereo/left/camera_info', '/gps/fix',
+                                     '/ground_truth/pose')
+ENDINGS = ('.jpg', '.jpeg', '.png', '.pgm', '.ppm', '.bmp', '.tif', '.tiff')
+MOST_BYTES = 256 << 20  # of an image's file
+LAST_STAMP_NS = (2**32 - 1) * 10**9  # a ROS stamp has 32 bits of seconds
+ENCODINGS = {('uint8', 1): 'mono8', ('uint8', 3): 'bgr8', ('uint16', 1): 'mono16', ('uint16', 3): 'bgr16'}
+
+
+class Image(NamedTuple):
+    """A file and when it was taken."""
+
+    stamp_ns: int
+    path: Path
+
+
+class Fix(NamedTuple):
+    """A position, degrees and metres; sigma of the horizontal position, None when nobody knows."""
+
+    stamp_ns: int
+    latitude: float
+    longitude: float
+    altitude: float
+    sigma_m: Optional[float]
+
+
+@dataclass
+class Recording:
+    """Images, positions, and what is known about the camera."""
+
+    images: List[Image]
+    fixes: List[Fix]
+    calibration: Optional[CameraInfo] = None
+    poses: List[PoseStamped] = field(default_factory=list)  # of the camera: x ahead, y left, z up
+    notes: List[str] = field(default_factory=list)  # what was assumed
+
+
+def image_files(folder: Path) -> List[Path]:
+    """The images of a folder by name."""
+    try:
+        files = sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())
+    except OSError as error:
+        raise DataError(folder, f'cannot be read: {error.strerror}') from error
+    if not files:
+        raise DataError(folder, f'holds no image ({" ".join(ENDINGS)})')
+    return files
+
+
+def image_message(path: Path) -> Tuple[CompressedImage, Tuple[int, int]]:
+    """The file as it is if it is JPEG or PNG, else as PNG; and its width and height."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise DataError(path, f'{path.stat().st_size / 2**20:.0f} MiB, at most {MOST_BYTES >> 20} are read')
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataError(path, f'cannot be read: {error.strerror}') from error
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    except cv2.error:
+        pixels = None
+    if pixels is None:
+        raise DataError(path, 'is not an image that OpenCV reads' if data else 'is empty')
+    kind = 'jpeg' if data.startswith(b'\xff\xd8') else 'png'
+    transparent = pixels.ndim == 3 and pixels.shape[2] == 4
+    if transparent:
+        pixels = pixels[:, :, :3]
+    encoding = ENCODINGS.get((str(pixels.dtype), 1 if pixels.ndim == 2 else pixels.shape[2]))
+    if encoding is None:
+        raise DataError(path, f'has pixels of type {pixels.dtype}: 8 or 16 bits, grey or colour, are read')
+    if transparent or (kind == 'png' and not data.startswith(b'\x89PNG')):
+        data = cv2.imencode('.png', pixels)[1].tobytes()
+    message = CompressedImage(format=f'{encoding}; {kind} compressed {encoding if encoding.startswith("bgr") else ""}',
+                              data=data)
+    message.header.frame_id = 'stereo_left'
+    return message, (pixels.shape[1], pixels.shape[0])
+
+
+def fix_message(fix: Fix) -> NavSatFix:
+    """A fix whose covariance is unknown unless somebody said it."""
+    message = NavSatFix(latitude=fix.latitude, longitude=fix.longitude, altitude=fix.altitude)
+    message.header.frame_id = 'gps'
+    message.status.status, message.status.service = NavSatStatus.STATUS_FIX, NavSatStatus.SERVICE_GPS
+    if fix.sigma_m is not None:
+        variance = fix.sigma_m**2
+        message.position_covariance = [variance, 0, 0, 0, variance, 0, 0, 0, 4 * variance]
+        message.position_covariance_type = NavSatFix.COVARIANCE_TYPE_APPROXIMATED
+    return message
+
+
+def image_events(recording: Recording) -> Iterator[tuple]:
+    """Each image with the calibration beside it."""
+    size, shown = None, time.monotonic()
+    for index, image in enumerate(recording.images):
+        message, this_size = image_message(image.path)
+        if size not in (None, this_size):
+            raise DataError(image.path, f'is {this_size[0]} x {this_size[1]}, the images before are '
+                            f'{size[0]} x {size[1]}')
+        size = this_size
+        yield image.stamp_ns, 0, IMAGES, message
+        if recording.calibration is not None:
+            info = copy.deepcopy(recording.calibration)
+            if info.width == 0:  # KITTI's files do not say it
+                info.width, info.height = size
+            if (info.width, info.height) != size:
+                raise DataError(image.path, f'is {size[0]} x {size[1]}, the calibration is for '
+                                f'{info.width} x {info.height}')
+            yield image.stamp_ns, 1, CALIBRATION, info
+        if sys.stderr.isatty() and time.monotonic() - shown > 0.5:
+            shown = time.monotonic()
+            print(f'\r{index + 1} of {len(recording.images)} images', end='', file=sys.stderr)
+    if sys.stderr.isatty():
+        print('\r\033[K', end='', file=sys.stderr)
+
+
+def write_bag(recording: Recording, output: Path) -> str:
+    """Writes the messages in the order of their stamps; says what there is."""
+    recording.images.sort()
+    for before, after in zip(recording.images, recording.images[1:]):
+        if before.stamp_ns == after.stamp_ns:
+            raise DataError(after.path, f'has the stamp of {before.path.name}, {after.stamp_ns / 1e9:.9f} s')
+    stamps = [item.stamp_ns for item in (*recording.images, *recording.fixes)]
+    if not 0 < min(stamps) <= max(stamps) <= LAST_STAMP_NS:
+        raise DataError(output, f'stamps from {min(stamps) / 1e9:.9g} to {max(stamps) / 1e9:.9g} s: a bag holds those '
+                        'after 0 and before 4294967296; --start SECONDS moves them')
+    fixes = ((fix.stamp_ns, 2, FIXES, fix_message(fix)) for fix in sorted(recording.fixes))
+    poses = ((pose.header.stamp.to_nsec(), 3, POSES, pose) for pose in recording.poses)
+    with written_whole(output) as partial:
+        try:
+            with rosbag.Bag(str(partial), 'w') as bag:
+                for stamp_ns, _, topic, message in heapq.merge(image_events(recording), fixes, poses,
+                                                               key=lambda event: event[:2]):
+                    message.header.stamp = genpy.Time(*divmod(stamp_ns, 10**9))
+                    bag.write(topic, message, message.header.stamp)
+        except rosbag.ROSBagException as error:
+            raise DataError(output, f'cannot be written: {error}') from error
+    first, last = recording.images[0].stamp_ns, recording.images[-1].stamp_ns
+    calibration = 'with' if recording.calibration is not None else 'without'
+    return '\n'.join([f'{output}: {len(recording.images)} images in {(last - first) / 1e9:.1f} s, '
+                      f'{len(recording.fixes)} fixes, {calibration} calibration', *recording.notes])
