@@ -5,6 +5,7 @@
 #include "base/text.h"
 #include "localization/paper_yaml.h"
 #include "parameters/yaml_map.h"
+#include "visual_localization/localization/tracker.h"
 
 namespace visual_localization {
 namespace {
@@ -18,7 +19,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
                   "dynamic particle swarm, several swarms, particle filter with Gaussian or linear motion, or discrete "
                   "Bayes filter "
                   "over the training images"},
-                 tracker, {"dpso", "dpso_multi", "pf_gaussian", "pf_linear", "bayes"});
+                 tracker, trackerNames());
   visitor.choice({"features", "", "what images are compared by; hybrid: global features, SIFT when the cloud spreads"},
                  features, {"sift", "global", "hybrid"});
   visitor.choice(

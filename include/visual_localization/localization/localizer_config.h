@@ -7,6 +7,7 @@
 #include "visual_localization/features/sift_features.h"
 #include "visual_localization/features/sift_matcher.h"
 #include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/odometry.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker_config.h"
@@ -33,8 +34,10 @@ struct LocalizerConfig : TrackerConfig {
   MatchConfig match{MatchConfig().max_angle_ratio, "votes"};
   SimilarityConfig similarity;
   HybridConfig hybrid;
+  FitnessConfig fitness;
   StateConfig state;
   MetricConfig metric;
+  OdometryConfig odometry;
 
   void declare(ParameterVisitor& visitor);
 };
