@@ -85,10 +85,9 @@ NodeParameters configOf(const LocalizeOptions& options) {
   if (!options.pose_source.empty()) given["pose_source"] = options.pose_source;
   if (options.seed) given["seed"] = *options.seed;
   if (options.map_cache_mb) given["map_cache_mb"] = *options.map_cache_mb;
-  TrackerConfig chosen = config.localizer;
-  if (!options.tracker.empty()) chosen.tracker = options.tracker;
-  if (options.particles) given[chosen.isSwarm() ? "dpso/particles" : "pf/particles"] = *options.particles;
+  const std::string tracker = options.tracker.empty() ? config.localizer.tracker : options.tracker;
   try {
+    if (options.particles) given[trackerKind(tracker).particles] = *options.particles;
     assignParameters(config, given);
   } catch (const ParameterError& error) {
     throw UsageError(error.what());

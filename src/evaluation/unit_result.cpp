@@ -86,19 +86,18 @@ std::optional<double> robotSpeed_mps(const TraceRecord& before, const TraceRecor
 std::string traceRow(const RunRecord& run, std::size_t step) {
   const TraceRecord& trace = run.trace[step];
   const Estimate& estimate = trace.estimate;
-  const TrackerTuning& tuning = estimate.tracked.tuning;
+  const TrackerReport& tracker = estimate.tracked.report;
   std::ostringstream out = numbers();
   out << run.start << ',' << step << ',' << trace.image << ',';
   if (!std::isnan(run.steps[step].error_m)) out << run.steps[step].error_m;
-  if (tuning.v0 > 0.0) {
-    out << ',' << tuning.v0 << ',' << tuning.speed_ema << ',' << tuning.quantum_share << ',' << tuning.phi2;
-  } else {
-    out << ",,,,";  // a particle filter has nothing to tune
+  for (const char* key : {"v0", "speed_ema", "quantum_share", "phi2"}) {
+    out << ',';
+    if (tracker.value("v0") > 0.0) out << tracker.value(key);  // others have nothing to tune
   }
-  out << ',' << (tuning.recovering ? 1 : 0) << ',' << estimate.tracked.spread_m.x() << ','
+  out << ',' << (estimate.tracked.recovering ? 1 : 0) << ',' << estimate.tracked.spread_m.x() << ','
       << estimate.tracked.spread_m.y() << ',' << trace.diversity_m << ',' << estimate.tracked.best.similarity << ','
       << estimate.comparisons << ',' << estimate.featuresName() << ',';
-  if (tuning.speed_mps > 0.0) out << tuning.speed_mps;
+  if (tracker.value("speed_mps") > 0.0) out << tracker.value("speed_mps");
   out << ',';
   const auto robot_mps = step > 0 ? robotSpeed_mps(run.trace[step - 1], trace) : std::nullopt;
   if (robot_mps) out << *robot_mps;

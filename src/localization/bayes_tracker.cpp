@@ -20,59 +20,57 @@ BayesTracker::BayesTracker(const TrainingMap& map, const TrackerConfig& config, 
     : map_(map),
       config_(config.bayes),
       random_(seed),
-      filter_(map, config.bayes, config.odometry),
-      particles_(config.particles()) {
-  drawParticles();
-}
-
-void BayesTracker::reset() {
-  filter_.reset();
-  seen_an_image_ = is_known_ = false;
+      filter_(map, config.bayes),
+      particles_(static_cast<std::size_t>(config.pf.particles)) {
   drawParticles();
 }
 
 void BayesTracker::reset(const Prior& prior) {
   constexpr std::size_t kDraws = 1000;
-  std::vector<Eigen::Vector2d> drawn_m;
-  while (drawn_m.size() < kDraws) drawn_m.push_back(prior(random_));
-  filter_.reset(drawn_m);
+  if (prior.isUnknown()) {
+    filter_.reset();
+  } else {
+    std::vector<Eigen::Vector2d> drawn_m;
+    while (drawn_m.size() < kDraws) drawn_m.push_back(prior(random_));
+    filter_.reset(drawn_m);
+  }
   seen_an_image_ = is_known_ = false;
+  belief_ = {};
   drawParticles();
 }
 
-void BayesTracker::configure(const TrackerConfig& config) {
+bool BayesTracker::configure(const TrackerConfig& config) {
+  if (static_cast<std::size_t>(config.pf.particles) != particles_.size()) return false;
   config_ = config.bayes;
-  filter_.configure(config.bayes, config.odometry);
+  filter_.configure(config.bayes);
+  return true;
 }
 
-TrackerEstimate BayesTracker::update(const TrackerInput& input) {
-  if (seen_an_image_) filter_.predict(input.travel);
-  seen_an_image_ = true;
+void BayesTracker::predict(const Motion& motion) {
+  if (seen_an_image_) filter_.predict(motion);
   ++images_;
+}
+
+void BayesTracker::update(Likelihood& likelihood) {
+  seen_an_image_ = true;
   chosen_.clear();
-  if (input.verified_m) {
-    filter_.update(filter_.around(*input.verified_m));
+  if (const auto peak_m = likelihood.peak_m()) {
+    filter_.update(filter_.around(*peak_m));
   } else {
-    choose(input);
-    filter_.update(compare(input.scores));
+    choose(likelihood);
+    filter_.update(compare(likelihood));
   }
   drawParticles();
-  return estimate(input.scores);
+  belief_ = estimate(likelihood);
 }
 
-/// As one more likelihood.
-void BayesTracker::attract(const Eigen::Vector2d& position_m) {
-  filter_.update(filter_.around(position_m));
-  drawParticles();
-}
-
-void BayesTracker::choose(const TrackerInput& input) {
+void BayesTracker::choose(Likelihood& likelihood) {
   const auto most = static_cast<std::size_t>(is_known_ ? config_.comparisons : config_.first_comparisons);
   others_ = std::min({kOthers, most / 2, map_.size()});
   const std::size_t rest = most - others_;
   const bool sees_all = map_.size() <= static_cast<std::size_t>(config_.first_comparisons);
   std::vector<std::size_t> proposed;
-  if (!sees_all) proposed = input.sweep.mostSimilar(input.scores, is_known_ ? rest / kProposed : rest / 2);
+  if (!sees_all) proposed = likelihood.mostSimilar(is_known_ ? rest / kProposed : rest / 2);
   filter_.mostProbable(rest - std::min(rest, proposed.size()), chosen_);
   chosen_.insert(chosen_.end(), proposed.begin(), proposed.end());
   std::sort(chosen_.begin(), chosen_.end());
@@ -88,18 +86,18 @@ void BayesTracker::choose(const TrackerInput& input) {
 
 /// A training image that the image was not compared with is as likely as the usual one of those that were taken in
 /// turn.
-PlaceLikelihood BayesTracker::compare(Scores& scores) {
+PlaceLikelihood BayesTracker::compare(Likelihood& image) {
   PlaceLikelihood likelihood;
   std::vector<double> usual;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    likelihood.compared.push_back({chosen_[i], filter_.likelihoodOf(scores[chosen_[i]])});
+    likelihood.compared.push_back({chosen_[i], filter_.likelihoodOf(image.of(chosen_[i]))});
     if (i + others_ >= chosen_.size()) usual.push_back(likelihood.compared.back().likelihood);
   }
   likelihood.elsewhere = median(std::move(usual));
   return likelihood;
 }
 
-TrackerEstimate BayesTracker::estimate(Scores& scores) {
+TrackerEstimate BayesTracker::estimate(Likelihood& likelihood) {
   const CloudMoments mode = filter_.mode();
   const double around_m = std::max(kAround_m, kPlacesAround * filter_.spacing_m());
   is_known_ = filter_.within(mode.mean_m, around_m) >= kKnown;
@@ -112,13 +110,13 @@ TrackerEstimate BayesTracker::estimate(Scores& scores) {
   result.best_image = result.training_image;
   for (const std::size_t image : chosen_) {
     const bool is_there = (map_.position_m(image) - mode.mean_m).norm() <= around_m;
-    if (!is_there || scores[image].similarity <= result.best.similarity) continue;
-    result.best = scores[image];
+    const Score score = is_there ? likelihood.of(image) : Score();
+    if (score.similarity <= result.best.similarity) continue;
+    result.best = score;
     result.best_image = image;
   }
   result.best_distance_m = (map_.position_m(result.best_image) - mode.mean_m).norm();
-  tuning_.speed_mps = filter_.speed_mps(result.training_image);
-  result.tuning = tuning_;
+  result.report.set("speed_mps", filter_.speed_mps(result.training_image));
   return result;
 }
 

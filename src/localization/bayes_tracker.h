@@ -21,20 +21,19 @@ class BayesTracker final : public Tracker {
   /// `map` must outlive the tracker. Starts anywhere in the map.
   BayesTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed);
 
-  void reset() override;
   void reset(const Prior& prior) override;
-  void configure(const TrackerConfig& config) override;
-  TrackerEstimate update(const TrackerInput& input) override;
-  void attract(const Eigen::Vector2d& position_m) override;
+  bool configure(const TrackerConfig& config) override;
+  void predict(const Motion& motion) override;
+  void update(Likelihood& likelihood) override;
+  const TrackerEstimate& belief() const override { return belief_; }
   /// Drawn from the posterior.
   const std::vector<Particle>& particles() const override { return particles_; }
-  TrackerTuning tuning() const override { return tuning_; }
-  const PlaceFilter* belief() const override { return &filter_; }
+  const PlaceFilter* posterior() const override { return &filter_; }
 
  private:
-  void choose(const TrackerInput& input);
-  PlaceLikelihood compare(Scores& scores);
-  TrackerEstimate estimate(Scores& scores);
+  void choose(Likelihood& likelihood);
+  PlaceLikelihood compare(Likelihood& image);
+  TrackerEstimate estimate(Likelihood& likelihood);
   void drawParticles();
 
   const TrainingMap& map_;
@@ -42,7 +41,7 @@ class BayesTracker final : public Tracker {
   Random random_;
   PlaceFilter filter_;
   std::vector<Particle> particles_;
-  TrackerTuning tuning_;
+  TrackerEstimate belief_;
   bool seen_an_image_ = false;
   bool is_known_ = false;            ///< most of the probability is around the last estimate
   std::size_t images_ = 0;           ///< since the start

@@ -5,7 +5,6 @@
 #include <numeric>
 #include <utility>
 
-#include "localization/session_choice.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/localization/particles.h"
 
@@ -30,22 +29,11 @@ double approach(double from, double to, double start, double share) {
 
 }  // namespace
 
-Dpso::Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed,
-           const OdometryConfig& odometry)
-    : map_(map),
-      config_(config),
-      fitness_config_(fitness),
-      odometry_config_(odometry),
-      random_(seed),
-      area_(map.area()) {
+Dpso::Dpso(const TrainingMap& map, const DpsoConfig& config, std::uint32_t seed)
+    : map_(map), config_(config), random_(seed), area_(map.area()) {
   particles_.resize(static_cast<std::size_t>(config.particles));
   fitness_.resize(particles_.size());
-  reset();
-}
-
-void Dpso::reset() {
   reset(anywhere(area_));
-  position_unknown_ = true;
 }
 
 void Dpso::reset(const Prior& prior) {
@@ -56,8 +44,9 @@ void Dpso::reset(const Prior& prior) {
   speed_known_ = false;
   ground_speed_known_ = false;
   seen_an_image_ = false;
-  position_unknown_ = false;
+  position_unknown_ = prior.isUnknown();
   bad_images_ = 0;
+  belief_ = {};
   for (Particle& particle : particles_) {
     particle = Particle();
     particle.position_m = prior(random_);
@@ -71,26 +60,51 @@ void Dpso::reset(const Prior& prior) {
   assignKinds();
 }
 
-void Dpso::configure(const TrackerConfig& config) {
-  const DpsoConfig before = std::exchange(config_, config.dpso);
+bool Dpso::configure(const TrackerConfig& config) {
+  if (static_cast<std::size_t>(config.dpso.particles) != particles_.size()) return false;
+  configure(config.dpso);
+  return true;
+}
+
+void Dpso::configure(const DpsoConfig& config) {
+  const DpsoConfig before = std::exchange(config_, config);
   choices_ = Choices(config_);
-  fitness_config_ = config.fitness;
-  odometry_config_ = config.odometry;
   if (config_.v0 != before.v0) tuning_.v0 = config_.v0;
   if (config_.quantum_share != before.quantum_share) tuning_.quantum_share = config_.quantum_share;
   if (config_.phi2 != before.phi2) tuning_.phi2 = config_.phi2;
   if (config_.phi0 != before.phi0) tuning_.phi0 = config_.phi0;
   tuning_.v0 = std::clamp(tuning_.v0, config_.v0_min, config_.v0_max);
   if (config_.recovery == "none" && tuning_.recovering) endRecovery();
+  belief_.recovering = tuning_.recovering;
   assignKinds();
 }
 
-TrackerEstimate Dpso::update(const TrackerInput& input) {
-  if (seen_an_image_ && input.travel.odometry) shift(*input.travel.odometry);
+void Dpso::predict(const Motion& motion) {
+  is_new_ = true;
+  seconds_ = motion.seconds();
+  if (!seen_an_image_) return;
+  for (Particle& particle : particles_) {
+    if (motion.carries(random_)) particle.position_m += motion.displacementAt(map_, particle.position_m);
+  }
+  if (attractor_m_) *attractor_m_ += motion.displacementAt(map_, *attractor_m_);
+  if (centre_of_mass_m_) centre_of_mass_m_ = centreOfMass();
+}
+
+void Dpso::update(Likelihood& likelihood) {
+  const bool first_of_image = std::exchange(is_new_, false);
+  if (first_of_image) fly(likelihood);
+  weigh(likelihood);
+  belief_ = estimate();
+  if (first_of_image) adapt();
+  belief_.recovering = tuning_.recovering;
+  report();
+}
+
+void Dpso::fly(Likelihood& likelihood) {
   for (Particle& particle : particles_) {
     if (particle.kind == ParticleKind::kQuantum && isGuided()) {
       particle.velocity_m.setZero();
-      particle.position_m = map_.position_m(input.sweep.draw(input.scores, random_));
+      particle.position_m = map_.position_m(likelihood.draw(random_));
     } else if (seen_an_image_) {
       particle.kind == ParticleKind::kQuantum ? moveQuantum(particle) : move(particle);
     }
@@ -98,18 +112,6 @@ TrackerEstimate Dpso::update(const TrackerInput& input) {
     keepOut(particle);
   }
   seen_an_image_ = true;
-  const std::size_t best = evaluate(input);
-  // An image that matches nothing says nothing about where to go: the attractor stays where it was.
-  if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
-  if (input.verified_m) attract(*input.verified_m);
-  TrackerEstimate result = estimate();
-  adaptSpeed(input.travel);
-  if (!input.verified_m) adaptDiversity(result.best);
-  assignKinds();
-  centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
-  if (!last_centre_m_ || input.travel.seconds > 0.0) last_centre_m_ = centre_of_mass_m_;
-  result.tuning = tuning_;
-  return result;
 }
 
 void Dpso::resize(std::size_t particles) {
@@ -126,24 +128,6 @@ void Dpso::resize(std::size_t particles) {
 void Dpso::exclude(const std::vector<Eigen::Vector2d>& places_m, double radius_m) {
   excluded_m_ = places_m;
   exclusion_radius_m_ = radius_m;
-}
-
-/// A share of the swarm moves with the robot; the rest finds out when the wheels slip.
-void Dpso::shift(const OdometryIncrement& odometry) {
-  for (Particle& particle : particles_) {
-    if (random_.uniform(0.0, 1.0) < odometry_config_.share) {
-      particle.position_m += wayInMap(map_, particle.position_m, odometry);
-    }
-  }
-  if (attractor_m_) *attractor_m_ += wayInMap(map_, *attractor_m_, odometry);
-  if (centre_of_mass_m_) centre_of_mass_m_ = centreOfMass();
-}
-
-void Dpso::attract(const Eigen::Vector2d& position_m) {
-  attractor_m_ = position_m;
-  position_unknown_ = false;
-  bad_images_ = 0;
-  if (tuning_.recovering) endRecovery();
 }
 
 /// The first particles are the quantum ones, the last the high-energy ones, so that a growing quantum share
@@ -196,17 +180,32 @@ bool Dpso::isGuided() const {
   return tuning_.recovering || (config_.guided_start && position_unknown_);
 }
 
-std::size_t Dpso::evaluate(const TrackerInput& input) {
+/// Where the likelihood knows its peak that is the best position, which no particle can match.
+void Dpso::weigh(Likelihood& likelihood) {
   std::size_t best = 0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    const Eigen::Vector2d& position_m = particles_[i].position_m;
-    fitness_[i] = input.verified_m ? Fitness{fitnessAbout(*input.verified_m, position_m), 0, {}}
-                                   : evaluateFitness(input.sessions.nearest(position_m), input.scores, fitness_config_);
+    fitness_[i] = likelihood.at(particles_[i].position_m);
     particles_[i].weight = fitness_[i].value;
     if (fitness_[i].value > fitness_[best].value) best = i;
   }
   normaliseWeights(particles_);
-  return best;
+  best_ = Fitness();
+  for (const Fitness& fitness : fitness_) {
+    if (fitness.score.similarity > best_.score.similarity) best_ = fitness;
+  }
+  // An image that matches nothing says nothing about where to go: the attractor stays where it was.
+  if (fitness_[best].value > 0.0) attractor_m_ = particles_[best].position_m;
+  const auto peak_m = likelihood.peak_m();
+  if (!peak_m) return;
+  best_ = likelihood.at(*peak_m);
+  found(*peak_m);
+}
+
+void Dpso::found(const Eigen::Vector2d& position_m) {
+  attractor_m_ = position_m;
+  position_unknown_ = false;
+  bad_images_ = 0;
+  if (tuning_.recovering) endRecovery();
 }
 
 /// The best particle; before any image was recognised, the middle of the cloud.
@@ -218,12 +217,8 @@ TrackerEstimate Dpso::estimate() const {
   result.mode_covariance_m2 = covarianceAbout(result.position_m, particles_, config_.mode_radius_m);
   result.cloud_covariance_m2 = scatterAbout(result.position_m, particles_);
   result.spread_m = cloud.spread();
-  result.best_image = result.training_image;
-  for (const Fitness& fitness : fitness_) {
-    if (fitness.score.similarity <= result.best.similarity) continue;
-    result.best = fitness.score;
-    result.best_image = fitness.training_image;
-  }
+  result.best = best_.score;
+  result.best_image = best_.score.similarity > 0.0 ? best_.training_image : result.training_image;
   result.best_distance_m = (map_.position_m(result.best_image) - result.position_m).norm();
   return result;
 }
@@ -265,8 +260,17 @@ Eigen::Vector2d Dpso::centreOfMass() const {
   return count > 0.0 ? Eigen::Vector2d(sum / count) : momentsOf(particles_).mean_m;
 }
 
+/// To what the image showed.
+void Dpso::adapt() {
+  adaptSpeed();
+  adaptDiversity();
+  assignKinds();
+  centre_of_mass_m_ = centreOfMass();  // of the particles that count from now on
+  if (!last_centre_m_ || seconds_ > 0.0) last_centre_m_ = centre_of_mass_m_;
+}
+
 /// Holds v0 at about twice the speed of the swarm (journal, section 5, "Self-adaptive parameters").
-void Dpso::adaptSpeed(const Travel& travel) {
+void Dpso::adaptSpeed() {
   const Eigen::Vector2d centre = centreOfMass();
   if (centre_of_mass_m_) {
     const auto smoothed = [this](bool known, double average, double speed) {
@@ -275,8 +279,8 @@ void Dpso::adaptSpeed(const Travel& travel) {
     tuning_.speed_ema =
         smoothed(speed_known_, tuning_.speed_ema, relativeLength(centre - *centre_of_mass_m_, range_m()));
     speed_known_ = true;
-    if (travel.seconds > 0.0) {
-      const double speed_mps = (centre - *last_centre_m_).norm() / travel.seconds;
+    if (seconds_ > 0.0) {
+      const double speed_mps = (centre - *last_centre_m_).norm() / seconds_;
       tuning_.speed_mps = smoothed(ground_speed_known_, tuning_.speed_mps, speed_mps);
       ground_speed_known_ = true;
     }
@@ -290,8 +294,8 @@ void Dpso::adaptSpeed(const Travel& travel) {
 
 /// Recovery phase of the same section: a best match that stays bad boosts the diversity step by step; the
 /// first good one ends it.
-void Dpso::adaptDiversity(const Score& best) {
-  const bool bad = !best.recognised;
+void Dpso::adaptDiversity() {
+  const bool bad = !best_.score.recognised;
   if (!bad) position_unknown_ = false;
   if (config_.recovery == "none") return;
   bad_images_ = bad ? bad_images_ + 1 : 0;
@@ -303,6 +307,15 @@ void Dpso::adaptDiversity(const Score& best) {
       approach(tuning_.quantum_share, config_.quantum_share_max, config_.quantum_share, config_.recovery_step);
   tuning_.phi2 = approach(tuning_.phi2, config_.phi2_min, config_.phi2, config_.recovery_step);
   tuning_.phi0 = approach(tuning_.phi0, std::max(config_.phi0, config_.phi0_max), config_.phi0, config_.recovery_step);
+}
+
+void Dpso::report() {
+  belief_.report.set("v0", tuning_.v0);
+  belief_.report.set("speed_ema", tuning_.speed_ema);
+  belief_.report.set("quantum_share", tuning_.quantum_share);
+  belief_.report.set("phi2", tuning_.phi2);
+  belief_.report.set("phi0", tuning_.phi0);
+  belief_.report.set("speed_mps", tuning_.speed_mps);
 }
 
 void Dpso::endRecovery() {

@@ -9,22 +9,37 @@
 
 namespace visual_localization {
 
+/// How the swarm is tuned at the moment.
+struct SwarmTuning {
+  double v0 = 0.0;             ///< speed limit, share of the area's range per image
+  double speed_ema = 0.0;      ///< smoothed speed of the swarm, same unit
+  double quantum_share = 0.0;  ///< share of quantum particles
+  double phi2 = 0.0;           ///< attraction of the best particle
+  double phi0 = 0.0;           ///< random perturbation
+  bool recovering = false;     ///< the position is taken to be lost
+  double speed_mps = 0.0;      ///< smoothed speed of the swarm (v_sw), metres per second; 0: not known yet
+};
+
 /// Dynamic particle swarm optimisation, Kronfeld et al. (journal), section 5: particles fly towards the best
 /// one of the last image; the best one is the estimate.
 class Dpso final : public Tracker {
  public:
   /// `map` must outlive the tracker. Starts anywhere in the map's area.
-  Dpso(const TrainingMap& map, const DpsoConfig& config, const FitnessConfig& fitness, std::uint32_t seed,
-       const OdometryConfig& odometry = {});
+  Dpso(const TrainingMap& map, const DpsoConfig& config, std::uint32_t seed);
+  Dpso(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) : Dpso(map, config.dpso, seed) {}
 
-  void reset() override;
   void reset(const Prior& prior) override;
   /// What has adapted itself to the images stays, unless just that was changed.
-  void configure(const TrackerConfig& config) override;
-  TrackerEstimate update(const TrackerInput& input) override;
-  void attract(const Eigen::Vector2d& position_m) override;
+  bool configure(const TrackerConfig& config) override;
+  /// Odometry carries a share of the swarm along.
+  void predict(const Motion& motion) override;
+  /// The swarm flies once an image, then weighs what it finds there.
+  void update(Likelihood& likelihood) override;
+  const TrackerEstimate& belief() const override { return belief_; }
   const std::vector<Particle>& particles() const override { return particles_; }
-  TrackerTuning tuning() const override { return tuning_; }
+  const SwarmTuning& tuning() const { return tuning_; }
+  /// As configure(), whatever the number of particles is.
+  void configure(const DpsoConfig& config);
   /// Fewer particles, or copies of those that are there.
   void resize(std::size_t particles);
   /// Where the particles of the next images must not be: discs of this radius about other swarms' places.
@@ -50,18 +65,21 @@ class Dpso final : public Tracker {
   void assignKinds();
   void confine(Particle& particle) const;
   void keepOut(Particle& particle) const;
-  void shift(const OdometryIncrement& odometry);
+  void fly(Likelihood& likelihood);
   void move(Particle& particle);
   Eigen::Vector2d limited(const Eigen::Vector2d& velocity_m, double limit) const;
   void moveQuantum(Particle& particle);
   bool isGuided() const;
-  std::size_t evaluate(const TrackerInput& input);
+  void weigh(Likelihood& likelihood);
+  void found(const Eigen::Vector2d& position_m);
   TrackerEstimate estimate() const;
   Eigen::Vector2d positionOf_m(const CloudMoments& cloud) const;
   Eigen::Vector2d centreOfBest_m() const;
-  void adaptSpeed(const Travel& travel);
-  void adaptDiversity(const Score& best);
+  void adapt();
+  void adaptSpeed();
+  void adaptDiversity();
   void endRecovery();
+  void report();
   Eigen::Vector2d centreOfMass() const;
   /// What speeds and the reach of quantum particles are shares of.
   Eigen::Vector2d range_m() const { return area_.range().cwiseMin(config_.max_range_m); }
@@ -69,13 +87,15 @@ class Dpso final : public Tracker {
   const TrainingMap& map_;
   DpsoConfig config_;
   Choices choices_{config_};
-  FitnessConfig fitness_config_;
-  OdometryConfig odometry_config_;
   Random random_;
   Area area_;
-  TrackerTuning tuning_;
+  SwarmTuning tuning_;
+  TrackerEstimate belief_;
   std::vector<Particle> particles_;
   std::vector<Fitness> fitness_;
+  Fitness best_;                                     ///< the most similar one of the last image
+  double seconds_ = 0.0;                             ///< up to the image; 0: unknown
+  bool is_new_ = false;                              ///< the swarm has not flown for the image yet
   std::optional<Eigen::Vector2d> attractor_m_;       ///< p^n: the best particle of the last image
   std::optional<Eigen::Vector2d> centre_of_mass_m_;  ///< after the last image, shifted by the odometry since
   /// The same at the last image of another time, not shifted.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/time.h"
+#include "localization/image_likelihood.h"
 #include "localization/place_filter.h"
 #include "localization/pose_verifier.h"
 #include "localization/session_choice.h"
@@ -43,11 +44,12 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       scores_(map_->size()),
       sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept()),
       tracker_(makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed))),
-      witness_(std::make_unique<PlaceFilter>(*map_, config_.bayes, config_.odometry)),
+      witness_(std::make_unique<PlaceFilter>(*map_, config_.bayes)),
       choice_(config_.features, config_.hybrid),
       assessor_(config_.state),
       odometry_(config_.odometry),
       sessions_(std::make_unique<SessionChoice>(*map_, config_.choose_session)),
+      likelihood_(std::make_unique<ImageLikelihood>(scores_, sweep_, *sessions_, config_.fitness)),
       verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric, *sessions_)) {
   verifier_->useOdometry(odometry_, config_.odometry);
 }
@@ -196,26 +198,37 @@ std::optional<MetricPose> Localizer::poseNearProposal(const TrackerEstimate& tra
   // Wherever that may be. The sweep's time is that of its features and comparisons, which are timed there.
   if (!pose) pose = nearOneOf(sweep_.mostSimilar(scores_, kSweptImages));
   if (!pose) return pose;
-  tracker_->attract(pose->base.translation().head<2>());
+  PoseLikelihood verified(*map_, pose->base.translation().head<2>());
+  tracker_->update(verified);
   bringTracker(tracked, *pose);
   return pose;
 }
 
 /// A verified pose takes the place of all comparisons but one: that with the training image whose landmarks agree most.
 TrackerEstimate Localizer::track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric) {
-  Travel travel;
-  if (tracked_ns_) travel = {odometry_.between(*tracked_ns_, stamp_ns), secondsBetween(*tracked_ns_, stamp_ns)};
+  Motion motion;
+  if (tracked_ns_) {
+    motion =
+        Motion(secondsBetween(*tracked_ns_, stamp_ns), odometry_.between(*tracked_ns_, stamp_ns), config_.odometry);
+  }
   tracked_ns_ = stamp_ns;
-  const TrackerEstimate tracked = trackFrom(travel, metric);
-  witness(travel, metric);
+  tracker_->predict(motion);
+  const TrackerEstimate tracked = metric ? trackVerified(*metric) : trackImage();
+  witness(motion, metric);
   return tracked;
 }
 
-TrackerEstimate Localizer::trackFrom(const Travel& travel, const std::optional<MetricPose>& metric) {
-  if (!metric) return tracker_->update({scores_, sweep_, *sessions_, travel});
-  const Eigen::Vector2d position_m = metric->base.translation().head<2>();
-  TrackerEstimate tracked = tracker_->update({scores_, sweep_, *sessions_, travel, position_m});
-  bringTracker(tracked, *metric);
+TrackerEstimate Localizer::trackImage() {
+  tracker_->update(*likelihood_);
+  return tracker_->belief();
+}
+
+TrackerEstimate Localizer::trackVerified(const MetricPose& metric) {
+  const Eigen::Vector2d position_m = metric.base.translation().head<2>();
+  PoseLikelihood verified(*map_, position_m);
+  tracker_->update(verified);
+  TrackerEstimate tracked = tracker_->belief();
+  bringTracker(tracked, metric);
   tracked.best_image = verifier_->matched().training_image;
   tracked.best = scores_[tracked.best_image];
   tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
@@ -223,9 +236,9 @@ TrackerEstimate Localizer::trackFrom(const Travel& travel, const std::optional<M
 }
 
 /// A filter beside the tracker learns from what that one compares, and costs no comparison.
-void Localizer::witness(const Travel& travel, const std::optional<MetricPose>& metric) {
-  if (tracker_->belief() != nullptr || config_.state.witness != "probability") return;
-  witness_->predict(travel);
+void Localizer::witness(const Motion& motion, const std::optional<MetricPose>& metric) {
+  if (tracker_->posterior() != nullptr || config_.state.witness != "probability") return;
+  witness_->predict(motion);
   if (metric) return witness_->update(witness_->around(metric->base.translation().head<2>()));
   if (scores_.kind() != FeatureKind::kLocal) return;
   witness_->update(witness_->likelihoodBeside(scores_.compared()));
@@ -235,7 +248,7 @@ void Localizer::witness(const Travel& travel, const std::optional<MetricPose>& m
 std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) const {
   constexpr double kPlaces = 3.0;  // where training images are far apart
   if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kLocal) return std::nullopt;
-  const PlaceFilter& filter = tracker_->belief() != nullptr ? *tracker_->belief() : *witness_;
+  const PlaceFilter& filter = tracker_->posterior() != nullptr ? *tracker_->posterior() : *witness_;
   return filter.within(tracked.position_m, std::max(config_.state.max_distance_m, kPlaces * filter.spacing_m()));
 }
 
@@ -316,7 +329,7 @@ Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool rec
 
 LocalizationState Localizer::doubt() {
   verifier_->doubtMotion();
-  const LocalizationState state = assessor_.doubt(tracker_->tuning().recovering);
+  const LocalizationState state = assessor_.doubt(tracker_->belief().recovering);
   if (last_) {
     last_->state = state;
     if (!last_->metric) last_->pose = poseOf(last_->tracked, state);
@@ -333,7 +346,8 @@ void Localizer::configure(const LocalizerConfig& config) {
   assessor_.configure(config_.state);
   verifier_->configure(config_.metric);
   odometry_.configure(config_.odometry);
-  witness_->configure(config_.bayes, config_.odometry);
+  likelihood_->configure(config_.fitness);
+  witness_->configure(config_.bayes);
   verifier_->useOdometry(odometry_, config_.odometry);
   configureTracker(before.tracker);
   last_.reset();
@@ -365,19 +379,13 @@ FrontEndConfig Localizer::frontEndConfig() const {
 }
 
 void Localizer::configureTracker(const std::string& tracker_before) {
-  if (config_.tracker == tracker_before && config_.particles() == tracker_->particles().size()) {
-    tracker_->configure(config_);
-    return;
-  }
+  if (config_.tracker == tracker_before && tracker_->configure(config_)) return;
   auto successor = makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed));
   successor->reset(drawnFrom(tracker_->particles()));
   tracker_ = std::move(successor);
 }
 
-void Localizer::relocalize() {
-  tracker_->reset();
-  forgetEvidence();
-}
+void Localizer::relocalize() { relocalize(anywhere(map_->area())); }
 
 void Localizer::relocalize(const Prior& prior) {
   tracker_->reset(prior);

@@ -7,6 +7,7 @@
 #include "localization/paper_yaml.h"
 #include "parameters/yaml_map.h"
 #include "visual_localization/features/sift.h"
+#include "visual_localization/localization/tracker.h"
 
 namespace visual_localization {
 namespace {
@@ -20,7 +21,7 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
                   "dynamic particle swarm, several swarms, particle filter with Gaussian or linear motion, or discrete "
                   "Bayes filter "
                   "over the training images"},
-                 tracker, {"dpso", "dpso_multi", "pf_gaussian", "pf_linear", "bayes"});
+                 tracker, trackerNames());
   std::vector<std::string> names = localFeatureNames();
   names.insert(names.end(), {"global", "hybrid"});
   visitor.choice({"features", "",

@@ -17,46 +17,50 @@ constexpr double kStart_m = 2.0;         ///< spread of a rival that begins
 MultiSwarm::MultiSwarm(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed)
     : map_(map), config_(config.dpso), random_(seed) {
   for (int i = 0; i < DpsoConfig::kMostSwarms; ++i) {
-    swarms_.push_back({std::make_unique<Dpso>(map, config.dpso, config.fitness, seed + static_cast<std::uint32_t>(i),
-                                              config.odometry)});
+    swarms_.push_back({std::make_unique<Dpso>(map, config.dpso, seed + static_cast<std::uint32_t>(i))});
   }
   particles_.reserve(static_cast<std::size_t>(config_.particles));
-  reset();
-}
-
-void MultiSwarm::reset() {
-  restart();
-  swarms_.front().dpso->reset();
-  gather();
+  reset(anywhere(map.area()));
 }
 
 void MultiSwarm::reset(const Prior& prior) {
   restart();
   swarms_.front().dpso->reset(prior);
+  belief_ = {};
   gather();
 }
 
-void MultiSwarm::configure(const TrackerConfig& config) {
+bool MultiSwarm::configure(const TrackerConfig& config) {
   config_ = config.dpso;
   while (active_ > static_cast<std::size_t>(config_.swarms)) dissolve(active_ - 1);
-  for (Swarm& swarm : swarms_) swarm.dpso->configure(config);
+  for (Swarm& swarm : swarms_) swarm.dpso->configure(config.dpso);
   share();
+  gather();
+  belief_.recovering = swarms_.front().dpso->tuning().recovering;
+  return true;
 }
 
-void MultiSwarm::attract(const Eigen::Vector2d& position_m) { swarms_.front().dpso->attract(position_m); }
+void MultiSwarm::predict(const Motion& motion) {
+  for (std::size_t i = 0; i < active_; ++i) swarms_[i].dpso->predict(motion);
+}
 
-TrackerEstimate MultiSwarm::update(const TrackerInput& input) {
-  if (input.verified_m) restart();
-  exclude();
-  follow(input);
-  if (!input.verified_m) {
+/// Where the likelihood knows its peak there are no rivals.
+void MultiSwarm::update(Likelihood& likelihood) {
+  if (likelihood.peak_m()) {
+    restart();
+    exclude();
+    swarms_.front().dpso->update(likelihood);
+    swarms_.front().estimate = swarms_.front().dpso->belief();
+  } else {
+    exclude();
+    follow(likelihood);
     chooseLeader();
     for (std::size_t i = active_; i-- > 1;) {
       if (isSuperfluous(i)) dissolve(i);
     }
-    scout(input);
+    scout(likelihood);
   }
-  return estimate();
+  belief_ = estimate();
 }
 
 /// The leader alone, as if it had followed no image yet: where geometry verified a pose, or after a reset, what it
@@ -86,11 +90,11 @@ void MultiSwarm::exclude() {
   }
 }
 
-void MultiSwarm::follow(const TrackerInput& input) {
+void MultiSwarm::follow(Likelihood& likelihood) {
   for (std::size_t i = 0; i < active_; ++i) {
     Swarm& swarm = swarms_[i];
-    swarm.estimate = swarm.dpso->update(input);
-    if (input.verified_m) continue;  // nothing was compared
+    swarm.dpso->update(likelihood);
+    swarm.estimate = swarm.dpso->belief();
     const double matched = swarm.estimate.best.weight;
     swarm.strength = swarm.images == 0 ? matched : kMemory * swarm.strength + (1.0 - kMemory) * matched;
     swarm.unrecognised = swarm.estimate.best.recognised ? 0 : swarm.unrecognised + 1;
@@ -135,14 +139,15 @@ bool MultiSwarm::isTaken(const Eigen::Vector2d& position_m) const {
 }
 
 /// A leader that is lost needs its particles to find its place again.
-void MultiSwarm::scout(const TrackerInput& input) {
-  const bool lost = !swarms_.front().estimate.best.recognised || tuning().recovering;
+void MultiSwarm::scout(Likelihood& likelihood) {
+  const Swarm& leader = swarms_.front();
+  const bool lost = !leader.estimate.best.recognised || leader.estimate.recovering;
   if (lost || active_ == static_cast<std::size_t>(config_.swarms)) return;
-  const std::size_t image = input.sweep.draw(input.scores, random_);
+  const std::size_t image = likelihood.draw(random_);
   const Eigen::Vector2d& position_m = map_.position_m(image);
   if (isTaken(position_m)) return;
-  const Score found = input.scores[image];
-  if (!found.recognised || found.weight < config_.rival_share * swarms_.front().estimate.best.weight) return;
+  const Score found = likelihood.of(image);
+  if (!found.recognised || found.weight < config_.rival_share * leader.estimate.best.weight) return;
   Swarm& rival = swarms_[active_++];
   rival.strength = found.weight;
   rival.images = 1;
@@ -162,8 +167,7 @@ TrackerEstimate MultiSwarm::estimate() {
   double best_rival = 0.0;
   for (std::size_t i = 0; i < active_; ++i) all += swarms_[i].strength;
   for (std::size_t i = 1; i < active_; ++i) best_rival = std::max(best_rival, swarms_[i].strength);
-  result.rival_weight = all > 0.0 ? best_rival / all : 0.0;
-  result.tuning = tuning();
+  result.report.set("rival_weight", all > 0.0 ? best_rival / all : 0.0);
   return result;
 }
 

@@ -25,13 +25,12 @@ class MultiSwarm final : public Tracker {
   /// `map` must outlive the tracker. Starts anywhere in the map's area, as one swarm.
   MultiSwarm(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed);
 
-  void reset() override;
   void reset(const Prior& prior) override;
-  void configure(const TrackerConfig& config) override;
-  TrackerEstimate update(const TrackerInput& input) override;
-  void attract(const Eigen::Vector2d& position_m) override;
+  bool configure(const TrackerConfig& config) override;
+  void predict(const Motion& motion) override;
+  void update(Likelihood& likelihood) override;
+  const TrackerEstimate& belief() const override { return belief_; }
   const std::vector<Particle>& particles() const override { return particles_; }
-  TrackerTuning tuning() const override { return swarms_.front().dpso->tuning(); }
   /// Those that follow a place now, the leader included.
   std::size_t swarms() const { return active_; }
 
@@ -47,12 +46,12 @@ class MultiSwarm final : public Tracker {
   void restart();
   void share();
   void exclude();
-  void follow(const TrackerInput& input);
+  void follow(Likelihood& likelihood);
   void chooseLeader();
   void dissolve(std::size_t swarm);
   bool isSuperfluous(std::size_t swarm) const;
   bool isTaken(const Eigen::Vector2d& position_m) const;
-  void scout(const TrackerInput& input);
+  void scout(Likelihood& likelihood);
   TrackerEstimate estimate();
   void gather();
 
@@ -61,6 +60,7 @@ class MultiSwarm final : public Tracker {
   Random random_;
   std::vector<Swarm> swarms_;  ///< the leader first, then its rivals, then those that wait
   std::size_t active_ = 1;
+  TrackerEstimate belief_;
   std::vector<Particle> particles_;        ///< of all
   std::vector<Eigen::Vector2d> others_m_;  ///< places of the other swarms; kept to save the allocation
 };

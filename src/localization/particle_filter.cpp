@@ -8,12 +8,29 @@
 #include <Eigen/Geometry>
 
 #include "base/numbers.h"
-#include "localization/session_choice.h"
 #include "visual_localization/localization/particles.h"
+#include "visual_localization/localization/tracker_config.h"
+#include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
 
-void GaussianMotion::move(Particle& particle, const Travel&, Random& random) const {
+void ParticleFilterConfig::declare(ParameterVisitor& visitor) {
+  visitor.integer({"pf/particles", "1", "number of particles (m)"}, particles, 2, 100000);
+  visitor.real({"pf/pull", "1", "share of the way to its nearest training image that a particle is moved"}, pull, 0.0,
+               1.0);
+  visitor.real({"pf/random_share", "1", "worst particles that are replaced by random ones after each image"},
+               random_share, 0.0, 1.0);
+  visitor.real({"pf/gaussian_std", "m", "step of pf_gaussian per image and axis"}, gaussian_std_m, 0.0, 1000.0);
+  visitor.real({"pf/rotation_std", "deg", "how much pf_linear turns per image (sigma_rot)"}, rotation_std_deg, 0.0,
+               180.0);
+  visitor.real(
+      {"pf/acceleration_std", "1", "how much the logarithm of pf_linear's speed changes per image (sigma_acc)"},
+      acceleration_std, 0.0, 1.0);
+  visitor.real({"pf/initial_speed", "m", "first speed of pf_linear's particles per image (v_init)"}, initial_speed_m,
+               0.0, 1000.0);
+}
+
+void GaussianMotion::move(Particle& particle, const Motion&, Random& random) const {
   particle.position_m += random.normal(Eigen::Vector2d(std_m_, std_m_));
 }
 
@@ -23,23 +40,21 @@ void LinearMotion::start(Particle& particle, Random& random) const {
 }
 
 /// Kronfeld et al. (journal), Eq. 7 and 8: the velocity is rotated, then scaled.
-void LinearMotion::move(Particle& particle, const Travel&, Random& random) const {
+void LinearMotion::move(Particle& particle, const Motion&, Random& random) const {
   const Eigen::Rotation2Dd rotation(random.normal(rotation_std_rad_));
   particle.velocity_m = std::exp(random.normal(acceleration_std_)) * (rotation * particle.velocity_m);
   particle.position_m += particle.velocity_m;
 }
 
-void OdometryMotion::move(Particle& particle, const Travel& travel, Random& random) const {
-  if (!travel.odometry || random.uniform(0.0, 1.0) >= config_.share) {
-    return otherwise_->move(particle, travel, random);
-  }
+void OdometryMotion::move(Particle& particle, const Motion& motion, Random& random) const {
+  if (!motion.carries(random)) return otherwise_->move(particle, motion, random);
   constexpr double kLeast_m = 0.2;  // particles are as far apart as the training images allow
-  const double sigma_m = kLeast_m + config_.distance_sigma * travel.odometry->distance_m;
+  const double sigma_m = kLeast_m + motion.sigma_m();
   particle.position_m +=
-      wayInMap(map_, particle.position_m, *travel.odometry) + random.normal(Eigen::Vector2d(sigma_m, sigma_m));
+      motion.displacementAt(map_, particle.position_m) + random.normal(Eigen::Vector2d(sigma_m, sigma_m));
 }
 
-void PullToMap::move(Particle& particle, const Travel&, Random&) const {
+void PullToMap::move(Particle& particle, const Motion&, Random&) const {
   const Eigen::Vector2d target_m = map_.position_m(map_.nearest(particle.position_m).image);
   particle.position_m += share_ * (target_m - particle.position_m);
 }
@@ -50,12 +65,12 @@ void CombinedMotion::start(Particle& particle, Random& random) const {
   for (const auto& part : parts_) part->start(particle, random);
 }
 
-void CombinedMotion::move(Particle& particle, const Travel& travel, Random& random) const {
-  for (const auto& part : parts_) part->move(particle, travel, random);
+void CombinedMotion::move(Particle& particle, const Motion& motion, Random& random) const {
+  for (const auto& part : parts_) part->move(particle, motion, random);
 }
 
 std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
-                                             const TrainingMap& map, const OdometryConfig& odometry) {
+                                             const TrainingMap& map) {
   std::unique_ptr<MotionModel> of_papers;
   if (tracker == "pf_gaussian") {
     of_papers = std::make_unique<GaussianMotion>(config.gaussian_std_m);
@@ -64,23 +79,25 @@ std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const P
                                                config.initial_speed_m);
   }
   std::vector<std::unique_ptr<MotionModel>> parts;
-  parts.push_back(std::make_unique<OdometryMotion>(map, odometry, std::move(of_papers)));
+  parts.push_back(std::make_unique<OdometryMotion>(map, std::move(of_papers)));
   if (config.pull > 0.0) parts.push_back(std::make_unique<PullToMap>(map, config.pull));
   return std::make_unique<CombinedMotion>(std::move(parts));
 }
 
+ParticleFilter::ParticleFilter(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed)
+    : ParticleFilter(map, makeMotionModel(config.tracker, config.pf, map), config.pf, seed) {}
+
 ParticleFilter::ParticleFilter(const TrainingMap& map, std::unique_ptr<MotionModel> motion,
-                               const ParticleFilterConfig& config, const FitnessConfig& fitness, std::uint32_t seed)
+                               const ParticleFilterConfig& config, std::uint32_t seed)
     : map_(map),
       motion_(std::move(motion)),
       config_(config),
-      fitness_config_(fitness),
       random_(seed),
       anywhere_(anywhere(map.area())),
       particles_(static_cast<std::size_t>(config.particles)),
       order_(particles_.size()) {
   std::iota(order_.begin(), order_.end(), std::size_t{0});
-  reset();
+  reset(anywhere_);
 }
 
 void ParticleFilter::reset(const Prior& prior) {
@@ -90,31 +107,31 @@ void ParticleFilter::reset(const Prior& prior) {
     particle.weight = 1.0 / static_cast<double>(particles_.size());
     motion_->start(particle, random_);
   }
-  seen_an_image_ = false;
+  is_new_ = true;
+  belief_ = {};
 }
 
-void ParticleFilter::configure(const TrackerConfig& config) {
+bool ParticleFilter::configure(const TrackerConfig& config) {
+  if (static_cast<std::size_t>(config.pf.particles) != particles_.size()) return false;
   config_ = config.pf;
-  fitness_config_ = config.fitness;
-  motion_ = makeMotionModel(config.tracker, config.pf, map_, config.odometry);
+  motion_ = makeMotionModel(config.tracker, config.pf, map_);
+  return true;
 }
 
-TrackerEstimate ParticleFilter::update(const TrackerInput& input) {
-  if (seen_an_image_) {
-    resample();
-    for (Particle& particle : particles_) motion_->move(particle, input.travel, random_);
+void ParticleFilter::predict(const Motion& motion) {
+  if (std::exchange(is_new_, true)) return;
+  resample();
+  for (Particle& particle : particles_) motion_->move(particle, motion, random_);
+}
+
+void ParticleFilter::update(Likelihood& likelihood) {
+  const bool first_of_image = std::exchange(is_new_, false);
+  if (first_of_image) {
+    for (Particle& particle : particles_) particle.weight = 1.0;  // each was drawn by its weight before
   }
-  seen_an_image_ = true;
-  weigh(input);
-  TrackerEstimate result = estimate();
-  injectRandomParticles();
-  return result;
-}
-
-/// As one more likelihood.
-void ParticleFilter::attract(const Eigen::Vector2d& position_m) {
-  for (Particle& particle : particles_) particle.weight *= fitnessAbout(position_m, particle.position_m);
-  normaliseWeights(particles_);
+  weigh(likelihood);
+  belief_ = estimate();
+  if (first_of_image) injectRandomParticles();
 }
 
 /// Low-variance resampling: one random offset, then equal steps through the cumulated weights.
@@ -132,13 +149,11 @@ void ParticleFilter::resample() {
   particles_.swap(drawn_);
 }
 
-void ParticleFilter::weigh(const TrackerInput& input) {
+void ParticleFilter::weigh(Likelihood& likelihood) {
   best_ = Fitness();
   for (Particle& particle : particles_) {
-    const Fitness fitness =
-        input.verified_m ? Fitness{fitnessAbout(*input.verified_m, particle.position_m), 0, {}}
-                         : evaluateFitness(input.sessions.nearest(particle.position_m), input.scores, fitness_config_);
-    particle.weight = fitness.value;
+    const Fitness fitness = likelihood.at(particle.position_m);
+    particle.weight *= fitness.value;
     if (fitness.score.similarity > best_.score.similarity) best_ = fitness;
   }
   normaliseWeights(particles_);

@@ -20,7 +20,7 @@ class MotionModel {
   /// Gives a particle at a new position whatever the model needs.
   virtual void start(Particle&, Random&) const {}
   /// One image further.
-  virtual void move(Particle& particle, const Travel& travel, Random& random) const = 0;
+  virtual void move(Particle& particle, const Motion& motion, Random& random) const = 0;
 };
 
 /// Random walk (Weiss et al., section IV.A; PF-g of Kronfeld et al. (journal), section 7.2).
@@ -28,7 +28,7 @@ class GaussianMotion final : public MotionModel {
  public:
   /// `std_m`: of the step along each axis, metres per image.
   explicit GaussianMotion(double std_m) : std_m_(std_m) {}
-  void move(Particle& particle, const Travel& travel, Random& random) const override;
+  void move(Particle& particle, const Motion& motion, Random& random) const override;
 
  private:
   double std_m_;
@@ -42,7 +42,7 @@ class LinearMotion final : public MotionModel {
   LinearMotion(double rotation_std_rad, double acceleration_std, double initial_speed_m)
       : rotation_std_rad_(rotation_std_rad), acceleration_std_(acceleration_std), initial_speed_m_(initial_speed_m) {}
   void start(Particle& particle, Random& random) const override;
-  void move(Particle& particle, const Travel& travel, Random& random) const override;
+  void move(Particle& particle, const Motion& motion, Random& random) const override;
 
  private:
   double rotation_std_rad_;
@@ -55,7 +55,7 @@ class PullToMap final : public MotionModel {
  public:
   /// `map` must outlive the model; `share` in [0, 1].
   PullToMap(const TrainingMap& map, double share) : map_(map), share_(share) {}
-  void move(Particle& particle, const Travel& travel, Random& random) const override;
+  void move(Particle& particle, const Motion& motion, Random& random) const override;
 
  private:
   const TrainingMap& map_;
@@ -66,14 +66,13 @@ class PullToMap final : public MotionModel {
 class OdometryMotion final : public MotionModel {
  public:
   /// `map` must outlive the model.
-  OdometryMotion(const TrainingMap& map, const OdometryConfig& config, std::unique_ptr<MotionModel> otherwise)
-      : map_(map), config_(config), otherwise_(std::move(otherwise)) {}
+  OdometryMotion(const TrainingMap& map, std::unique_ptr<MotionModel> otherwise)
+      : map_(map), otherwise_(std::move(otherwise)) {}
   void start(Particle& particle, Random& random) const override { otherwise_->start(particle, random); }
-  void move(Particle& particle, const Travel& travel, Random& random) const override;
+  void move(Particle& particle, const Motion& motion, Random& random) const override;
 
  private:
   const TrainingMap& map_;
-  OdometryConfig config_;
   std::unique_ptr<MotionModel> otherwise_;
 };
 
@@ -82,7 +81,7 @@ class CombinedMotion final : public MotionModel {
  public:
   explicit CombinedMotion(std::vector<std::unique_ptr<MotionModel>> parts);
   void start(Particle& particle, Random& random) const override;
-  void move(Particle& particle, const Travel& travel, Random& random) const override;
+  void move(Particle& particle, const Motion& motion, Random& random) const override;
 
  private:
   std::vector<std::unique_ptr<MotionModel>> parts_;
@@ -91,41 +90,41 @@ class CombinedMotion final : public MotionModel {
 /// The motion of the tracker called `tracker`, "pf_gaussian" or "pf_linear", with the pull towards the training images.
 /// `map` must outlive it.
 std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const ParticleFilterConfig& config,
-                                             const TrainingMap& map, const OdometryConfig& odometry = {});
+                                             const TrainingMap& map);
 
 /// Particle filter without odometry (Weiss et al., section IV.A): resample, move, weigh, estimate the weighted
 /// mean, replace the worst by random particles.
 class ParticleFilter final : public Tracker {
  public:
   /// `map` must outlive the filter. Starts anywhere in the map's area.
+  ParticleFilter(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed);
   ParticleFilter(const TrainingMap& map, std::unique_ptr<MotionModel> motion, const ParticleFilterConfig& config,
-                 const FitnessConfig& fitness, std::uint32_t seed);
+                 std::uint32_t seed);
 
-  void reset() override { reset(anywhere_); }
   void reset(const Prior& prior) override;
-  void configure(const TrackerConfig& config) override;
-  TrackerEstimate update(const TrackerInput& input) override;
-  void attract(const Eigen::Vector2d& position_m) override;
+  bool configure(const TrackerConfig& config) override;
+  void predict(const Motion& motion) override;
+  void update(Likelihood& likelihood) override;
+  const TrackerEstimate& belief() const override { return belief_; }
   const std::vector<Particle>& particles() const override { return particles_; }
-  TrackerTuning tuning() const override { return {}; }
 
  private:
   void resample();
-  void weigh(const TrackerInput& input);
+  void weigh(Likelihood& likelihood);
   TrackerEstimate estimate() const;
   void injectRandomParticles();
 
   const TrainingMap& map_;
   std::unique_ptr<MotionModel> motion_;
   ParticleFilterConfig config_;
-  FitnessConfig fitness_config_;
   Random random_;
   Prior anywhere_;
   std::vector<Particle> particles_;
   std::vector<Particle> drawn_;     ///< of the last resampling; kept to save the allocation
   std::vector<std::size_t> order_;  ///< of the particles by weight
   Fitness best_;                    ///< of the last image
-  bool seen_an_image_ = false;
+  bool is_new_ = true;              ///< nothing is known of the image yet, or there was none
+  TrackerEstimate belief_;
 };
 
 }  // namespace visual_localization

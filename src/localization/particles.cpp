@@ -21,10 +21,6 @@ bool isOnLocalMap(const Eigen::Vector2d& position_m) {
 
 }  // namespace
 
-Eigen::Vector2d wayInMap(const TrainingMap& map, const Eigen::Vector2d& position_m, const OdometryIncrement& odometry) {
-  return Eigen::Rotation2Dd(map.yaw_rad(map.nearest(position_m).image)) * odometry.translation_m;
-}
-
 CloudMoments momentsOf(const std::vector<Particle>& particles) {
   CloudMoments moments;
   double total = 0.0;
@@ -69,11 +65,12 @@ void normaliseWeights(std::vector<Particle>& particles) {
 }
 
 Prior anywhere(const Area& area) {
-  return [area](Random& random) {
+  const auto draw = [area](Random& random) {
     const double x = random.uniform(0.0, 1.0);
     const double y = random.uniform(0.0, 1.0);
     return Eigen::Vector2d(area.min_m + Eigen::Vector2d(x, y).cwiseProduct(area.range()));
   };
+  return Prior(draw, true);
 }
 
 Prior around(const Eigen::Vector2d& centre_m, double radius_m) {
@@ -82,11 +79,11 @@ Prior around(const Eigen::Vector2d& centre_m, double radius_m) {
   if (!(radius_m >= 0.0 && radius_m <= kLargestCoordinate_m)) {
     throw std::invalid_argument("the radius must be from 0 to 1000 km, in metres");
   }
-  return [centre_m, radius_m](Random& random) {
+  return Prior([centre_m, radius_m](Random& random) {
     const double angle = random.uniform(-kPi, kPi);
     const double distance = radius_m * std::sqrt(random.uniform(0.0, 1.0));
     return Eigen::Vector2d(centre_m + distance * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-  };
+  });
 }
 
 Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& covariance_m2) {
@@ -107,9 +104,9 @@ Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& 
     throw std::invalid_argument("the covariance must be positive semi-definite");
   }
   const Eigen::Matrix2d root = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  return [mean_m, root](Random& random) {
+  return Prior([mean_m, root](Random& random) {
     return Eigen::Vector2d(mean_m + root * random.normal(Eigen::Vector2d(1.0, 1.0)));
-  };
+  });
 }
 
 Prior drawnFrom(std::vector<Particle> cloud) {
@@ -118,7 +115,7 @@ Prior drawnFrom(std::vector<Particle> cloud) {
   cumulated.reserve(cloud.size());
   double total = 0.0;
   for (const Particle& particle : cloud) cumulated.push_back(total += particle.weight);
-  return [cloud = std::move(cloud), cumulated = std::move(cumulated)](Random& random) {
+  return Prior([cloud = std::move(cloud), cumulated = std::move(cumulated)](Random& random) {
     const double sum = cumulated.back();
     const bool by_weight = random.uniform(0.0, 1.0) < 0.5 && sum > 0.0;
     const double target = random.uniform(0.0, by_weight ? sum : static_cast<double>(cloud.size()));
@@ -126,18 +123,7 @@ Prior drawnFrom(std::vector<Particle> cloud) {
     const auto index =
         by_weight ? static_cast<std::size_t>(found - cumulated.begin()) : static_cast<std::size_t>(target);
     return cloud[std::min(index, cloud.size() - 1)].position_m;
-  };
-}
-
-Fitness evaluateFitness(const Neighbour& nearest, Scores& scores, const FitnessConfig& config) {
-  const double offset = nearest.distance_m / config.distance_sigma_m;
-  const Score score = scores[nearest.image];
-  return {score.weight * std::exp(-0.5 * offset * offset), nearest.image, score};
-}
-
-double fitnessAbout(const Eigen::Vector2d& verified_m, const Eigen::Vector2d& position_m) {
-  constexpr double kSigma_m = 1.0;  // a cloud as wide as that of a place: the next image may have no pose
-  return std::exp(-0.5 * (position_m - verified_m).squaredNorm() / (kSigma_m * kSigma_m));
+  });
 }
 
 }  // namespace visual_localization

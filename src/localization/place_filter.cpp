@@ -59,10 +59,9 @@ void BayesConfig::declare(ParameterVisitor& visitor) {
   visitor.atMost("bayes/comparisons", comparisons, "bayes/first_comparisons", first_comparisons);
 }
 
-PlaceFilter::PlaceFilter(const TrainingMap& map, const BayesConfig& config, const OdometryConfig& odometry)
+PlaceFilter::PlaceFilter(const TrainingMap& map, const BayesConfig& config)
     : map_(map),
       config_(config),
-      odometry_(odometry),
       pace_mps_(map.size()),
       probabilities_(map.size()),
       likelihoods_(map.size()),
@@ -72,13 +71,8 @@ PlaceFilter::PlaceFilter(const TrainingMap& map, const BayesConfig& config, cons
   reset();
 }
 
-void PlaceFilter::configure(const BayesConfig& config, const OdometryConfig& odometry) {
-  config_ = config;
-  odometry_ = odometry;
-}
-
-double PlaceFilter::secondsOf(const Travel& travel) const {
-  return std::min(travel.seconds > 0.0 ? travel.seconds : interval_s_, kLongest_s);
+double PlaceFilter::secondsOf(const Motion& motion) const {
+  return std::min(motion.seconds() > 0.0 ? motion.seconds() : interval_s_, kLongest_s);
 }
 
 /// A robot is likely to be slow where the session was.
@@ -157,20 +151,19 @@ PlaceLikelihood PlaceFilter::likelihoodBeside(const std::vector<Scores::Compared
   return likelihood;
 }
 
-void PlaceFilter::predict(const Travel& travel) {
+void PlaceFilter::predict(const Motion& motion) {
   constexpr double kLeastIndependence = 0.1;  // of a robot that stands: noise, and people who pass
-  const double way_m =
-      travel.odometry ? travel.odometry->distance_m : expectedSpeed() * spacing_m_ / interval_s_ * secondsOf(travel);
+  const double expected_m = expectedSpeed() * spacing_m_ / interval_s_ * secondsOf(motion);
+  const double way_m = motion.share() > 0.0 ? motion.increment().distance_m : expected_m;
   independence_ = std::clamp(way_m / spacing_m_, kLeastIndependence, 1.0);
   arrivals_.clear();
   stayed_ = probabilities_;
-  odometry_share_ = travel.odometry ? odometry_.share : 0.0;
   const double least = kLeastMoved * *std::max_element(probabilities_.begin(), probabilities_.end());
   std::vector<std::size_t> moved;
   mostProbable(kMostMoved, moved);
   for (const std::size_t image : moved) {
     if (probabilities_[image] < least || probabilities_[image] <= 0.0) continue;
-    moveFrom(image, travel);
+    moveFrom(image, motion);
     stayed_[image] = 0.0;
   }
   const PerSpeed usual = usualSpeeds();
@@ -182,18 +175,18 @@ void PlaceFilter::predict(const Travel& travel) {
   probabilities_ = stayed_;
   for (const Arrival& arrival : arrivals_) {
     const double by_speed =
-        std::inner_product(speeds_.begin(), speeds_.end(), arrival.by_speed.begin(), 0.0) * (1.0 - odometry_share_);
-    probabilities_[arrival.training_image] += by_speed + odometry_share_ * arrival.by_odometry;
+        std::inner_product(speeds_.begin(), speeds_.end(), arrival.by_speed.begin(), 0.0) * (1.0 - motion.share());
+    probabilities_[arrival.training_image] += by_speed + motion.share() * arrival.by_odometry;
   }
   const double anywhere = config_.anywhere / static_cast<double>(map_.size());
   for (double& probability : probabilities_) probability = (1.0 - config_.anywhere) * probability + anywhere;
 }
 
 /// A Gaussian about where each speed leads to, shared among the training images that face alike.
-void PlaceFilter::moveFrom(std::size_t image, const Travel& travel) {
-  const double pace_m = static_cast<double>(pace_mps_[image]) * secondsOf(travel);
+void PlaceFilter::moveFrom(std::size_t image, const Motion& motion) {
+  const double pace_m = static_cast<double>(pace_mps_[image]) * secondsOf(motion);
   const double place_m = kPlaceSigma * spacing_m_;
-  const double longest_m = std::max(kSpeeds.back() * pace_m, travel.odometry ? travel.odometry->distance_m : 0.0);
+  const double longest_m = std::max(kSpeeds.back() * pace_m, motion.increment().distance_m);
   const auto sessions = static_cast<double>(map_.header().sessions.size());
   const double most = std::ceil(3.0 * sessions * (1.0 + longest_m / spacing_m_));
   map_.nearest(map_.position_m(image), static_cast<std::size_t>(std::min(most, 1.0 * kMostAround)), neighbours_);
@@ -224,10 +217,9 @@ void PlaceFilter::moveFrom(std::size_t image, const Travel& travel) {
     share(distance_m, std::hypot(kDistanceSigma * distance_m, place_m),
           [k](Arrival& arrival, double part) { arrival.by_speed[k] += part; });
   }
-  if (!travel.odometry) return;
-  const Eigen::Vector2d& way_m = travel.odometry->translation_m;
-  share(std::copysign(way_m.norm(), way_m.x()),
-        std::hypot(odometry_.distance_sigma * travel.odometry->distance_m, place_m),
+  if (motion.share() <= 0.0) return;
+  const Eigen::Vector2d& way_m = motion.increment().translation_m;
+  share(std::copysign(way_m.norm(), way_m.x()), std::hypot(motion.sigma_m(), place_m),
         [](Arrival& arrival, double part) { arrival.by_odometry += part; });
 }
 

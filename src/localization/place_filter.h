@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "visual_localization/localization/motion.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker_config.h"
@@ -32,15 +33,15 @@ struct PlaceLikelihood {
 class PlaceFilter {
  public:
   /// `map` must outlive the filter. Anywhere.
-  PlaceFilter(const TrainingMap& map, const BayesConfig& config, const OdometryConfig& odometry);
+  PlaceFilter(const TrainingMap& map, const BayesConfig& config);
 
-  void configure(const BayesConfig& config, const OdometryConfig& odometry);
+  void configure(const BayesConfig& config) { config_ = config; }
   /// Anywhere again.
   void reset();
   /// At the training images nearest to these positions, each counted the same; there must be one.
   void reset(const std::vector<Eigen::Vector2d>& positions_m);
   /// The motion since the last image.
-  void predict(const Travel& travel);
+  void predict(const Motion& motion);
   /// How likely an image with this score was taken at the training image: a power of the matches and one, or what the
   /// score counts for a particle where there are none. Images that follow each other more closely than the training
   /// images do are not independent: the nearer they are the less each says.
@@ -82,15 +83,14 @@ class PlaceFilter {
   };
 
   void learnPace();
-  double secondsOf(const Travel& travel) const;
-  void moveFrom(std::size_t image, const Travel& travel);
+  double secondsOf(const Motion& motion) const;
+  void moveFrom(std::size_t image, const Motion& motion);
   Arrival& arrivalAt(std::size_t image);
   double expectedSpeed() const;
   void learnSpeed(double elsewhere);
 
   const TrainingMap& map_;
   BayesConfig config_;
-  OdometryConfig odometry_;
   double spacing_m_ = 1.0;
   double interval_s_ = 1.0;      ///< usual time between successive training images
   std::vector<float> pace_mps_;  ///< of the session at each training image
@@ -100,7 +100,6 @@ class PlaceFilter {
   std::vector<double> stayed_;       ///< probability of those too improbable to be moved
   std::vector<Arrival> arrivals_;
   std::vector<std::uint32_t> arrival_of_;  ///< of each training image; holds if the arrival says so too
-  double odometry_share_ = 0.0;            ///< of the last motion
   std::optional<double> log_best_;         ///< of the likelihoods of late, smoothed
   double independence_ = 1.0;              ///< of the image from the one before, (0, 1]
   mutable std::vector<Neighbour> neighbours_;

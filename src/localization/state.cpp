@@ -153,7 +153,7 @@ LocalizationState StateAssessor::update(std::int64_t stamp_ns, const TrackerEsti
   if (certain) unconfirmed_ = 0;
   if (!certain && !evidence.blind && !sees_map) unconfirmed_ = std::min(unconfirmed_ + 1, config_.off_map_images);
   const bool decided = evidence.verified || evidence.probability;
-  return stateOf(certain, estimate.tuning.recovering && !(decided && certain));
+  return stateOf(certain, estimate.recovering && !(decided && certain));
 }
 
 LocalizationState StateAssessor::stateOf(bool certain, bool recovering) const {

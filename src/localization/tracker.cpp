@@ -1,5 +1,8 @@
 #include "visual_localization/localization/tracker.h"
 
+#include <stdexcept>
+
+#include "base/text.h"
 #include "localization/bayes_tracker.h"
 #include "localization/dpso.h"
 #include "localization/multi_swarm.h"
@@ -9,105 +12,68 @@
 
 namespace visual_localization {
 
-void FitnessConfig::declare(ParameterVisitor& visitor) {
-  visitor.real({"fitness/distance_sigma", "m", "how fast fitness falls off beside the recorded path (std of zeta)"},
-               distance_sigma_m, 0.1, 1000.0);
+void TrackerReport::set(const char* key, double value) {
+  for (std::size_t i = 0; i < size_; ++i) {
+    if (key != std::string_view(entries_[i].key)) continue;
+    entries_[i].value = value;
+    return;
+  }
+  if (size_ == kMost) throw std::length_error("a tracker reports too much: " + std::string(key));
+  entries_[size_++] = {key, value};
 }
 
-void DpsoConfig::declare(ParameterVisitor& visitor) {
-  visitor.integer({"dpso/particles", "1", "size of the swarm"}, particles, 2, 100000);
-  visitor.real({"dpso/inertia", "1", "share of the velocity that is kept (omega)"}, inertia, 0.0, 1.0);
-  visitor.real({"dpso/phi0", "1", "weight of the random perturbation"}, phi0, 0.0, 10.0);
-  visitor.real({"dpso/phi2", "1", "weight of the attraction to the best particle"}, phi2, 0.0, 4.0);
-  visitor.choice({"dpso/confine", "",
-                  "where particles may be: anywhere, as in the papers (none), in the bounding box of the training "
-                  "images, or not far from one of them (corridor)"},
-                 confine, {"none", "box", "corridor"});
-  visitor.real({"dpso/corridor", "m", "how far from the nearest training image a corridor reaches"}, corridor_m, 0.1,
-               10000.0);
-  visitor.choice({"dpso/speed_limit", "",
-                  "what is limited: the speed along each axis, or its norm, as in the papers, with each axis in shares "
-                  "of its range"},
-                 speed_limit, {"axis", "norm"});
-  visitor.choice({"dpso/speed_of", "",
-                  "whose centre of mass tells the speed of the swarm (v_sw): of all particles, as in the papers, or "
-                  "without those that do not travel, the quantum particles (moving)"},
-                 speed_of, {"moving", "all"});
-  visitor.choice({"dpso/position", "",
-                  "estimate: the best particle, the centre of the best ones, or the weighted centre of the swarm "
-                  "(conference paper, section V)"},
-                 position, {"best", "k_best", "centre"});
-  visitor.integer({"dpso/best_particles", "1", "how many are the best ones (k)"}, best_particles, 1, 100000);
-  visitor.real({"dpso/quantum_share", "1", "share of quantum particles (q_r)"}, quantum_share, 0.0, 1.0);
-  visitor.real({"dpso/quantum_std", "1", "spread of quantum particles, share of the area's range (q_d)"}, quantum_std,
-               0.0, 1.0);
-  visitor.real({"dpso/high_energy_share", "1", "share of particles allowed a higher speed (h_r)"}, high_energy_share,
-               0.0, 1.0);
-  visitor.real({"dpso/high_energy_factor", "1", "their speed limit in multiples of v0"}, high_energy_factor, 1.0,
-               100.0);
-  visitor.real({"dpso/v0", "1", "initial speed limit per image, share of the area's range"}, v0, 1e-6, 1.0);
-  visitor.flag({"dpso/adapt_speed", "", "keep v0 at about twice the speed of the swarm"}, adapt_speed);
-  visitor.real({"dpso/v0_min", "1", "lower limit of the speed adaptation"}, v0_min, 1e-6, 1.0);
-  visitor.real({"dpso/ema_alpha", "1", "weight of the newest speed in its moving average (alpha)"}, ema_alpha, 0.001,
-               1.0);
-  visitor.choice({"recovery", "",
-                  "when the swarm is lost: search where the image looks alike, widen as in the papers, "
-                  "or nothing"},
-                 recovery, {"guided", "paper", "none"});
-  visitor.flag({"dpso/guided_start", "", "guided also while the position is unknown from the start"}, guided_start);
-  visitor.integer({"dpso/recovery_patience", "1", "bad images in a row before recovery starts"}, recovery_patience, 1,
-                  1000);
-  visitor.real({"dpso/recovery_step", "1", "share of the way to the limits taken per bad image"}, recovery_step, 0.01,
-               1.0);
-  visitor.real({"dpso/v0_max", "1", "speed limit in recovery and of the speed adaptation"}, v0_max, 1e-6, 1.0);
-  visitor.real({"dpso/max_range", "m", "largest range of a map that shares of the range refer to"}, max_range_m, 1.0,
-               100000.0);
-  visitor.real({"dpso/quantum_share_max", "1", "share of quantum particles in recovery"}, quantum_share_max, 0.0, 1.0);
-  visitor.real({"dpso/phi2_min", "1", "attraction of the best particle in recovery"}, phi2_min, 0.0, 4.0);
-  visitor.real(
-      {"dpso/phi0_max", "1",
-       "random perturbation in recovery, as in the conference paper; up to phi0: not raised, as in the journal"},
-      phi0_max, 0.0, 10.0);
-  visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
-               1000.0);
-  visitor.integer({"dpso/swarms", "1", "dpso_multi: swarms at most, which share the particles"}, swarms, 2,
-                  kMostSwarms);
-  visitor.real({"dpso/exclusion_radius", "m", "dpso_multi: swarms this close to each other become one"},
-               exclusion_radius_m, 0.1, 1000.0);
-  visitor.real({"dpso/rival_share", "1", "dpso_multi: a rival must match so well in relation to the leader"},
-               rival_share, 0.01, 1.0);
-  visitor.atMost("dpso/v0_min", v0_min, "dpso/v0", v0);
-  visitor.atMost("dpso/v0", v0, "dpso/v0_max", v0_max);
-  visitor.atMost("dpso/quantum_share", quantum_share, "dpso/quantum_share_max", quantum_share_max);
-  visitor.atMost("dpso/phi2_min", phi2_min, "dpso/phi2", phi2);
-  // Not by the difference: 1 - 0.9 is less than 0.1.
-  visitor.require(quantum_share_max + high_energy_share <= 1.0, "dpso/quantum_share_max",
-                  parameters::toString(quantum_share_max),
-                  "at most 1 - 'dpso/high_energy_share' = " + parameters::toString(1.0 - high_energy_share));
+double TrackerReport::value(std::string_view key) const {
+  for (std::size_t i = 0; i < size_; ++i) {
+    if (key == entries_[i].key) return entries_[i].value;
+  }
+  return 0.0;
 }
 
-void ParticleFilterConfig::declare(ParameterVisitor& visitor) {
-  visitor.integer({"pf/particles", "1", "number of particles (m)"}, particles, 2, 100000);
-  visitor.real({"pf/pull", "1", "share of the way to its nearest training image that a particle is moved"}, pull, 0.0,
-               1.0);
-  visitor.real({"pf/random_share", "1", "worst particles that are replaced by random ones after each image"},
-               random_share, 0.0, 1.0);
-  visitor.real({"pf/gaussian_std", "m", "step of pf_gaussian per image and axis"}, gaussian_std_m, 0.0, 1000.0);
-  visitor.real({"pf/rotation_std", "deg", "how much pf_linear turns per image (sigma_rot)"}, rotation_std_deg, 0.0,
-               180.0);
-  visitor.real(
-      {"pf/acceleration_std", "1", "how much the logarithm of pf_linear's speed changes per image (sigma_acc)"},
-      acceleration_std, 0.0, 1.0);
-  visitor.real({"pf/initial_speed", "m", "first speed of pf_linear's particles per image (v_init)"}, initial_speed_m,
-               0.0, 1000.0);
+namespace {
+
+template <class Kind>
+std::unique_ptr<Tracker> make(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) {
+  return std::make_unique<Kind>(map, config, seed);
+}
+
+std::vector<TrackerKind>& registry() {
+  static std::vector<TrackerKind> kinds{
+      {"dpso", "dpso/particles", make<Dpso>},
+      {"dpso_multi", "dpso/particles", make<MultiSwarm>},
+      {"pf_gaussian", "pf/particles", make<ParticleFilter>},
+      {"pf_linear", "pf/particles", make<ParticleFilter>},
+      {"bayes", "pf/particles", make<BayesTracker>},
+  };
+  return kinds;
+}
+
+const TrackerKind* find(const std::string& name) {
+  for (const TrackerKind& kind : registry()) {
+    if (kind.name == name) return &kind;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+void registerTracker(const TrackerKind& kind) {
+  if (find(kind.name) != nullptr) throw std::invalid_argument("there is a tracker '" + kind.name + "' already");
+  registry().push_back(kind);
+}
+
+const TrackerKind& trackerKind(const std::string& name) {
+  if (const TrackerKind* kind = find(name)) return *kind;
+  throw ParameterError("tracker '" + oneLine(name, 60) + "' is not allowed: must be one of " + joined(trackerNames()));
+}
+
+std::vector<std::string> trackerNames() {
+  std::vector<std::string> names;
+  for (const TrackerKind& kind : registry()) names.push_back(kind.name);
+  return names;
 }
 
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) {
-  if (config.tracker == "dpso") return std::make_unique<Dpso>(map, config.dpso, config.fitness, seed, config.odometry);
-  if (config.tracker == "dpso_multi") return std::make_unique<MultiSwarm>(map, config, seed);
-  if (config.tracker == "bayes") return std::make_unique<BayesTracker>(map, config, seed);
-  return std::make_unique<ParticleFilter>(map, makeMotionModel(config.tracker, config.pf, map, config.odometry),
-                                          config.pf, config.fitness, seed);
+  return trackerKind(config.tracker).make(map, config, seed);
 }
 
 }  // namespace visual_localization

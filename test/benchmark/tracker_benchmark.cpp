@@ -18,7 +18,7 @@ void step(benchmark::State& state, MakeTracker makeTracker) {
   const std::unique_ptr<Tracker> tracker = makeTracker(world.map(), static_cast<int>(state.range(0)));
   double arc_m = 0.0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(tracker->update(world.from(test::onCircle(arc_m))));
+    benchmark::DoNotOptimize(see(*tracker, world.from(test::onCircle(arc_m))));
     arc_m += 0.94;
   }
 }
@@ -27,7 +27,7 @@ void dpso(benchmark::State& state) {
   step(state, [](const TrainingMap& map, int particles) {
     DpsoConfig config;
     config.particles = particles;
-    return std::make_unique<Dpso>(map, config, FitnessConfig(), 1);
+    return std::make_unique<Dpso>(map, config, 1);
   });
 }
 
@@ -35,7 +35,7 @@ void filter(benchmark::State& state, const std::string& motion) {
   step(state, [&motion](const TrainingMap& map, int particles) {
     ParticleFilterConfig config;
     config.particles = particles;
-    return std::make_unique<ParticleFilter>(map, makeMotionModel(motion, config, map), config, FitnessConfig(), 1);
+    return std::make_unique<ParticleFilter>(map, makeMotionModel(motion, config, map), config, 1);
   });
 }
 void particleFilterGaussian(benchmark::State& state) { filter(state, "pf_gaussian"); }

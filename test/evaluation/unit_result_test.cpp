@@ -123,8 +123,8 @@ TEST(UnitResult, ATraceHasTheSpeedsOfSwarmAndRobot) {
   for (std::size_t i = 0; i < run.trace.size(); ++i) {
     run.trace[i].estimate.stamp_ns = static_cast<std::int64_t>(i) * 500'000'000;
     run.trace[i].truth_m = Eigen::Vector2d(0.3 * static_cast<double>(i), 0.0);
-    run.trace[i].estimate.tracked.tuning.v0 = 0.01;
-    run.trace[i].estimate.tracked.tuning.speed_mps = 0.25 * static_cast<double>(i);
+    run.trace[i].estimate.tracked.report.set("v0", 0.01);
+    run.trace[i].estimate.tracked.report.set("speed_mps", 0.25 * static_cast<double>(i));
   }
   run.trace[2].truth_m.reset();
   const UnitResult unit = summariseRuns({run}, {});

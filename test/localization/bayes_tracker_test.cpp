@@ -27,11 +27,11 @@ TEST(BayesTracker, FindsAndFollowsARobotOnceAround) {
   BayesTracker tracker(world.map(), config(), 1);
   for (int step = 0; step < 200; ++step) {
     const Eigen::Vector2d robot_m = onCircle(0.94 * step);
-    const TrackerEstimate estimate = tracker.update(world.from(robot_m));
+    const TrackerEstimate estimate = see(tracker, world.from(robot_m));
     if (step < 10) continue;
     EXPECT_LT((estimate.position_m - robot_m).norm(), 1.5) << step;
     EXPECT_LT(estimate.best_distance_m, 2.0);
-    EXPECT_GT(tracker.belief()->within(robot_m, 5.0), 0.97);
+    EXPECT_GT(tracker.posterior()->within(robot_m, 5.0), 0.97);
   }
 }
 
@@ -41,8 +41,8 @@ TEST(BayesTracker, ComparesAsManyAsIsSaid) {
   few.bayes.comparisons = 40;
   BayesTracker tracker(world.map(), few, 1);
   for (int step = 0; step < 60; ++step) {
-    TrackerInput input = world.from(onCircle(0.94 * step));
-    tracker.update(input);
+    test::Seen input = world.from(onCircle(0.94 * step));
+    see(tracker, input);
     const std::size_t comparisons = input.scores.comparisons();
     if (step == 0) {
       EXPECT_EQ(comparisons, 200U);
@@ -56,9 +56,9 @@ TEST(BayesTracker, ComparesAsManyAsIsSaid) {
 TEST(BayesTracker, FindsARobotThatWasCarriedAway) {
   World world = roundWorld();
   BayesTracker tracker(world.map(), config(), 1);
-  for (int step = 0; step < 30; ++step) tracker.update(world.from(onCircle(0.94 * step)));
+  for (int step = 0; step < 30; ++step) see(tracker, world.from(onCircle(0.94 * step)));
   TrackerEstimate estimate;
-  for (int step = 100; step < 130; ++step) estimate = tracker.update(world.from(onCircle(0.94 * step)));
+  for (int step = 100; step < 130; ++step) estimate = see(tracker, world.from(onCircle(0.94 * step)));
   EXPECT_LT((estimate.position_m - onCircle(0.94 * 129)).norm(), 2.0);
 }
 
@@ -70,8 +70,8 @@ TEST(BayesTracker, ALargeMapIsSeenByWhatLooksAlike) {
   BayesTracker tracker(world.map(), few, 1);
   TrackerEstimate estimate;
   for (int step = 0; step < 20; ++step) {
-    TrackerInput input = world.from({1500.0 + step, 0.0});
-    estimate = tracker.update(input);
+    test::Seen input = world.from({1500.0 + step, 0.0});
+    estimate = see(tracker, input);
     EXPECT_LE(input.scores.comparisons(), 100u);
   }
   EXPECT_NEAR(estimate.position_m.x(), 1519.0, 2.0);
@@ -81,9 +81,9 @@ TEST(BayesTracker, AVerifiedPositionNeedsNoComparison) {
   World world = roundWorld();
   BayesTracker tracker(world.map(), config(), 1);
   for (int step = 0; step < 5; ++step) {
-    TrackerInput input = world.from(onCircle(0.0));
+    test::Seen input = world.from(onCircle(0.0));
     input.verified_m = onCircle(40.0);
-    const TrackerEstimate estimate = tracker.update(input);
+    const TrackerEstimate estimate = see(tracker, input);
     EXPECT_EQ(input.scores.comparisons(), 0u);
     EXPECT_LT((estimate.position_m - onCircle(40.0)).norm(), 2.0);
   }
@@ -93,7 +93,7 @@ TEST(BayesTracker, ParticlesAreDrawnFromThePosterior) {
   World world = roundWorld();
   BayesTracker tracker(world.map(), config(), 1);
   TrackerEstimate estimate;
-  for (int step = 0; step < 30; ++step) estimate = tracker.update(world.from(onCircle(0.94 * step)));
+  for (int step = 0; step < 30; ++step) estimate = see(tracker, world.from(onCircle(0.94 * step)));
   const auto near =
       std::count_if(tracker.particles().begin(), tracker.particles().end(),
                     [&](const Particle& particle) { return (particle.position_m - estimate.position_m).norm() < 5.0; });

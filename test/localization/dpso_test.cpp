@@ -21,11 +21,11 @@ using test::World;
 
 TEST(Dpso, FindsAndFollowsARobot) {
   World world = roundWorld();
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  Dpso tracker(world.map(), DpsoConfig(), 1);
   double error_sum_m = 0.0;
   for (int step = 0; step < 200; ++step) {
     const Eigen::Vector2d robot = onCircle(0.6 * step);
-    const TrackerEstimate estimate = tracker.update(world.from(robot));
+    const TrackerEstimate estimate = see(tracker, world.from(robot));
     if (step >= 60) error_sum_m += (estimate.position_m - robot).norm();
   }
   EXPECT_LT(error_sum_m / 140.0, 1.5);
@@ -33,10 +33,10 @@ TEST(Dpso, FindsAndFollowsARobot) {
 
 TEST(Dpso, ParticlesStayInTheArea) {
   World world = roundWorld();
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 2);
+  Dpso tracker(world.map(), DpsoConfig(), 2);
   const Area& area = world.map().area();
   for (int step = 0; step < 50; ++step) {
-    tracker.update(step % 10 == 9 ? world.inTheDark() : world.from(onCircle(4.0 * step)));  // all around
+    see(tracker, step % 10 == 9 ? world.inTheDark() : world.from(onCircle(4.0 * step)));  // all around
     for (const Particle& particle : tracker.particles()) {
       ASSERT_TRUE((particle.position_m.array() >= area.min_m.array()).all());
       ASSERT_TRUE((particle.position_m.array() <= area.max_m.array()).all());
@@ -46,7 +46,7 @@ TEST(Dpso, ParticlesStayInTheArea) {
 
 TEST(Dpso, TheSharesOfTheKindsAreKept) {
   World world = roundWorld();
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  Dpso tracker(world.map(), DpsoConfig(), 1);
   EXPECT_EQ(countOf(tracker.particles(), ParticleKind::kQuantum), 8u);
   EXPECT_EQ(countOf(tracker.particles(), ParticleKind::kHighEnergy), 8u);
   EXPECT_EQ(countOf(tracker.particles(), ParticleKind::kStandard), 64u);
@@ -56,10 +56,10 @@ TEST(Dpso, NobodyFliesFasterThanAllowed) {
   World world = roundWorld();
   DpsoConfig config;
   config.adapt_speed = false;
-  Dpso tracker(world.map(), config, FitnessConfig(), 5);
+  Dpso tracker(world.map(), config, 5);
   const Eigen::Vector2d range = world.map().area().range();
   for (int step = 0; step < 40; ++step) {
-    tracker.update(world.from(onCircle(0.6 * step)));
+    see(tracker, world.from(onCircle(0.6 * step)));
     for (const Particle& particle : tracker.particles()) {
       const double factor = particle.kind == ParticleKind::kHighEnergy ? 3.0 : 1.0;
       for (int axis = 0; axis < 2; ++axis) {
@@ -71,7 +71,7 @@ TEST(Dpso, NobodyFliesFasterThanAllowed) {
 
 TEST(Dpso, InACityItIsNotFasterThanTheLargestRangeAllows) {
   const auto city = test::mapAt(test::circle(200, 5000.0));
-  const Dpso swarm(*city, DpsoConfig(), FitnessConfig(), 1);
+  const Dpso swarm(*city, DpsoConfig(), 1);
   double fastest_m = 0.0;
   for (const Particle& particle : swarm.particles()) {
     fastest_m = std::max(fastest_m, particle.velocity_m.cwiseAbs().maxCoeff());
@@ -82,9 +82,9 @@ TEST(Dpso, InACityItIsNotFasterThanTheLargestRangeAllows) {
 
 TEST(Dpso, AStraightStreetHasNoSecondAxis) {
   World world(test::mapAt(test::street(50, 2.0)));
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  Dpso tracker(world.map(), DpsoConfig(), 1);
   TrackerEstimate estimate;
-  for (int step = 0; step < 40; ++step) estimate = tracker.update(world.from({20.0 + 0.6 * step, 0.0}));
+  for (int step = 0; step < 40; ++step) estimate = see(tracker, world.from({20.0 + 0.6 * step, 0.0}));
   EXPECT_NEAR(estimate.position_m.x(), 20.0 + 0.6 * 39, 3.0);
   EXPECT_EQ(estimate.position_m.y(), 0.0);
   EXPECT_TRUE(estimate.mode_covariance_m2.allFinite());
@@ -96,17 +96,17 @@ TEST(Dpso, AnAxisOfDecimetresIsOne) {
   DpsoConfig config;
   config.quantum_share = 0.0;
   config.speed_limit = "norm";
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
-  for (int image = 0; image < 3; ++image) swarm.update(world.inTheDark());
+  Dpso swarm(world.map(), config, 1);
+  for (int image = 0; image < 3; ++image) see(swarm, world.inTheDark());
   const auto moves = [](const Particle& particle) { return particle.velocity_m.y() != 0.0; };
   EXPECT_TRUE(std::any_of(swarm.particles().begin(), swarm.particles().end(), moves));
 }
 
 TEST(Dpso, AMapOfOneImageWorks) {
   World world(test::mapAt({{3.0, 4.0}}));
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  Dpso tracker(world.map(), DpsoConfig(), 1);
   for (int step = 0; step < 5; ++step) {
-    const TrackerEstimate estimate = tracker.update(world.from({3.0, 4.0}));
+    const TrackerEstimate estimate = see(tracker, world.from({3.0, 4.0}));
     EXPECT_EQ(estimate.position_m, Eigen::Vector2d(3.0, 4.0));
   }
 }
@@ -115,10 +115,10 @@ TEST(Dpso, SpeedLimitFollowsTheRobot) {
   World world = roundWorld();
   DpsoConfig config;
   config.recovery = "none";
-  Dpso tracker(world.map(), config, FitnessConfig(), 1);
-  for (int step = 0; step < 150; ++step) tracker.update(world.from(onCircle(0.3 * step)));
+  Dpso tracker(world.map(), config, 1);
+  for (int step = 0; step < 150; ++step) see(tracker, world.from(onCircle(0.3 * step)));
   const double slow = tracker.tuning().v0;
-  for (int step = 0; step < 150; ++step) tracker.update(world.from(onCircle(45.0 + 1.5 * step)));
+  for (int step = 0; step < 150; ++step) see(tracker, world.from(onCircle(45.0 + 1.5 * step)));
   const double fast = tracker.tuning().v0;
   EXPECT_GT(fast, 1.5 * slow);
   EXPECT_LE(fast, config.v0_max);
@@ -127,21 +127,21 @@ TEST(Dpso, SpeedLimitFollowsTheRobot) {
 
 TEST(Dpso, AnImageThatMatchesNothingMovesNoEstimate) {
   World world = roundWorld();
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
-  for (int step = 0; step < 60; ++step) tracker.update(world.from(onCircle(0.0)));
-  const Eigen::Vector2d before = tracker.update(world.from(onCircle(0.0))).position_m;
-  EXPECT_EQ(tracker.update(world.inTheDark()).position_m, before);
+  Dpso tracker(world.map(), DpsoConfig(), 1);
+  for (int step = 0; step < 60; ++step) see(tracker, world.from(onCircle(0.0)));
+  const Eigen::Vector2d before = see(tracker, world.from(onCircle(0.0))).position_m;
+  EXPECT_EQ(see(tracker, world.inTheDark()).position_m, before);
 }
 
 TEST(Dpso, ASingleFalseMatchDoesNotHideHowFarTheSearchReaches) {
   World world = roundWorld();
-  Dpso tracker(world.map(), DpsoConfig(), FitnessConfig(), 1);
-  const TrackerInput input = world.inTheDark();
+  Dpso tracker(world.map(), DpsoConfig(), 1);
+  const test::Seen input = world.inTheDark();
   bool given = false;
   input.scores.startImage(FeatureKind::kLocal, [&given](FeatureKind, std::size_t) {
     return std::exchange(given, true) ? Score{} : World::scoreAt(0.01);
   });
-  const TrackerEstimate estimate = tracker.update(input);
+  const TrackerEstimate estimate = see(tracker, input);
   EXPECT_GT(estimate.cloud_covariance_m2.trace(), 400.0);
 }
 
@@ -149,10 +149,10 @@ TEST(Dpso, CountsAtMostOneComparisonAParticle) {
   World world = roundWorld();
   DpsoConfig config;
   config.particles = 30;
-  Dpso tracker(world.map(), config, FitnessConfig(), 1);
+  Dpso tracker(world.map(), config, 1);
   for (int step = 0; step < 20; ++step) {
-    const TrackerInput input = world.from(onCircle(0.6 * step));
-    tracker.update(input);
+    const test::Seen input = world.from(onCircle(0.6 * step));
+    see(tracker, input);
     EXPECT_LE(input.scores.comparisons(), 30u);
     EXPECT_GE(input.scores.comparisons(), 1u);
   }
@@ -160,7 +160,7 @@ TEST(Dpso, CountsAtMostOneComparisonAParticle) {
 
 TEST(Dpso, AnotherNumberOfParticlesHasTheSameShares) {
   World world = roundWorld();
-  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  Dpso swarm(world.map(), DpsoConfig(), 1);
   for (const std::size_t particles : {40U, 120U}) {
     swarm.resize(particles);
     EXPECT_EQ(countOf(swarm.particles(), ParticleKind::kQuantum), particles / 10);
@@ -174,10 +174,10 @@ TEST(Dpso, StaysOutOfExcludedPlacesUnlessItsBestParticleIsThere) {
   World world = roundWorld();
   const Eigen::Vector2d here_m(30.0, 0.0);
   const auto nearest_m = [&](const Eigen::Vector2d& place_m, const Eigen::Vector2d& attractor_m) {
-    Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
+    Dpso swarm(world.map(), DpsoConfig(), 1);
     swarm.exclude({place_m}, 15.0);
-    swarm.attract(attractor_m);
-    swarm.update(world.inTheDark());  // the particles are all over the area
+    verify(swarm, world, attractor_m);
+    see(swarm, world.inTheDark());  // the particles are all over the area
     double least_m = 1e9;
     for (const Particle& p : swarm.particles()) least_m = std::min(least_m, (p.position_m - place_m).norm());
     return least_m;
@@ -189,27 +189,27 @@ TEST(Dpso, StaysOutOfExcludedPlacesUnlessItsBestParticleIsThere) {
 
 TEST(Dpso, AVerifiedPositionIsTheEstimateAndComparesNothing) {
   World world = roundWorld();
-  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
-  swarm.update(world.inTheDark());
-  TrackerInput input = world.from(onCircle(100.0));
+  Dpso swarm(world.map(), DpsoConfig(), 1);
+  see(swarm, world.inTheDark());
+  test::Seen input = world.from(onCircle(100.0));
   input.verified_m = onCircle(10.0);
-  swarm.update(input);
+  see(swarm, input);
   EXPECT_EQ(input.scores.comparisons(), 0U);
   for (int image = 0; image < 10; ++image) {
-    TrackerInput next = world.from(onCircle(100.0));
+    test::Seen next = world.from(onCircle(100.0));
     next.verified_m = onCircle(10.0);
-    const TrackerEstimate estimate = swarm.update(next);
+    const TrackerEstimate estimate = see(swarm, next);
     EXPECT_EQ(estimate.position_m, onCircle(10.0));
-    EXPECT_FALSE(estimate.tuning.recovering);
+    EXPECT_FALSE(estimate.recovering);
   }
 }
 
 TEST(Dpso, TheEstimateNamesItsTrainingImages) {
   World world = roundWorld();
-  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
+  Dpso swarm(world.map(), DpsoConfig(), 1);
   for (int image = 0; image < 40; ++image) {
-    const TrackerInput input = world.from(onCircle(0.6 * image));
-    const TrackerEstimate estimate = swarm.update(input);
+    const test::Seen input = world.from(onCircle(0.6 * image));
+    const TrackerEstimate estimate = see(swarm, input);
     EXPECT_EQ(estimate.training_image, world.map().nearest(estimate.position_m).image);
     if (estimate.best.similarity == 0.0) continue;
     EXPECT_EQ(estimate.best_image, input.scores.mostSimilar().front());
@@ -230,15 +230,14 @@ TEST(Dpso, AShareOfTheParticlesMovesWithTheOdometryAndTheSpeedIsWithoutIt) {
     config.recovery = "none";
     OdometryConfig odometry;
     odometry.share = share;
-    Dpso swarm(world.map(), config, FitnessConfig(), 1, odometry);
+    Dpso swarm(world.map(), config, 1);
     swarm.reset(around({50.0, 0.0}, 5.0));
-    swarm.update(world.inTheDark());
-    swarm.update(world.inTheDark());
+    see(swarm, world.inTheDark());
+    see(swarm, world.inTheDark());
     const std::vector<Particle> before = swarm.particles();
-    TrackerInput input = world.inTheDark();
-    input.travel.odometry = OdometryIncrement{{3.0, 0.0}, 0.0, 3.0};
-    input.travel.seconds = 2.0;
-    swarm.update(input);
+    test::Seen input = world.inTheDark();
+    input.motion = Motion(2.0, OdometryIncrement{{3.0, 0.0}, 0.0, 3.0}, odometry);
+    see(swarm, input);
     int moved = 0;
     for (std::size_t i = 0; i < before.size(); ++i) {
       const double way_m = (swarm.particles()[i].position_m - before[i].position_m).x();
@@ -254,8 +253,8 @@ TEST(Dpso, AShareOfTheParticlesMovesWithTheOdometryAndTheSpeedIsWithoutIt) {
 TEST(Dpso, AReconfigurationChangesWhatItNames) {
   World world = roundWorld();
   TrackerConfig config;
-  Dpso swarm(world.map(), config.dpso, config.fitness, 1);
-  for (int image = 0; image < 60; ++image) swarm.update(world.from(onCircle(0.2 * image)));
+  Dpso swarm(world.map(), config.dpso, 1);
+  for (int image = 0; image < 60; ++image) see(swarm, world.from(onCircle(0.2 * image)));
   const double adapted = swarm.tuning().v0;
   ASSERT_LT(adapted, 0.010);
   config.dpso.recovery = "none";
@@ -280,11 +279,11 @@ TEST(Dpso, AReconfigurationChangesWhatConfinesIt) {
   TrackerConfig config;
   config.dpso.confine = "none";
   config.dpso.phi0 = 5.0;
-  Dpso swarm(world.map(), config.dpso, config.fitness, 1);
+  Dpso swarm(world.map(), config.dpso, 1);
   const auto isAnyOutside = [&] {
     bool outside = false;
     for (int image = 0; image < 20; ++image) {
-      swarm.update(world.inTheDark());
+      see(swarm, world.inTheDark());
       for (const Particle& particle : swarm.particles()) {
         outside = outside || (particle.position_m.array().abs() > 30.0 + 1e-6).any();
       }
@@ -307,9 +306,9 @@ TEST(Dpso, AParticleThatTheCorridorHoldsKeepsOnlyTheSpeedAlongIt) {
   config.phi2 = 0.0;
   config.quantum_share = 0.0;
   config.recovery = "none";
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  Dpso swarm(world.map(), config, 1);
   swarm.reset(around({100.0, 0.0}, 0.5));  // the end of the street
-  for (int image = 0; image < 20; ++image) swarm.update(world.inTheDark());
+  for (int image = 0; image < 20; ++image) see(swarm, world.inTheDark());
   int held = 0;
   for (const Particle& particle : swarm.particles()) {
     const Eigen::Vector2d end_m(100.0, 0.0);
@@ -328,10 +327,10 @@ TEST(Dpso, InsideTheCorridorNobodyIsHeld) {
   config.phi0 = 0.0;
   config.recovery = "none";
   config.quantum_share = 0.0;
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  Dpso swarm(world.map(), config, 1);
   swarm.reset(around({50.0, 20.0}, 0.3));
   const std::vector<Particle> before = swarm.particles();
-  swarm.update(world.inTheDark());
+  see(swarm, world.inTheDark());
   for (std::size_t i = 0; i < before.size(); ++i) {
     const Eigen::Vector2d expected_m = before[i].position_m + swarm.particles()[i].velocity_m;
     EXPECT_LT((swarm.particles()[i].position_m - expected_m).norm(), 1e-9) << i;
@@ -342,12 +341,12 @@ TEST(Dpso, BeforeTheFirstImageThereIsNoWay) {
   World world(test::mapAt(test::street(100, 1.0)));
   OdometryConfig odometry;
   odometry.share = 1.0;
-  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1, odometry);
+  Dpso swarm(world.map(), DpsoConfig(), 1);
   swarm.reset(around({50.0, 0.0}, 5.0));
   const std::vector<Particle> before = swarm.particles();
-  TrackerInput input = world.inTheDark();
-  input.travel.odometry = OdometryIncrement{{30.0, 0.0}, 0.0, 30.0};
-  swarm.update(input);
+  test::Seen input = world.inTheDark();
+  input.motion = Motion(0.0, OdometryIncrement{{30.0, 0.0}, 0.0, 30.0}, odometry);
+  see(swarm, input);
   for (std::size_t i = 0; i < before.size(); ++i) {
     EXPECT_EQ(swarm.particles()[i].position_m, before[i].position_m);
   }
@@ -358,13 +357,13 @@ TEST(Dpso, TheAttractorMovesWithTheOdometry) {
   DpsoConfig config;
   config.quantum_std = 0.0;
   config.recovery = "none";
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  Dpso swarm(world.map(), config, 1);
   swarm.reset(around({50.0, 0.0}, 5.0));
-  swarm.update(world.inTheDark());
-  swarm.attract({50.0, 0.0});
-  TrackerInput input = world.inTheDark();
-  input.travel.odometry = OdometryIncrement{{3.0, 0.0}, 0.0, 3.0};
-  EXPECT_EQ(swarm.update(input).position_m, Eigen::Vector2d(53.0, 0.0));
+  see(swarm, world.inTheDark());
+  verify(swarm, world, {50.0, 0.0});
+  test::Seen input = world.inTheDark();
+  input.motion = Motion(0.0, OdometryIncrement{{3.0, 0.0}, 0.0, 3.0});
+  EXPECT_EQ(see(swarm, input).position_m, Eigen::Vector2d(53.0, 0.0));
   EXPECT_EQ(swarm.particles().front().position_m, Eigen::Vector2d(53.0, 0.0)) << "a quantum particle";
 }
 
@@ -372,9 +371,9 @@ TEST(Dpso, TheCovarianceIsThatOfTheModeAroundTheEstimate) {
   World world = roundWorld();
   DpsoConfig config;
   config.mode_radius_m = 4.0;
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
+  Dpso swarm(world.map(), config, 1);
   for (int image = 0; image < 40; ++image) {
-    const TrackerEstimate estimate = swarm.update(world.from(onCircle(0.6 * image)));
+    const TrackerEstimate estimate = see(swarm, world.from(onCircle(0.6 * image)));
     EXPECT_EQ(estimate.mode_covariance_m2, covarianceAbout(estimate.position_m, swarm.particles(), 4.0));
     EXPECT_EQ(estimate.cloud_covariance_m2, scatterAbout(estimate.position_m, swarm.particles()));
     EXPECT_EQ(estimate.spread_m, momentsOf(swarm.particles()).spread());

@@ -20,18 +20,18 @@ Dpso makeSwarm(const World& world, const std::string& recovery, std::uint32_t se
   DpsoConfig config;
   config.recovery = recovery;
   config.guided_start = guided_start;
-  return {world.map(), config, FitnessConfig(), seed};
+  return {world.map(), config, seed};
 }
 
 /// Whether the swarm looked where images look alike.
-bool asks(Dpso& swarm, const TrackerInput& input) {
-  swarm.update(input);
+bool asks(Dpso& swarm, const test::Seen& input) {
+  see(swarm, input);
   return input.scores.swept() > 0;
 }
 
 /// Follows a robot until it is tracked well.
 void settle(Dpso& swarm, World& world) {
-  for (int step = 0; step < 60; ++step) swarm.update(world.from(onCircle(0.0)));
+  for (int step = 0; step < 60; ++step) see(swarm, world.from(onCircle(0.0)));
 }
 
 /// Images from the kidnapping until the error is below 3 m; `most` when that is not in time.
@@ -41,7 +41,7 @@ int imagesUntilFound(const std::string& recovery, std::uint32_t seed, int most) 
   settle(swarm, world);
   for (int image = 1; image < most; ++image) {
     const Eigen::Vector2d robot = onCircle(kHalfRound_m + 0.6 * image);
-    if ((swarm.update(world.from(robot)).position_m - robot).norm() < 3.0) return image;
+    if ((see(swarm, world.from(robot)).position_m - robot).norm() < 3.0) return image;
   }
   return most;
 }
@@ -73,7 +73,7 @@ TEST(GuidedRecovery, TheOtherRecoveriesNeverAsk) {
     for (int step = 0; step < 30; ++step) {
       EXPECT_FALSE(asks(swarm, step % 10 < 6 ? world.inTheDark() : world.from(onCircle(0.6 * step))));
     }
-    swarm.reset();
+    swarm.reset(anywhere(world.map().area()));
     EXPECT_FALSE(asks(swarm, world.inTheDark()));
   }
 }
@@ -82,10 +82,10 @@ TEST(GuidedRecovery, TheStartIsGuidedUntilAnImageIsRecognised) {
   World world = roundWorld();
   Dpso swarm = makeSwarm(world, "guided");
   for (int step = 0; step < 2; ++step) EXPECT_TRUE(asks(swarm, world.inTheDark()));
-  for (int step = 0; step < 3; ++step) swarm.update(world.from(onCircle(0.0)));
+  for (int step = 0; step < 3; ++step) see(swarm, world.from(onCircle(0.0)));
   EXPECT_FALSE(asks(swarm, world.from(onCircle(0.0))));
   EXPECT_FALSE(asks(swarm, world.inTheDark())) << "the start is over";
-  swarm.reset();
+  swarm.reset(anywhere(world.map().area()));
   EXPECT_TRUE(asks(swarm, world.from(onCircle(0.0))));
 }
 
@@ -104,11 +104,11 @@ TEST(GuidedRecovery, OnlyQuantumParticlesGoWhereTheImageLooksAlike) {
   World world = roundWorld();
   Dpso swarm = makeSwarm(world, "guided");
   const std::vector<Particle> before = swarm.particles();
-  const TrackerInput input = world.inTheDark();
+  const test::Seen input = world.inTheDark();
   input.scores.startImage(FeatureKind::kLocal, [](FeatureKind kind, std::size_t image) {
     return kind == FeatureKind::kGlobal && image == 77 ? World::scoreAt(1.0) : Score{};
   });
-  swarm.update(input);
+  see(swarm, input);
   for (std::size_t i = 0; i < before.size(); ++i) {
     const bool quantum = before[i].kind == ParticleKind::kQuantum;
     EXPECT_EQ(swarm.particles()[i].position_m, quantum ? world.map().image(77).position_m : before[i].position_m);

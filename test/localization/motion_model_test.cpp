@@ -21,12 +21,11 @@ class OdometryMotion final : public MotionModel {
   void start(Particle& particle, Random& random) const override {
     particle.velocity_m = Eigen::Rotation2Dd(random.uniform(-kPi, kPi)) * Eigen::Vector2d::UnitX();
   }
-  void move(Particle& particle, const Travel& travel, Random&) const override {
-    if (!travel.odometry) return;
+  void move(Particle& particle, const Motion& travel, Random&) const override {
     const Eigen::Vector2d heading = particle.velocity_m;
     const Eigen::Vector2d left(-heading.y(), heading.x());
-    particle.position_m += travel.odometry->translation_m.x() * heading + travel.odometry->translation_m.y() * left;
-    particle.velocity_m = Eigen::Rotation2Dd(travel.odometry->rotation_rad) * heading;
+    particle.position_m += travel.increment().translation_m.x() * heading + travel.increment().translation_m.y() * left;
+    particle.velocity_m = Eigen::Rotation2Dd(travel.increment().rotation_rad) * heading;
   }
 };
 
@@ -50,8 +49,8 @@ TEST(MotionModel, LinearKeepsAndDisturbsTheVelocity) {
   straight.start(particle, random);
   EXPECT_NEAR(particle.velocity_m.norm(), 2.0, 1e-12);
   const Eigen::Vector2d velocity = particle.velocity_m;
-  straight.move(particle, Travel(), random);
-  straight.move(particle, Travel(), random);
+  straight.move(particle, Motion(), random);
+  straight.move(particle, Motion(), random);
   EXPECT_LT((particle.position_m - 2.0 * velocity).norm(), 1e-12);
 
   const LinearMotion disturbed(kPi / 3.0, 0.1, 2.0);
@@ -59,7 +58,7 @@ TEST(MotionModel, LinearKeepsAndDisturbsTheVelocity) {
   double scaled_squared = 0.0;
   for (int i = 0; i < 4000; ++i) {
     particle.velocity_m = {1.0, 0.0};
-    disturbed.move(particle, Travel(), random);
+    disturbed.move(particle, Motion(), random);
     const double log_speed = std::log(particle.velocity_m.norm());
     scaled_squared += log_speed * log_speed / 4000.0;
     turned_squared += std::cos(std::atan2(particle.velocity_m.y(), particle.velocity_m.x())) / 4000.0;
@@ -74,7 +73,7 @@ TEST(MotionModel, GaussianStepsHaveTheGivenSpread) {
   double squared = 0.0;
   for (int i = 0; i < 4000; ++i) {
     Particle particle;
-    motion.move(particle, Travel(), random);
+    motion.move(particle, Motion(), random);
     squared += particle.position_m.squaredNorm() / 8000.0;
   }
   EXPECT_NEAR(std::sqrt(squared), 4.0, 0.15);
@@ -86,7 +85,7 @@ TEST(MotionModel, PullsAShareOfTheWayToTheNearestTrainingImage) {
   for (const double share : {0.0, 0.2, 1.0}) {
     Particle particle = standingAt(7.0, 5.0);
     particle.velocity_m = {1.0, 2.0};
-    PullToMap(*map, share).move(particle, Travel(), random);
+    PullToMap(*map, share).move(particle, Motion(), random);
     EXPECT_DOUBLE_EQ(particle.position_m.x(), 7.0 + share * 3.0);
     EXPECT_DOUBLE_EQ(particle.position_m.y(), 5.0 - share * 5.0);
     EXPECT_EQ(particle.velocity_m, Eigen::Vector2d(1.0, 2.0));
@@ -96,8 +95,7 @@ TEST(MotionModel, PullsAShareOfTheWayToTheNearestTrainingImage) {
 TEST(MotionModel, PartsMoveOneAfterTheOther) {
   const auto map = test::mapAt({{0.0, 0.0}, {100.0, 0.0}});
   Random random(4);
-  Travel travel;
-  travel.odometry = OdometryIncrement{{60.0, 0.0}, 0.0};
+  const Motion travel(0.0, OdometryIncrement{{60.0, 0.0}, 0.0});
   Particle particle = standingAt(10.0, 0.0);
   particle.velocity_m = {1.0, 0.0};
   Particle other = particle;
@@ -118,14 +116,13 @@ TEST(MotionModel, EveryPartStartsAParticle) {
 TEST(MotionModel, WithoutPartsNothingMoves) {
   Random random(6);
   Particle particle = standingAt(1.0, 2.0);
-  combined()->move(particle, Travel(), random);
+  combined()->move(particle, Motion(), random);
   EXPECT_EQ(particle.position_m, Eigen::Vector2d(1.0, 2.0));
 }
 
 TEST(MotionModel, OdometryAndGaussianNoiseAdd) {
   const auto motion = combined(OdometryMotion(), GaussianMotion(0.5));
-  Travel travel;
-  travel.odometry = OdometryIncrement{{3.0, 1.0}, kPi / 2.0};
+  const Motion travel(0.0, OdometryIncrement{{3.0, 1.0}, kPi / 2.0});
   Random random(7);
   std::vector<Particle> cloud(4000);
   for (Particle& particle : cloud) {
@@ -147,13 +144,13 @@ TEST(MotionModel, OdometryReachesTheParticlesOfAFilter) {
   ParticleFilterConfig config;
   config.random_share = 0.0;
   for (const bool with_odometry : {true, false}) {
-    ParticleFilter filter(world.map(), combined(OdometryMotion(), GaussianMotion(0.1)), config, FitnessConfig(), 1);
+    ParticleFilter filter(world.map(), combined(OdometryMotion(), GaussianMotion(0.1)), config, 1);
     filter.reset(around({50.0, 0.0}, 0.5));
-    filter.update(world.inTheDark());
+    see(filter, world.inTheDark());
     for (int step = 0; step < 10; ++step) {
-      TrackerInput input = world.inTheDark();
-      if (with_odometry) input.travel.odometry = OdometryIncrement{{2.0, 0.0}, 0.0};
-      filter.update(input);
+      test::Seen input = world.inTheDark();
+      if (with_odometry) input.motion = Motion(0.0, OdometryIncrement{{2.0, 0.0}, 0.0});
+      see(filter, input);
     }
     double distance_sum_m = 0.0;
     for (const Particle& particle : filter.particles()) {
@@ -171,9 +168,8 @@ TEST(MotionModel, OfAFilterFollowsOdometryWithAShareOfItsParticles) {
   OdometryConfig odometry;
   odometry.share = 0.5;
   odometry.distance_sigma = 0.1;
-  const auto motion = makeMotionModel("pf_gaussian", config, *map, odometry);
-  Travel travel;
-  travel.odometry = OdometryIncrement{{8.0, 1.0}, 0.0, 10.0};
+  const auto motion = makeMotionModel("pf_gaussian", config, *map);
+  const Motion travel(0.0, OdometryIncrement{{8.0, 1.0}, 0.0, 10.0}, odometry);
   Random random(9);
   std::vector<Particle> moved;
   constexpr int kParticles = 4000;
@@ -212,7 +208,7 @@ TEST(MotionModel, OfALinearFilterTurnsBySixtyDegrees) {
   for (int i = 0; i < 4000; ++i) {
     Particle particle;
     particle.velocity_m = {2.0, 0.0};
-    motion->move(particle, Travel(), random);
+    motion->move(particle, Motion(), random);
     cosine += particle.velocity_m.normalized().x() / 4000.0;
     EXPECT_NEAR(particle.velocity_m.norm(), 2.0, 0.02) << "its speed hardly changes";
     EXPECT_EQ(particle.position_m, particle.velocity_m);

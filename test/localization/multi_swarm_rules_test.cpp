@@ -26,7 +26,7 @@ class StandingRobot {
     tracker.reset(around(TwinStreet::at(kPlace_m), 1.0));
   }
 
-  TrackerEstimate look() { return tracker.update(street.from(kPlace_m)); }
+  TrackerEstimate look() { return see(tracker, street.from(kPlace_m)); }
 
   /// Looks until there are so many swarms; false if there never are.
   bool lookUntil(std::size_t swarms) {
@@ -72,21 +72,21 @@ TEST(MultiSwarmRules, ARivalHasASeventhOfTheParticlesAndTheWeightOfItsMatches) {
 TEST(MultiSwarmRules, TheImageThatFoundARivalIsItsFirst) {
   StandingRobot robot(severalSwarms());
   double weight = 0.0;
-  for (int i = 0; i < 200 && robot.tracker.swarms() == 1U; ++i) weight = robot.look().rival_weight;
+  for (int i = 0; i < 200 && robot.tracker.swarms() == 1U; ++i) weight = robot.look().report.value("rival_weight");
   ASSERT_EQ(robot.tracker.swarms(), 2U);
   robot.street.setLikeness(1.0, 0.7);
   const double strength = 0.8 * weight / (1.0 - weight) + 0.2 * 0.7;  // the leader's is 1
-  EXPECT_NEAR(robot.look().rival_weight, strength / (1.0 + strength), 1e-4);
+  EXPECT_NEAR(robot.look().report.value("rival_weight"), strength / (1.0 + strength), 1e-4);
 }
 
 TEST(MultiSwarmRules, StrengthIsAMeanInWhichTheLastImageCountsAFifth) {
   StandingRobot robot(severalSwarms());
   ASSERT_TRUE(robot.settle(2));
-  EXPECT_NEAR(robot.look().rival_weight, 0.9 / 1.9, 1e-9);
+  EXPECT_NEAR(robot.look().report.value("rival_weight"), 0.9 / 1.9, 1e-9);
   robot.street.setLikeness(1.0, 0.7);
-  EXPECT_NEAR(robot.look().rival_weight, 0.86 / 1.86, 1e-9);
+  EXPECT_NEAR(robot.look().report.value("rival_weight"), 0.86 / 1.86, 1e-9);
   robot.street.setLikeness(0.95, 0.9);
-  EXPECT_NEAR(robot.look().rival_weight, 0.868 / (0.99 + 0.868), 1e-9);
+  EXPECT_NEAR(robot.look().report.value("rival_weight"), 0.868 / (0.99 + 0.868), 1e-9);
 }
 
 TEST(MultiSwarmRules, TheCloudIsThatOfAllSwarms) {
@@ -250,8 +250,8 @@ TEST(MultiSwarmRules, ALeaderThatIsLostHasAllParticles) {
 TEST(MultiSwarmRules, IsDrawnToWhereItIsAttracted) {
   StandingRobot robot(severalSwarms());
   robot.look();
-  robot.tracker.attract(TwinStreet::at(170.0));
-  EXPECT_EQ(robot.tracker.update(robot.street.nowhere()).position_m, TwinStreet::at(170.0));
+  verify(robot.tracker, robot.street, TwinStreet::at(170.0));
+  EXPECT_EQ(see(robot.tracker, robot.street.nowhere()).position_m, TwinStreet::at(170.0));
 }
 
 TEST(MultiSwarmRules, AResetBeginsTheLeadersStrengthAnew) {
@@ -259,7 +259,7 @@ TEST(MultiSwarmRules, AResetBeginsTheLeadersStrengthAnew) {
   const auto lookAfterReset = [&robot](double own, double twin) {
     robot.street.setLikeness(own, twin);
     robot.tracker.reset(around(TwinStreet::at(StandingRobot::kPlace_m), 1.0));
-    return robot.look().rival_weight;
+    return robot.look().report.value("rival_weight");
   };
   int at_once = 0;
   for (int i = 0; i < 400; ++i) {

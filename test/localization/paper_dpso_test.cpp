@@ -27,9 +27,9 @@ constexpr int kDrivenImages = 60;
 template <class Check>
 void drive(const DpsoConfig& config, const Check& check) {
   World world = roundWorld();
-  Dpso swarm(world.map(), config, FitnessConfig(), 4);
+  Dpso swarm(world.map(), config, 4);
   for (int image = 0; image < kDrivenImages; ++image) {
-    const TrackerEstimate estimate = swarm.update(image % 10 == 9 ? world.inTheDark() : world.from(onCircle(image)));
+    const TrackerEstimate estimate = see(swarm, image % 10 == 9 ? world.inTheDark() : world.from(onCircle(image)));
     check(world.map(), swarm, estimate);
   }
 }
@@ -122,7 +122,7 @@ void expectSpeed(const std::string& speed_of, bool quantum_counts) {
   DpsoConfig config;
   config.speed_of = speed_of;
   config.quantum_share = 0.2;
-  Dpso swarm(world.map(), config, FitnessConfig(), 4);
+  Dpso swarm(world.map(), config, 4);
   const auto centre_m = [&] {
     Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
     double count = 0.0;
@@ -133,9 +133,9 @@ void expectSpeed(const std::string& speed_of, bool quantum_counts) {
     }
     return Eigen::Vector2d(sum_m / count);
   };
-  swarm.update(world.from(onCircle(0.0)));
+  see(swarm, world.from(onCircle(0.0)));
   const Eigen::Vector2d before_m = centre_m();
-  swarm.update(world.from(onCircle(1.0)));
+  see(swarm, world.from(onCircle(1.0)));
   const double speed = (centre_m() - before_m).cwiseQuotient(world.map().area().range()).norm();
   EXPECT_NEAR(swarm.tuning().speed_ema, speed, 1e-12) << speed_of;
 }
@@ -152,15 +152,14 @@ TEST(PaperDpso, RecoveryRaisesThePerturbationStepByStepAndEndsAtOnce) {
   config.recovery_patience = 2;
   config.recovery_step = 0.5;
   config.phi0_max = 0.9;
-  Dpso swarm(world.map(), config, FitnessConfig(), 4);
-  for (int image = 0; image < 30; ++image) swarm.update(world.from(onCircle(0.5 * image)));
+  Dpso swarm(world.map(), config, 4);
+  for (int image = 0; image < 30; ++image) see(swarm, world.from(onCircle(0.5 * image)));
   EXPECT_DOUBLE_EQ(swarm.tuning().phi0, 0.3);
   for (const double expected : {0.3, 0.6, 0.9, 0.9}) {
-    swarm.update(world.inTheDark());
+    see(swarm, world.inTheDark());
     EXPECT_NEAR(swarm.tuning().phi0, expected, 1e-12);
   }
-  for (int image = 30; image < 80 && swarm.tuning().recovering; ++image)
-    swarm.update(world.from(onCircle(0.5 * image)));
+  for (int image = 30; image < 80 && swarm.tuning().recovering; ++image) see(swarm, world.from(onCircle(0.5 * image)));
   EXPECT_FALSE(swarm.tuning().recovering);
   EXPECT_DOUBLE_EQ(swarm.tuning().phi0, 0.3);
 }
@@ -170,8 +169,8 @@ TEST(PaperDpso, RecoveryLeavesAnyPerturbationAloneUnlessToldToRaiseIt) {
     LocalizerConfig config = test::swarmConfig();
     assignParameters(config, {{"dpso/phi0", phi0}, {"recovery", std::string("paper")}});
     World world = roundWorld();
-    Dpso swarm(world.map(), config.dpso, FitnessConfig(), 4);
-    for (int image = 0; image < 10; ++image) swarm.update(world.inTheDark());
+    Dpso swarm(world.map(), config.dpso, 4);
+    for (int image = 0; image < 10; ++image) see(swarm, world.inTheDark());
     EXPECT_TRUE(swarm.tuning().recovering);
     EXPECT_DOUBLE_EQ(swarm.tuning().phi0, phi0);
   }

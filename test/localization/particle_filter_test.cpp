@@ -20,7 +20,7 @@ using test::World;
 
 ParticleFilter makeFilter(const World& world, const std::string& tracker, std::uint32_t seed,
                           const ParticleFilterConfig& config = {}) {
-  return ParticleFilter(world.map(), makeMotionModel(tracker, config, world.map()), config, FitnessConfig(), seed);
+  return ParticleFilter(world.map(), makeMotionModel(tracker, config, world.map()), config, seed);
 }
 
 class ParticleFilterTest : public ::testing::TestWithParam<const char*> {};
@@ -33,7 +33,7 @@ TEST_P(ParticleFilterTest, FindsAndFollowsARobot) {
   double error_sum_m = 0.0;
   for (int step = 0; step < 150; ++step) {
     const Eigen::Vector2d robot = onCircle(0.6 * step);
-    const TrackerEstimate estimate = filter.update(world.from(robot));
+    const TrackerEstimate estimate = see(filter, world.from(robot));
     if (step >= 60) error_sum_m += (estimate.position_m - robot).norm();
   }
   EXPECT_LT(error_sum_m / 90.0, 2.0);
@@ -42,11 +42,11 @@ TEST_P(ParticleFilterTest, FindsAndFollowsARobot) {
 TEST_P(ParticleFilterTest, FindsAKidnappedRobotAgain) {
   World world = roundWorld();
   ParticleFilter filter = makeFilter(world, GetParam(), 1);
-  for (int step = 0; step < 60; ++step) filter.update(world.from(onCircle(0.6 * step)));
+  for (int step = 0; step < 60; ++step) see(filter, world.from(onCircle(0.6 * step)));
   double error_m = 0.0;
   for (int step = 60; step < 160; ++step) {
     const Eigen::Vector2d robot = onCircle(30.0 * kPi + 0.6 * step);
-    error_m = (filter.update(world.from(robot)).position_m - robot).norm();
+    error_m = (see(filter, world.from(robot)).position_m - robot).norm();
   }
   EXPECT_LT(error_m, 5.0);
 }
@@ -56,7 +56,7 @@ TEST_P(ParticleFilterTest, AStraightStreetAndASingleImageWork) {
     World world(test::mapAt(test::street(images, 2.0)));
     ParticleFilter filter = makeFilter(world, GetParam(), 1);
     TrackerEstimate estimate;
-    for (int step = 0; step < 40; ++step) estimate = filter.update(world.from({0.0, 0.0}));
+    for (int step = 0; step < 40; ++step) estimate = see(filter, world.from({0.0, 0.0}));
     EXPECT_LT(estimate.position_m.norm(), 5.0);
     EXPECT_TRUE(estimate.mode_covariance_m2.allFinite());
   }
@@ -68,7 +68,7 @@ TEST(ParticleFilter, TheEstimateIsTheWeightedMean) {
   config.random_share = 0.0;  // nothing happens to the cloud after the estimate
   ParticleFilter filter = makeFilter(world, "pf_gaussian", 5, config);
   for (int step = 0; step < 10; ++step) {
-    const TrackerEstimate estimate = filter.update(world.from(onCircle(0.6 * step)));
+    const TrackerEstimate estimate = see(filter, world.from(onCircle(0.6 * step)));
     EXPECT_LT((estimate.position_m - momentsOf(filter.particles()).mean_m).norm(), 1e-12);
     EXPECT_LT((estimate.spread_m - momentsOf(filter.particles()).spread()).norm(), 1e-12);
   }
@@ -77,7 +77,7 @@ TEST(ParticleFilter, TheEstimateIsTheWeightedMean) {
 TEST(ParticleFilter, TheWorstAreReplacedByRandomOnes) {
   World world = roundWorld();
   ParticleFilter filter = makeFilter(world, "pf_gaussian", 6);
-  for (int step = 0; step < 60; ++step) filter.update(world.from(onCircle(0.0)));
+  for (int step = 0; step < 60; ++step) see(filter, world.from(onCircle(0.0)));
   std::size_t far = 0;
   for (const Particle& particle : filter.particles())
     far += (particle.position_m - onCircle(0.0)).norm() > 20.0 ? 1 : 0;
@@ -92,9 +92,9 @@ TEST(ParticleFilter, AParticleIsPulledToItsTrainingImage) {
   config.random_share = 0.0;
   ParticleFilter filter = makeFilter(world, "pf_gaussian", 1, config);
   filter.reset(around({10.0, 0.0}, 0.0));
-  filter.update(world.from({0.0, 0.0}));
+  see(filter, world.from({0.0, 0.0}));
   EXPECT_DOUBLE_EQ(filter.particles()[0].position_m.x(), 10.0);
-  filter.update(world.from({0.0, 0.0}));
+  see(filter, world.from({0.0, 0.0}));
   EXPECT_DOUBLE_EQ(filter.particles()[0].position_m.x(), 8.0);
 }
 
@@ -106,7 +106,7 @@ TEST(ParticleFilter, WhatIsInjectedHasAMeanWeightAndTheFirstSpeedInAnyDirection)
   config.acceleration_std = 0.1;  // so that the others have another speed
   config.pull = 0.0;
   ParticleFilter filter = makeFilter(world, "pf_linear", 7, config);
-  for (int image = 0; image < 10; ++image) filter.update(world.from(onCircle(0.0)));
+  for (int image = 0; image < 10; ++image) see(filter, world.from(onCircle(0.0)));
   std::vector<Particle> injected;
   double least_of_others = 1.0;
   for (const Particle& particle : filter.particles()) {
@@ -141,7 +141,7 @@ TEST(ParticleFilter, OneOfFiftyIsInjectedWhereTheShareSaysSo) {
   filter.reset(around(onCircle(0.0), 2.0));
   int far_away = 0;
   for (int image = 0; image < 20; ++image) {
-    filter.update(world.from(onCircle(0.0)));
+    see(filter, world.from(onCircle(0.0)));
     far_away += std::any_of(filter.particles().begin(), filter.particles().end(), [](const Particle& particle) {
       return (particle.position_m - onCircle(0.0)).norm() > 15.0;
     });
@@ -157,9 +157,9 @@ TEST(ParticleFilter, BeforeTheFirstImageAllWeighAlikeAndNothingMoves) {
   for (int start = 0; start < 2; ++start) {
     const std::vector<Particle> before = filter.particles();
     for (const Particle& particle : before) EXPECT_DOUBLE_EQ(particle.weight, 1.0 / 300.0);
-    filter.update(world.from(onCircle(0.0)));
+    see(filter, world.from(onCircle(0.0)));
     for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(filter.particles()[i].position_m, before[i].position_m);
-    filter.reset();
+    filter.reset(anywhere(world.map().area()));
   }
 }
 
@@ -168,8 +168,8 @@ TEST(ParticleFilter, TheEstimateNamesItsTrainingImages) {
   ParticleFilter filter = makeFilter(world, "pf_linear", 7);
   for (int image = 0; image < 30; ++image) {
     const bool dark = image % 10 == 9;
-    const TrackerInput input = dark ? world.inTheDark() : world.from(onCircle(0.6 * image));
-    const TrackerEstimate estimate = filter.update(input);
+    const test::Seen input = dark ? world.inTheDark() : world.from(onCircle(0.6 * image));
+    const TrackerEstimate estimate = see(filter, input);
     EXPECT_EQ(estimate.training_image, world.map().nearest(estimate.position_m).image);
     const std::size_t best =
         estimate.best.similarity > 0.0 ? input.scores.mostSimilar().front() : estimate.training_image;
@@ -193,10 +193,10 @@ TEST(ParticleFilter, WhoHasAllTheWeightIsDrawnAlways) {
   for (const int heavy : {0, 1, 7, 19}) {
     ParticleFilter filter = makeFilter(world, "pf_gaussian", 7, standingConfig(20));
     int drawn = 0;
-    filter.reset([&drawn, heavy](Random&) { return onCircle(drawn++ == heavy ? 20.0 : 100.0); });
-    filter.update(world.from(onCircle(20.0)));
+    filter.reset(Prior([&drawn, heavy](Random&) { return onCircle(drawn++ == heavy ? 20.0 : 100.0); }));
+    see(filter, world.from(onCircle(20.0)));
     ASSERT_GT(filter.particles()[static_cast<std::size_t>(heavy)].weight, 1.0 - 1e-9);
-    filter.update(world.from(onCircle(20.0)));
+    see(filter, world.from(onCircle(20.0)));
     for (const Particle& particle : filter.particles()) EXPECT_EQ(particle.position_m, onCircle(20.0)) << heavy;
   }
 }
@@ -206,9 +206,9 @@ TEST(ParticleFilter, EachIsDrawnAsOftenAsItsWeightSays) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     ParticleFilter filter = makeFilter(world, "pf_gaussian", seed, standingConfig(50));
     filter.reset(around(onCircle(20.0), 5.0));
-    filter.update(world.from(onCircle(20.0)));
+    see(filter, world.from(onCircle(20.0)));
     const std::vector<Particle> before = filter.particles();
-    filter.update(world.from(onCircle(20.0)));
+    see(filter, world.from(onCircle(20.0)));
     for (const Particle& one : before) {
       const auto drawn = std::count_if(filter.particles().begin(), filter.particles().end(),
                                        [&](const Particle& other) { return other.position_m == one.position_m; });
@@ -222,46 +222,47 @@ TEST(ParticleFilter, AVerifiedPositionWeighsTheParticles) {
   ParticleFilterConfig config;
   config.random_share = 0.0;
   ParticleFilter filter = makeFilter(world, "pf_gaussian", 7, config);
-  TrackerInput input = world.from(onCircle(100.0));
+  test::Seen input = world.from(onCircle(100.0));
   input.verified_m = onCircle(10.0);
-  filter.update(input);
+  see(filter, input);
   EXPECT_EQ(input.scores.comparisons(), 0U);
   double sum = 0.0;
-  for (const Particle& particle : filter.particles()) sum += fitnessAbout(onCircle(10.0), particle.position_m);
+  PoseLikelihood first(world.map(), onCircle(10.0));
+  for (const Particle& particle : filter.particles()) sum += first.at(particle.position_m).value;
   for (const Particle& particle : filter.particles()) {
-    EXPECT_NEAR(particle.weight, fitnessAbout(onCircle(10.0), particle.position_m) / sum, 1e-12);
+    EXPECT_NEAR(particle.weight, first.at(particle.position_m).value / sum, 1e-12);
   }
   const std::vector<Particle> before = filter.particles();
-  filter.attract(onCircle(12.0));
+  PoseLikelihood second(world.map(), onCircle(12.0));
+  filter.update(second);
   double total = 0.0;
-  for (const Particle& particle : before) total += particle.weight * fitnessAbout(onCircle(12.0), particle.position_m);
+  for (const Particle& particle : before) total += particle.weight * second.at(particle.position_m).value;
   for (std::size_t i = 0; i < before.size(); ++i) {
-    const double expected = before[i].weight * fitnessAbout(onCircle(12.0), before[i].position_m) / total;
+    const double expected = before[i].weight * second.at(before[i].position_m).value / total;
     EXPECT_NEAR(filter.particles()[i].weight, expected, 1e-12) << "one more likelihood";
   }
 }
 
-TEST(ParticleFilter, AReconfigurationReachesMotionAndFitness) {
+TEST(ParticleFilter, AReconfigurationReachesTheMotion) {
   World world = roundWorld();
   TrackerConfig config;
   config.tracker = "pf_gaussian";
   config.pf.random_share = 0.0;
   config.pf.pull = 0.0;
   ParticleFilter filter = makeFilter(world, config.tracker, 7, config.pf);
-  filter.update(world.from(onCircle(0.0)));
+  see(filter, world.from(onCircle(0.0)));
   config.pf.gaussian_std_m = 0.0;
-  config.fitness.distance_sigma_m = 0.5;
   filter.configure(config);
   const std::vector<Particle> before = filter.particles();
-  TrackerInput input = world.from(onCircle(0.0));
-  filter.update(input);
+  test::Seen input = world.from(onCircle(0.0));
+  see(filter, input);
   double sum = 0.0;
   std::vector<double> fitness;
   for (const Particle& particle : filter.particles()) {
     const bool stood = std::any_of(before.begin(), before.end(),
                                    [&](const Particle& other) { return other.position_m == particle.position_m; });
     EXPECT_TRUE(stood) << "without noise a particle stays";
-    fitness.push_back(evaluateFitness(world.map().nearest(particle.position_m), input.scores, config.fitness).value);
+    fitness.push_back(input.likelihood.at(particle.position_m).value);
     sum += fitness.back();
   }
   for (std::size_t i = 0; i < fitness.size(); ++i) EXPECT_NEAR(filter.particles()[i].weight, fitness[i] / sum, 1e-12);

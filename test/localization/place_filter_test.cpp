@@ -48,11 +48,11 @@ double sumOf(const PlaceFilter& filter) {
   return std::accumulate(filter.probabilities().begin(), filter.probabilities().end(), 0.0);
 }
 
-Travel afterSeconds(double seconds) { return {std::nullopt, seconds}; }
+Motion afterSeconds(double seconds) { return Motion(seconds); }
 
 TEST(PlaceFilter, TheMassIsOne) {
   const auto map = mapOf(streetSession(80));
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   EXPECT_NEAR(sumOf(filter), 1.0, 1e-12);
   for (int i = 0; i < 100; ++i) {
     filter.predict(afterSeconds(i % 7 == 0 ? 0.0 : 1.0));
@@ -64,7 +64,7 @@ TEST(PlaceFilter, TheMassIsOne) {
 
 TEST(PlaceFilter, MovesAsTheSessionDid) {
   const auto map = mapOf(streetSession(80));
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   filter.reset({{20.0, 0.0}});
   filter.predict(afterSeconds(1.0));
   EXPECT_NEAR(filter.mode().mean_m.x(), 21.0, 0.3);
@@ -76,7 +76,7 @@ TEST(PlaceFilter, MovesAsTheSessionDid) {
 TEST(PlaceFilter, LearnsAnotherSpeed) {
   const auto map = mapOf(streetSession(200));
   for (const double speed_mps : {0.0, 0.5, 1.0, 2.0}) {
-    PlaceFilter filter(*map, {}, {});
+    PlaceFilter filter(*map, {});
     filter.reset({{10.0, 0.0}});
     double east_m = 10.0;
     for (int i = 0; i < 40; ++i) {
@@ -93,11 +93,9 @@ TEST(PlaceFilter, LearnsAnotherSpeed) {
 
 TEST(PlaceFilter, OdometrySaysHowFar) {
   const auto map = mapOf(streetSession(80));
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   filter.reset({{20.0, 0.0}});
-  Travel travel = afterSeconds(1.0);
-  travel.odometry = OdometryIncrement{{6.0, 0.0}, 0.0, 6.0};
-  filter.predict(travel);
+  filter.predict(Motion(1.0, OdometryIncrement{{6.0, 0.0}, 0.0, 6.0}));
   EXPECT_GT(filter.within({26.0, 0.0}, 1.5), 0.4);
   filter.reset({{20.0, 0.0}});
   filter.predict(afterSeconds(1.0));
@@ -106,7 +104,7 @@ TEST(PlaceFilter, OdometrySaysHowFar) {
 
 TEST(PlaceFilter, FindsARobotThatWasCarriedAway) {
   const auto map = mapOf(streetSession(200));
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   double east_m = 10.0;
   for (int i = 0; i < 20; ++i, east_m += 1.0) {
     filter.predict(afterSeconds(1.0));
@@ -127,7 +125,7 @@ TEST(PlaceFilter, GoesFromOneSessionToAnother) {
   std::vector<TrainingImage> second = streetSession(100, 1);
   images.insert(images.end(), second.begin() + 45, second.end());
   const auto map = mapOf(images, 2);
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   filter.reset({{40.0, 0.0}});
   for (int i = 0; i < 20; ++i) filter.predict(afterSeconds(1.0));
   EXPECT_GT(filter.within({60.0, 0.0}, 10.0), 0.3);
@@ -139,7 +137,7 @@ TEST(PlaceFilter, DoesNotTurnAround) {
   for (TrainingImage& image : back) image.yaw_rad = 3.14159;
   images.insert(images.end(), back.begin(), back.end());
   const auto map = mapOf(images, 2);
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   filter.reset({{20.0, 0.0}});
   filter.predict(afterSeconds(1.0));
   const std::vector<double>& probabilities = filter.probabilities();
@@ -155,7 +153,7 @@ TEST(PlaceFilter, TheOrderOfTheSessionsDoesNotMatter) {
     if (swapped) std::swap(images, others);
     images.insert(images.end(), others.begin(), others.end());
     const auto map = mapOf(images, 2);
-    PlaceFilter filter(*map, {}, {});
+    PlaceFilter filter(*map, {});
     for (int i = 0; i < 10; ++i) {
       filter.predict(afterSeconds(1.0));
       filter.update(seenFrom(*map, 10.0 + i));
@@ -169,7 +167,7 @@ TEST(PlaceFilter, TheOrderOfTheSessionsDoesNotMatter) {
 
 TEST(PlaceFilter, WhatMatchesNothingLeavesItUnsure) {
   const auto map = mapOf(streetSession(200));
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   for (int i = 0; i < 50; ++i) {
     filter.predict(afterSeconds(1.0));
     filter.update(seenFrom(*map, 0.0, 0.0));
@@ -179,7 +177,7 @@ TEST(PlaceFilter, WhatMatchesNothingLeavesItUnsure) {
 
 TEST(PlaceFilter, WhatWasNotComparedIsAsLikelyAsIsSaid) {
   const auto map = mapOf(streetSession(10));
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   PlaceLikelihood likelihood;
   likelihood.compared = {{3, 1.0}};
   likelihood.elsewhere = 4.0;
@@ -192,7 +190,7 @@ TEST(PlaceFilter, TheLikelihoodGrowsWithTheMatches) {
   const auto map = mapOf(streetSession(10));
   BayesConfig config;
   config.exponent = 2.0;
-  const PlaceFilter filter(*map, config, {});
+  const PlaceFilter filter(*map, config);
   Score none;
   Score some;
   some.matches = 9;
@@ -205,7 +203,7 @@ TEST(PlaceFilter, TheLikelihoodGrowsWithTheMatches) {
 
 TEST(PlaceFilter, ImagesThatFollowCloselySayLess) {
   const auto map = mapOf(streetSession(80));
-  PlaceFilter filter(*map, {}, {});
+  PlaceFilter filter(*map, {});
   Score score;
   score.matches = 9;
   filter.predict(afterSeconds(1.0));

@@ -340,8 +340,9 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
     SessionChoice sessions(map, choose);
     Scores scores(map.size());
     MapSweep sweep(map, 100000, 100000);
+    ImageLikelihood image(scores, sweep, sessions, FitnessConfig());
     TrackerConfig config;
-    Dpso swarm(map, config.dpso, config.fitness, 1);
+    Dpso swarm(map, config.dpso, 1);
     double sum = 0.0;
     for (int i = 0; i < 100; ++i) {
       const Eigen::Vector2d robot_m = test::onCircle(0.6 * i);
@@ -351,7 +352,7 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
         return test::World::scoreAt((map.pose(image).session == 1 ? 0.5 : 0.1) * bell);
       });
       sweep.startImage();
-      const TrackerEstimate estimate = swarm.update({scores, sweep, sessions});
+      const TrackerEstimate estimate = see(swarm, test::Seen{map, scores, image});
       sessions.sawSomething(estimate.best.recognised);
       const auto trial = sessions.trial(map.position_m(estimate.best_image), map.yaw_rad(estimate.best_image));
       if (trial) {

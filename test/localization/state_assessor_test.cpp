@@ -31,7 +31,7 @@ Said placeRatio(double ratio) { return {{FeatureKind::kLocal, ratio}}; }
 Said blind() { return {{FeatureKind::kLocal, 1.0, true}}; }
 
 LocalizationState assess(StateAssessor& assessor, TrackerEstimate estimate, const Said& said) {
-  estimate.tuning.recovering = said.recovering;
+  estimate.recovering = said.recovering;
   return assessor.update(0, estimate, said.evidence);
 }
 

@@ -42,11 +42,11 @@ struct OneMove {
   std::vector<Particle> after;
 
   OneMove(World& world, const DpsoConfig& config, const Eigen::Vector2d& attractor_m) {
-    Dpso swarm(world.map(), config, FitnessConfig(), 7);
-    swarm.update(world.inTheDark());  // nothing moves at the first image
-    swarm.attract(attractor_m);
+    Dpso swarm(world.map(), config, 7);
+    see(swarm, world.inTheDark());  // nothing moves at the first image
+    verify(swarm, world, attractor_m);
     before = swarm.particles();
-    swarm.update(world.inTheDark());
+    see(swarm, world.inTheDark());
     after = swarm.particles();
   }
 
@@ -159,14 +159,14 @@ TEST(SwarmEquations, TheLimitOfTheNormKeepsTheDirection) {
   config.inertia = 1.0;
   config.speed_limit = "norm";
   config.v0 = 0.05;
-  Dpso swarm(world.map(), config, FitnessConfig(), 7);
-  swarm.update(world.inTheDark());
+  Dpso swarm(world.map(), config, 7);
+  see(swarm, world.inTheDark());
   const std::vector<Particle> before = swarm.particles();
   TrackerConfig slower;
   slower.dpso = config;
   slower.dpso.v0 = 0.01;
   swarm.configure(slower);
-  swarm.update(world.inTheDark());
+  see(swarm, world.inTheDark());
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (before[i].kind != ParticleKind::kStandard) continue;
     const Eigen::Vector2d share = swarm.particles()[i].velocity_m.cwiseQuotient(kRange_m);
@@ -211,9 +211,9 @@ TEST(SwarmEquations, QuantumParticlesOfASwarmThatSawNothingAreAnywhere) {
   World world = cornersWorld();
   DpsoConfig config = stillConfig();
   config.quantum_share = 0.8;
-  Dpso swarm(world.map(), config, FitnessConfig(), 7);
-  swarm.update(world.inTheDark());
-  swarm.update(world.inTheDark());
+  Dpso swarm(world.map(), config, 7);
+  see(swarm, world.inTheDark());
+  see(swarm, world.inTheDark());
   std::vector<double> shares;
   for (const Particle& particle : swarm.particles()) {
     if (particle.kind != ParticleKind::kQuantum) continue;
@@ -227,16 +227,16 @@ TEST(SwarmEquations, TheBestParticleAttractsTheNextMove) {
   DpsoConfig config;
   config.quantum_std = 0.0;
   config.confine = "none";
-  Dpso swarm(world.map(), config, FitnessConfig(), 3);
+  Dpso swarm(world.map(), config, 3);
   swarm.reset(around(onCircle(0.0), 5.0));  // so that the start is not guided
   for (int image = 0; image < 20; ++image) {
-    swarm.update(world.from(onCircle(0.0)));
+    see(swarm, world.from(onCircle(0.0)));
     const std::vector<Particle>& particles = swarm.particles();
     const Eigen::Vector2d best_m =
         std::max_element(particles.begin(), particles.end(), [](const Particle& a, const Particle& b) {
           return a.weight < b.weight;
         })->position_m;
-    swarm.update(world.inTheDark());
+    see(swarm, world.inTheDark());
     EXPECT_EQ(swarm.particles().front().position_m, best_m) << "a quantum particle";
   }
 }
@@ -277,16 +277,16 @@ Adaptations adaptationsOn(World& world, int images, const Way& way) {
   config.recovery = "none";
   config.v0_max = 0.03;
   config.v0_min = 0.004;
-  Dpso swarm(world.map(), config, FitnessConfig(), 3);
+  Dpso swarm(world.map(), config, 3);
   Adaptations seen;
   double ema = 0.0;
   double ema_mps = 0.0;
   Eigen::Vector2d before_m = Eigen::Vector2d::Zero();
   for (int image = 0; image < images; ++image) {
     const double v0 = swarm.tuning().v0;
-    TrackerInput input = world.from(way(image));
-    if (image > 0) input.travel.seconds = 0.25;
-    swarm.update(input);
+    test::Seen input = world.from(way(image));
+    if (image > 0) input.motion = Motion(0.25);
+    see(swarm, input);
     const Eigen::Vector2d centre_m = centreOfTravellers(swarm);
     const double speed = (centre_m - before_m).cwiseQuotient(range_m).norm();
     const double speed_mps = (centre_m - before_m).norm() / 0.25;
@@ -333,20 +333,20 @@ TEST(SwarmEquations, RecoveryIsStepwiseAndEndsAtTheConfiguration) {
   config.recovery = "paper";
   config.recovery_step = 0.25;
   config.recovery_patience = 3;
-  Dpso swarm(world.map(), config, FitnessConfig(), 4);
-  for (int image = 0; image < 60; ++image) swarm.update(world.from(onCircle(0.2 * image)));
+  Dpso swarm(world.map(), config, 4);
+  for (int image = 0; image < 60; ++image) see(swarm, world.from(onCircle(0.2 * image)));
   ASSERT_FALSE(swarm.tuning().recovering);
   const double v0 = swarm.tuning().v0;
   ASSERT_LT(v0, config.v0) << "a slow robot";
   for (int bad = 1; bad < 3; ++bad) {
-    swarm.update(world.inTheDark());
+    see(swarm, world.inTheDark());
     EXPECT_FALSE(swarm.tuning().recovering) << bad;
     EXPECT_EQ(swarm.tuning().quantum_share, 0.1) << bad;
   }
   const double still_m = swarm.tuning().v0;
   for (int step = 1; step <= 6; ++step) {
-    swarm.update(world.inTheDark());
-    const TrackerTuning tuning = swarm.tuning();
+    see(swarm, world.inTheDark());
+    const SwarmTuning tuning = swarm.tuning();
     ASSERT_TRUE(tuning.recovering);
     EXPECT_NEAR(tuning.v0, std::min(config.v0_max, still_m + step * 0.25 * (config.v0_max - config.v0)), 1e-12);
     EXPECT_NEAR(tuning.quantum_share, std::min(0.2, 0.1 + step * 0.025), 1e-12);
@@ -355,14 +355,14 @@ TEST(SwarmEquations, RecoveryIsStepwiseAndEndsAtTheConfiguration) {
   }
   int image = 0;
   while (swarm.tuning().recovering && image < 60) {
-    swarm.update(world.from(onCircle(12.0)));
+    see(swarm, world.from(onCircle(12.0)));
     ++image;
   }
   EXPECT_EQ(swarm.tuning().v0, config.v0) << "not the limit of the slow robot before";
   EXPECT_EQ(swarm.tuning().quantum_share, config.quantum_share);
   EXPECT_EQ(swarm.tuning().phi2, config.phi2);
   const Eigen::Vector2d before_m = centreOfTravellers(swarm);
-  swarm.update(world.from(onCircle(12.0)));
+  see(swarm, world.from(onCircle(12.0)));
   const Eigen::Vector2d step_m = centreOfTravellers(swarm) - before_m;
   EXPECT_NEAR(swarm.tuning().speed_ema, step_m.cwiseQuotient(world.map().area().range()).norm(), 1e-12)
       << "the speed of the search is forgotten";
@@ -372,38 +372,38 @@ TEST(SwarmEquations, TheSpeedOverTheGroundStaysKnown) {
   World world = roundWorld();
   DpsoConfig config;
   config.recovery = "paper";
-  Dpso swarm(world.map(), config, FitnessConfig(), 4);
-  const auto see = [&](TrackerInput input, double seconds) {
-    input.travel.seconds = seconds;
-    swarm.update(input);
+  Dpso swarm(world.map(), config, 4);
+  const auto after = [&](test::Seen input, double seconds) {
+    input.motion = Motion(seconds);
+    see(swarm, input);
   };
-  for (int image = 0; image < 10; ++image) see(world.from(onCircle(0.6 * image)), 1.0);
+  for (int image = 0; image < 10; ++image) after(world.from(onCircle(0.6 * image)), 1.0);
   const double known_mps = swarm.tuning().speed_mps;
   EXPECT_GT(known_mps, 0.0);
   const Eigen::Vector2d before_m = centreOfTravellers(swarm);
-  see(world.from(onCircle(6.0)), 0.0);  // the stamp of the image before
+  after(world.from(onCircle(6.0)), 0.0);  // the stamp of the image before
   EXPECT_EQ(swarm.tuning().speed_mps, known_mps);
-  see(world.from(onCircle(6.6)), 2.0);
+  after(world.from(onCircle(6.6)), 2.0);
   EXPECT_NEAR(swarm.tuning().speed_mps, 0.875 * known_mps + 0.125 * 0.5 * (centreOfTravellers(swarm) - before_m).norm(),
               1e-9);
-  while (!swarm.tuning().recovering) see(world.inTheDark(), 1.0);
-  for (int image = 0; image < 60 && swarm.tuning().recovering; ++image) see(world.from(onCircle(7.0)), 1.0);
+  while (!swarm.tuning().recovering) after(world.inTheDark(), 1.0);
+  for (int image = 0; image < 60 && swarm.tuning().recovering; ++image) after(world.from(onCircle(7.0)), 1.0);
   ASSERT_FALSE(swarm.tuning().recovering);
   EXPECT_GT(swarm.tuning().speed_mps, 0.0) << "the image that ends a recovery";
   const Eigen::Vector2d then_m = centreOfTravellers(swarm);
-  see(world.from(onCircle(7.6)), 2.0);
+  after(world.from(onCircle(7.6)), 2.0);
   EXPECT_NEAR(swarm.tuning().speed_mps, 0.5 * (centreOfTravellers(swarm) - then_m).norm(), 1e-9)
       << "the speed of the search is forgotten";
-  swarm.reset();
+  swarm.reset(anywhere(world.map().area()));
   EXPECT_EQ(swarm.tuning().speed_mps, 0.0);
-  see(world.from(onCircle(7.6)), 1.0);
-  see(world.from(onCircle(8.2)), 1.0);
+  after(world.from(onCircle(7.6)), 1.0);
+  after(world.from(onCircle(8.2)), 1.0);
   const Eigen::Vector2d restarted_m = centreOfTravellers(swarm);
-  swarm.reset();
-  see(world.from(onCircle(8.2)), 1.0);
+  swarm.reset(anywhere(world.map().area()));
+  after(world.from(onCircle(8.2)), 1.0);
   const Eigen::Vector2d first_m = centreOfTravellers(swarm);
   EXPECT_NE(first_m, restarted_m);
-  see(world.from(onCircle(8.8)), 1.0);
+  after(world.from(onCircle(8.8)), 1.0);
   EXPECT_NEAR(swarm.tuning().speed_mps, (centreOfTravellers(swarm) - first_m).norm(), 1e-9)
       << "of its first step, not smoothed with what was before";
 }
@@ -413,8 +413,8 @@ TEST(SwarmEquations, WhatIsAtItsLimitStaysThereInARecovery) {
   DpsoConfig config;
   config.recovery = "paper";
   config.phi2_min = 0.6;  // phi2 has nowhere to go
-  Dpso swarm(world.map(), config, FitnessConfig(), 4);
-  for (int image = 0; image < 5; ++image) swarm.update(world.inTheDark());
+  Dpso swarm(world.map(), config, 4);
+  for (int image = 0; image < 5; ++image) see(swarm, world.inTheDark());
   EXPECT_EQ(swarm.tuning().phi2, 0.6);
   EXPECT_EQ(swarm.tuning().v0, config.v0_max);
 }
@@ -425,7 +425,7 @@ TEST(SwarmEquations, TheLastParticlesHaveHighEnergyAndTheFirstAreQuantumParticle
   config.particles = 40;
   config.quantum_share = 0.25;
   config.high_energy_share = 0.2;
-  const Dpso swarm(world.map(), config, FitnessConfig(), 4);
+  const Dpso swarm(world.map(), config, 4);
   for (std::size_t i = 0; i < 40; ++i) {
     const ParticleKind expected = i < 10    ? ParticleKind::kQuantum
                                   : i >= 32 ? ParticleKind::kHighEnergy

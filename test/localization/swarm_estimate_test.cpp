@@ -19,9 +19,9 @@ using test::World;
 
 TEST(SwarmEstimate, WhereNothingMatchesTheBestImageIsTheOneNearBy) {
   World world = roundWorld();
-  Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), 1);
-  for (int image = 0; image < 40; ++image) swarm.update(world.from(onCircle(50.0)));
-  const TrackerEstimate estimate = swarm.update(world.inTheDark());
+  Dpso swarm(world.map(), DpsoConfig(), 1);
+  for (int image = 0; image < 40; ++image) see(swarm, world.from(onCircle(50.0)));
+  const TrackerEstimate estimate = see(swarm, world.inTheDark());
   EXPECT_EQ(estimate.best.similarity, 0.0);
   EXPECT_EQ(estimate.best_image, world.map().nearest(estimate.position_m).image);
   EXPECT_EQ(estimate.training_image, estimate.best_image);
@@ -31,8 +31,8 @@ TEST(SwarmEstimate, WhereNothingMatchesTheBestImageIsTheOneNearBy) {
 TEST(SwarmEstimate, BeforeAnythingMatchesTheBestImageIsTheOneInTheMiddle) {
   World world = roundWorld();
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
-    Dpso swarm(world.map(), DpsoConfig(), FitnessConfig(), seed);
-    const TrackerEstimate estimate = swarm.update(world.inTheDark());
+    Dpso swarm(world.map(), DpsoConfig(), seed);
+    const TrackerEstimate estimate = see(swarm, world.inTheDark());
     EXPECT_EQ(estimate.best_image, world.map().nearest(estimate.position_m).image) << seed;
   }
 }
@@ -45,12 +45,12 @@ TEST(SwarmEstimate, TheCentreOfTheBestIsThatOfThoseWithAnyWeight) {
   config.recovery = "none";
   int few = 0;
   for (std::uint32_t seed = 1; seed <= 40; ++seed) {
-    Dpso swarm(world.map(), config, FitnessConfig(), seed);
-    const TrackerInput input = world.inTheDark();
+    Dpso swarm(world.map(), config, seed);
+    const test::Seen input = world.inTheDark();
     input.scores.startImage(FeatureKind::kLocal, [&world](FeatureKind, std::size_t image) {
       return (world.map().position_m(image) - onCircle(20.0)).norm() < 2.0 ? World::scoreAt(0.3) : Score{};
     });
-    const TrackerEstimate estimate = swarm.update(input);
+    const TrackerEstimate estimate = see(swarm, input);
     Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
     int weighted = 0;
     for (const Particle& particle : swarm.particles()) {
@@ -69,9 +69,9 @@ TEST(SwarmEstimate, WhereNothingMatchesTheCentreOfTheBestIsTheAttractor) {
   World world = roundWorld();
   DpsoConfig config;
   config.position = "k_best";
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
-  swarm.attract(onCircle(10.0));
-  EXPECT_EQ(swarm.update(world.inTheDark()).position_m, onCircle(10.0));
+  Dpso swarm(world.map(), config, 1);
+  verify(swarm, world, onCircle(10.0));
+  EXPECT_EQ(see(swarm, world.inTheDark()).position_m, onCircle(10.0));
 }
 
 /// Without smoothing; `quantum_share` of the particles are quantum ones, the others standard.
@@ -90,9 +90,9 @@ template <class Point>
 void expectSpeedOf(const Point& point_m, World& world, Dpso& swarm) {
   for (int image = 1; image < 10; ++image) {
     const Eigen::Vector2d before_m = point_m(swarm);
-    TrackerInput input = world.from(onCircle(2.0 * image));
-    input.travel.seconds = 0.5;
-    swarm.update(input);
+    test::Seen input = world.from(onCircle(2.0 * image));
+    input.motion = Motion(0.5);
+    see(swarm, input);
     EXPECT_NEAR(swarm.tuning().speed_mps, (point_m(swarm) - before_m).norm() / 0.5, 1e-9) << image;
   }
 }
@@ -101,13 +101,14 @@ TEST(SwarmEstimate, AResetForgetsTheSpeed) {
   World world = roundWorld();
   DpsoConfig config = withQuantumShare(0.0);
   config.ema_alpha = 0.1;
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
-  for (int image = 0; image < 10; ++image) swarm.update(world.from(onCircle(2.0 * image)));
+  Dpso swarm(world.map(), config, 1);
+  for (int image = 0; image < 10; ++image) see(swarm, world.from(onCircle(2.0 * image)));
   swarm.reset(normallyDistributed(onCircle(0.0), 9.0 * Eigen::Matrix2d::Identity()));
-  swarm.update(world.from(onCircle(0.0)));
-  TrackerInput input = world.from(onCircle(2.0));
-  input.travel.seconds = 1.0;
-  const TrackerTuning tuning = swarm.update(input).tuning;
+  see(swarm, world.from(onCircle(0.0)));
+  test::Seen input = world.from(onCircle(2.0));
+  input.motion = Motion(1.0);
+  see(swarm, input);
+  const SwarmTuning& tuning = swarm.tuning();
   const Eigen::Vector2d area_m = world.map().area().range();
   EXPECT_GE(tuning.speed_ema * area_m.maxCoeff(), tuning.speed_mps - 1e-9);
   EXPECT_LE(tuning.speed_ema * area_m.minCoeff(), tuning.speed_mps + 1e-9);
@@ -115,8 +116,8 @@ TEST(SwarmEstimate, AResetForgetsTheSpeed) {
 
 TEST(SwarmEstimate, WithoutTravellersItsSpeedIsThatOfTheWeightedCentre) {
   World world = roundWorld();
-  Dpso swarm(world.map(), withQuantumShare(1.0), FitnessConfig(), 1);
-  swarm.update(world.from(onCircle(0.0)));
+  Dpso swarm(world.map(), withQuantumShare(1.0), 1);
+  see(swarm, world.from(onCircle(0.0)));
   expectSpeedOf([](const Dpso& all) { return momentsOf(all.particles()).mean_m; }, world, swarm);
 }
 
@@ -124,16 +125,16 @@ TEST(SwarmEstimate, OneTravellerIsACentre) {
   World world = roundWorld();
   DpsoConfig config = withQuantumShare(0.9);
   config.particles = 10;
-  Dpso swarm(world.map(), config, FitnessConfig(), 1);
-  swarm.update(world.from(onCircle(0.0)));
+  Dpso swarm(world.map(), config, 1);
+  see(swarm, world.from(onCircle(0.0)));
   expectSpeedOf([](const Dpso& all) { return all.particles().back().position_m; }, world, swarm);
 }
 
 TEST(SwarmEstimate, AfterAnotherNumberOfParticlesItsSpeedIsThatOfThoseItHas) {
   World world = roundWorld();
   for (const std::size_t particles : {std::size_t{20}, std::size_t{90}}) {
-    Dpso swarm(world.map(), withQuantumShare(0.0), FitnessConfig(), 1);
-    for (int image = 0; image < 10; ++image) swarm.update(world.from(onCircle(0.0)));
+    Dpso swarm(world.map(), withQuantumShare(0.0), 1);
+    for (int image = 0; image < 10; ++image) see(swarm, world.from(onCircle(0.0)));
     swarm.resize(particles);
     const auto centre_m = [](const Dpso& all) {
       Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
@@ -152,10 +153,10 @@ TEST(SwarmEstimate, WhereNothingConfinesItTheFrameEndsAfterAThousandKilometres) 
   config.adapt_speed = false;
   config.phi2 = 0.6;
   config.v0 = 1e6;
-  Dpso swarm(world.map(), config, FitnessConfig(), 7);
-  swarm.update(world.inTheDark());
-  swarm.attract({5e6, -5e6});
-  swarm.update(world.inTheDark());
+  Dpso swarm(world.map(), config, 7);
+  see(swarm, world.inTheDark());
+  verify(swarm, world, {5e6, -5e6});
+  see(swarm, world.inTheDark());
   int at_the_end = 0;
   for (const Particle& particle : swarm.particles()) {
     EXPECT_LE(particle.position_m.cwiseAbs().maxCoeff(), kLargestCoordinate_m);

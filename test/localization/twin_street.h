@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "localization/image_likelihood.h"
 #include "localization/session_choice.h"
 #include "test/support/world.h"
 
@@ -35,7 +36,7 @@ class TwinStreet {
   /// Within this distance an image matches as well as at its place.
   void setPlateau(double plateau_m) { plateau_m_ = plateau_m; }
 
-  TrackerInput from(double along_m) {
+  Seen from(double along_m) {
     scores_.startImage(FeatureKind::kLocal, [this, along_m](FeatureKind kind, std::size_t image) {
       const double wide_m = kind == FeatureKind::kLocal ? 2.0 : 5.0;
       const double place_m = map_->position_m(image).x();
@@ -47,10 +48,10 @@ class TwinStreet {
       return World::scoreAt(0.5 * like);
     });
     sweep_.startImage();
-    return {scores_, sweep_, sessions_};
+    return {*map_, scores_, likelihood_};
   }
 
-  TrackerInput nowhere() { return from(-1000.0); }
+  Seen nowhere() { return from(-1000.0); }
 
   const TrainingMap& map() const { return *map_; }
 
@@ -68,6 +69,7 @@ class TwinStreet {
   Scores scores_;
   MapSweep sweep_;
   SessionChoice sessions_;
+  ImageLikelihood likelihood_{scores_, sweep_, sessions_, FitnessConfig()};
 };
 
 inline TrackerConfig severalSwarms(int swarms = 3) {

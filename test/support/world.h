@@ -5,15 +5,44 @@
 #include <cstddef>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "localization/image_likelihood.h"
 #include "localization/session_choice.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker.h"
 
 namespace visual_localization::test {
+
+/// An image as a tracker gets it: what it shows, and what is known of it beside that.
+struct Seen {
+  const TrainingMap& map;
+  Scores& scores;
+  Likelihood& likelihood;
+  Motion motion = {};                              ///< up to it
+  std::optional<Eigen::Vector2d> verified_m = {};  ///< instead of what it shows
+};
+
+inline TrackerEstimate see(Tracker& tracker, const Seen& seen) {
+  tracker.predict(seen.motion);
+  if (seen.verified_m) {
+    PoseLikelihood verified(seen.map, *seen.verified_m);
+    tracker.update(verified);
+  } else {
+    tracker.update(seen.likelihood);
+  }
+  return tracker.belief();
+}
+
+/// The image that the tracker saw last was taken here.
+template <class Place>
+void verify(Tracker& tracker, const Place& place, const Eigen::Vector2d& position_m) {
+  PoseLikelihood verified(place.map(), position_m);
+  tracker.update(verified);
+}
 
 /// A world without images: how alike two places look depends on their distance only.
 class World {
@@ -22,19 +51,19 @@ class World {
       : map_(std::move(map)), scores_(map_->size()), sweep_(*map_, 100000, 100000), sessions_(*map_, false) {}
 
   /// What the robot sees from here; globally, places within some 10 m look alike.
-  TrackerInput from(const Eigen::Vector2d& robot_m) {
+  Seen from(const Eigen::Vector2d& robot_m) {
     scores_.startImage(FeatureKind::kLocal, [this, robot_m](FeatureKind kind, std::size_t image) {
       return kind == FeatureKind::kLocal ? scoreAt(0.5 * bell(image, robot_m, 2.0))
                                          : scoreAt(bell(image, robot_m, 10.0));
     });
     sweep_.startImage();
-    return {scores_, sweep_, sessions_};
+    return {*map_, scores_, likelihood_};
   }
 
-  TrackerInput inTheDark() {
+  Seen inTheDark() {
     scores_.startImage(FeatureKind::kLocal, [](FeatureKind, std::size_t) { return Score{}; });
     sweep_.startImage();
-    return {scores_, sweep_, sessions_};
+    return {*map_, scores_, likelihood_};
   }
 
   static Score scoreAt(double similarity) {
@@ -53,6 +82,7 @@ class World {
   Scores scores_;
   MapSweep sweep_;
   SessionChoice sessions_;
+  ImageLikelihood likelihood_{scores_, sweep_, sessions_, FitnessConfig()};
 };
 
 /// Radius 30 m, an image every 0.94 m.

@@ -20,6 +20,7 @@
 
 namespace visual_localization {
 
+class ImageLikelihood;
 class PlaceFilter;
 class PoseVerifier;
 class SessionChoice;
@@ -102,8 +103,9 @@ class Localizer {
   std::optional<MetricPose> poseNearPrediction(std::int64_t stamp_ns);
   std::optional<MetricPose> poseNearProposal(const TrackerEstimate& tracked);
   TrackerEstimate track(std::int64_t stamp_ns, const std::optional<MetricPose>& metric);
-  TrackerEstimate trackFrom(const Travel& travel, const std::optional<MetricPose>& metric);
-  void witness(const Travel& travel, const std::optional<MetricPose>& metric);
+  TrackerEstimate trackImage();
+  TrackerEstimate trackVerified(const MetricPose& metric);
+  void witness(const Motion& motion, const std::optional<MetricPose>& metric);
   std::optional<double> probabilityOf(const TrackerEstimate& tracked) const;
   void learnSession(const TrackerEstimate& tracked);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
@@ -129,6 +131,7 @@ class Localizer {
   OdometryTrack odometry_;
   std::optional<std::int64_t> tracked_ns_;  ///< the stamp of the last image that the tracker saw
   std::unique_ptr<SessionChoice> sessions_;
+  std::unique_ptr<ImageLikelihood> likelihood_;
   std::unique_ptr<PoseVerifier> verifier_;
   std::vector<Neighbour> neighbours_;  ///< of the last estimate
   std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again

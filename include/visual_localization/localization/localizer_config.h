@@ -7,6 +7,7 @@
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/sift.h"
 #include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/odometry.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker_config.h"
@@ -34,8 +35,10 @@ struct LocalizerConfig : TrackerConfig {
   MatchConfig match{MatchConfig().max_angle_ratio, "votes"};
   SimilarityConfig similarity;
   HybridConfig hybrid;
+  FitnessConfig fitness;
   StateConfig state;
   MetricConfig metric;
+  OdometryConfig odometry;
 
   void declare(ParameterVisitor& visitor);
 };

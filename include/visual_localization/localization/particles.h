@@ -3,15 +3,12 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
-#include <optional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "visual_localization/localization/odometry.h"
-#include "visual_localization/localization/scores.h"
-#include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -26,15 +23,6 @@ struct Particle {
   double weight = 0.0;                                   ///< share of the fitness; all weights sum to one
   ParticleKind kind = ParticleKind::kStandard;
 };
-
-/// What is known about the way from the last image to this one.
-struct Travel {
-  std::optional<OdometryIncrement> odometry = {};  ///< the papers' models do without
-  double seconds = 0.0;                            ///< 0: unknown
-};
-
-/// The way of a robot at `position_m` that looks where the nearest training image does, in the map frame, metres.
-Eigen::Vector2d wayInMap(const TrainingMap& map, const Eigen::Vector2d& position_m, const OdometryIncrement& odometry);
 
 /// Mean and covariance of a weighted cloud, metres.
 struct CloudMoments {
@@ -75,10 +63,23 @@ class Random {
   std::mt19937 engine_;
 };
 
-/// Draws a position of the map frame, metres: where the robot may be before any image was seen.
-using Prior = std::function<Eigen::Vector2d(Random&)>;
+/// Where the robot may be before any image was seen: draws a position of the map frame, metres.
+class Prior {
+ public:
+  using Draw = std::function<Eigen::Vector2d(Random&)>;
 
-/// Anywhere in the area, uniformly.
+  /// `unknown`: anywhere in the map.
+  explicit Prior(Draw draw, bool unknown = false) : draw_(std::move(draw)), unknown_(unknown) {}
+
+  Eigen::Vector2d operator()(Random& random) const { return draw_(random); }
+  bool isUnknown() const { return unknown_; }
+
+ private:
+  Draw draw_;
+  bool unknown_;
+};
+
+/// Anywhere in the area, uniformly: the position is unknown.
 Prior anywhere(const Area& area);
 /// Uniform in a disc. Throws std::invalid_argument unless the centre may lie on a local map (see kLargestCoordinate_m)
 /// and the radius is from 0 to the size of one.
@@ -90,19 +91,5 @@ Prior normallyDistributed(const Eigen::Vector2d& mean_m, const Eigen::Matrix2d& 
 /// best positions are among few particles too, the other half from all alike, so that rivals are not forgotten. Throws
 /// std::invalid_argument when there are none.
 Prior drawnFrom(std::vector<Particle> cloud);
-
-/// f(x, t) and the training image it rests on.
-struct Fitness {
-  double value = 0.0;
-  std::size_t training_image = 0;
-  Score score;
-};
-
-/// f(x, t) = m(i_M(x), s(t)) * zeta(distance to i_M(x)), Kronfeld et al. (journal), Eq. 3, zeta a Gaussian of
-/// height one; m as the weight that its similarity gives it. `nearest`: i_M(x) and its distance.
-Fitness evaluateFitness(const Neighbour& nearest, Scores& scores, const FitnessConfig& config);
-
-/// In its stead where landmarks verify the position: a Gaussian of height one about it.
-double fitnessAbout(const Eigen::Vector2d& verified_m, const Eigen::Vector2d& position_m);
 
 }  // namespace visual_localization

@@ -1,13 +1,18 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
-#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "visual_localization/localization/likelihood.h"
+#include "visual_localization/localization/motion.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker_config.h"
@@ -15,15 +20,22 @@
 
 namespace visual_localization {
 
-/// How the tracker is tuned at the moment, for people to see.
-struct TrackerTuning {
-  double v0 = 0.0;             ///< speed limit, share of the area's range per image
-  double speed_ema = 0.0;      ///< smoothed speed of the swarm, same unit
-  double quantum_share = 0.0;  ///< share of quantum particles
-  double phi2 = 0.0;           ///< attraction of the best particle
-  double phi0 = 0.0;           ///< random perturbation
-  bool recovering = false;     ///< the position is taken to be lost
-  double speed_mps = 0.0;      ///< smoothed speed of the swarm (v_sw), metres per second; 0: not known yet
+/// What a tracker tells of itself, for people to see: a few numbers, each by its name.
+class TrackerReport {
+ public:
+  /// Another value of `key`, which must live for ever. Throws std::length_error for more than kMost of them.
+  void set(const char* key, double value);
+  /// 0 where the tracker does not tell it.
+  double value(std::string_view key) const;
+
+ private:
+  static constexpr std::size_t kMost = 12;  // an image takes no memory from the heap
+  struct Entry {
+    const char* key = nullptr;
+    double value = 0.0;
+  };
+  std::array<Entry, kMost> entries_{};
+  std::size_t size_ = 0;
 };
 
 /// What a tracker believes after an image.
@@ -36,47 +48,52 @@ struct TrackerEstimate {
   Score best;                                                     ///< best score among the training images compared
   std::size_t best_image = 0;                                     ///< the training image of `best`
   double best_distance_m = 0.0;                                   ///< from `position_m` to `best_image`
-  TrackerTuning tuning;                                           ///< for the next image
-  /// Of several swarms: how well the best rival matches, share of all that they match. Above a half another place fits
-  /// better than `position_m`, but not for long enough yet.
-  double rival_weight = 0.0;
+  bool recovering = false;                                        ///< the position is taken to be lost
+  TrackerReport report;
 };
 
 class PlaceFilter;
-class SessionChoice;
 
-/// What one image brings to a tracker.
-struct TrackerInput {
-  Scores& scores;                 ///< of the image, by the features chosen for it
-  MapSweep& sweep;                ///< where it may have been taken, should the position be lost
-  const SessionChoice& sessions;  ///< which training image stands for a position
-  Travel travel = {};             ///< since the last image
-  /// Where landmarks verify that the image was taken: particles are weighed by their distance from there, and no
-  /// training image is compared.
-  std::optional<Eigen::Vector2d> verified_m = {};
-};
-
-/// Follows the position from image to image.
+/// Follows the position from image to image. A new kind of tracker is a class of its own and one line in tracker.cpp,
+/// or a call of registerTracker().
 class Tracker {
  public:
   virtual ~Tracker() = default;
-  /// Forgets the past: the robot may be anywhere in the map's area.
-  virtual void reset() = 0;
-  /// Forgets the past; the particles of the next image are drawn from `prior`.
+  /// Forgets the past; the robot is where `prior` says.
   virtual void reset(const Prior& prior) = 0;
-  /// Goes on with other parameters; the particles stay. Tracker and number of particles must be the ones it has.
-  virtual void configure(const TrackerConfig& config) = 0;
-  /// One image: moves the particles, scores them, estimates.
-  virtual TrackerEstimate update(const TrackerInput& input) = 0;
-  /// A verified position of the last image: the next one is searched around it.
-  virtual void attract(const Eigen::Vector2d& position_m) = 0;
+  /// The next image, and what is known of the motion up to it; the first one after a reset comes without any.
+  virtual void predict(const Motion& motion) = 0;
+  /// What is known of where that image was taken. Several likelihoods of one image may follow each other.
+  virtual void update(Likelihood& likelihood) = 0;
+  /// After the last update.
+  virtual const TrackerEstimate& belief() const = 0;
+  /// Goes on with other parameters from the next image on. False if it cannot: then nothing has changed, and a new one
+  /// must take its place.
+  virtual bool configure(const TrackerConfig& config) = 0;
+  /// Where it believes the robot to be, as samples: for people to see, and for its successor to begin with.
   virtual const std::vector<Particle>& particles() const = 0;
-  virtual TrackerTuning tuning() const = 0;
   /// How likely each training image is, where it keeps a posterior over them; null otherwise.
-  virtual const PlaceFilter* belief() const { return nullptr; }
+  virtual const PlaceFilter* posterior() const { return nullptr; }
 };
 
-/// The chosen tracker, with its particles anywhere in the map. `map` must outlive it.
+/// Makes a tracker that may be anywhere in the map, which must outlive it.
+using MakeTracker =
+    std::function<std::unique_ptr<Tracker>(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed)>;
+
+/// A kind of tracker.
+struct TrackerKind {
+  std::string name;       ///< the value of the parameter `tracker`
+  std::string particles;  ///< the parameter that says how many particles it has; empty: none
+  MakeTracker make;
+};
+
+/// Beside those of this library; before any localizer is made. Throws std::invalid_argument for a name that is taken.
+void registerTracker(const TrackerKind& kind);
+/// Throws ParameterError for a name that nobody registered.
+const TrackerKind& trackerKind(const std::string& name);
+std::vector<std::string> trackerNames();
+
+/// The chosen tracker. `map` must outlive it.
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed);
 
 }  // namespace visual_localization

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <cstddef>
 #include <string>
 
-#include "visual_localization/localization/odometry.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -83,13 +81,6 @@ struct TrackerConfig {
   DpsoConfig dpso;
   ParticleFilterConfig pf;
   BayesConfig bayes;
-  FitnessConfig fitness;
-  OdometryConfig odometry;
-
-  /// Number of particles of the chosen tracker.
-  std::size_t particles() const { return static_cast<std::size_t>(isSwarm() ? dpso.particles : pf.particles); }
-  /// Whether it is one or several swarms.
-  bool isSwarm() const { return tracker == "dpso" || tracker == "dpso_multi"; }
 };
 
 }  // namespace visual_localization

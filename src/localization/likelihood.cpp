@@ -1,0 +1,36 @@
+#include "visual_localization/localization/likelihood.h"
+
+#include <cmath>
+
+#include "localization/image_likelihood.h"
+
+namespace visual_localization {
+
+void FitnessConfig::declare(ParameterVisitor& visitor) {
+  visitor.real({"fitness/distance_sigma", "m", "how fast fitness falls off beside the recorded path (std of zeta)"},
+               distance_sigma_m, 0.1, 1000.0);
+}
+
+Fitness ImageLikelihood::at(const Eigen::Vector2d& position_m) {
+  const Neighbour nearest = sessions_.nearest(position_m);
+  const double offset = nearest.distance_m / config_.distance_sigma_m;
+  const Score score = scores_[nearest.image];
+  return {score.weight * std::exp(-0.5 * offset * offset), nearest.image, score};
+}
+
+PoseLikelihood::PoseLikelihood(const TrainingMap& map, const Eigen::Vector2d& verified_m)
+    : map_(map), verified_m_(verified_m), nearest_(map.nearest(verified_m).image) {}
+
+Fitness PoseLikelihood::at(const Eigen::Vector2d& position_m) {
+  constexpr double kSigma_m = 1.0;  // a cloud as wide as that of a place: the next image may have no pose
+  const double value = std::exp(-0.5 * (position_m - verified_m_).squaredNorm() / (kSigma_m * kSigma_m));
+  return {value, nearest_, {value, value, 0, true}};
+}
+
+std::vector<std::size_t> PoseLikelihood::mostSimilar(std::size_t count) {
+  std::vector<std::size_t> images;
+  for (const Neighbour& neighbour : map_.nearest(verified_m_, count)) images.push_back(neighbour.image);
+  return images;
+}
+
+}  // namespace visual_localization
