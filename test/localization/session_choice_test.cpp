@@ -347,9 +347,9 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
     for (int i = 0; i < 100; ++i) {
       const Eigen::Vector2d robot_m = test::onCircle(0.6 * i);
       sessions.startImage(i * 1'000'000'000LL);
-      scores.startImage(FeatureKind::kLocal, [&](FeatureKind, std::size_t image) {
-        const double bell = std::exp(-0.125 * (map.position_m(image) - robot_m).squaredNorm());
-        return test::World::scoreAt((map.pose(image).session == 1 ? 0.5 : 0.1) * bell);
+      scores.startImage(FeatureKind::kLocal, [&](FeatureKind, std::size_t training) {
+        const double bell = std::exp(-0.125 * (map.position_m(training) - robot_m).squaredNorm());
+        return test::World::scoreAt((map.pose(training).session == 1 ? 0.5 : 0.1) * bell);
       });
       sweep.startImage();
       const TrackerEstimate estimate = see(swarm, test::Seen{map, scores, image});
