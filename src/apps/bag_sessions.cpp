@@ -192,12 +192,13 @@ void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOp
   const BagReader bag(path);
   PlottedSession session{sessionName(path, sessions), {}, {}};
   Receiver receiver = receiverOf(bag, options, config, session.remarks);
-  const SessionCamera camera = cameraOf(bag, options, mountOf(bag, options, config, receiver.frame, session.remarks));
+  SessionCamera camera = cameraOf(bag, options, mountOf(bag, options, config, receiver.frame, session.remarks));
   for (const Remark& pause : breaksOf(receiver.fixes, config.trajectory)) session.remarks.push_back(pause);
   const ClockCheck clock =
       checkClock(bag, bag.images(options.image_topic), receiver.fixes, config, camera.mount, options.threads);
   session.remarks.push_back(clock.remark);
   session.fixes = putRight(std::move(receiver.fixes), clock);
+  camera.clock_sigma_s = std::max(camera.clock_sigma_s, clock.sigma_s);
   addTo(builder, bag, options, std::move(session), camera, sessions, [](std::int64_t) { return true; });
 }
 

@@ -168,6 +168,9 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
   for (const SessionImages& session : report.session_images) {
     if (geometry.enabled) printGeometry(session, geometry);
   }
+  for (const SessionImages& session : report.session_images) {
+    std::cout << session.name << ": expected error of its positions " << describe(session.fixes) << '\n';
+  }
   for (const SessionImages& session : report.session_images) printOtherSizes(session);
   for (const SessionImages& session : report.session_images) {
     if (sessions.size() > 1 || session.recorded != report.image_size) printImages(session, report.image_size);

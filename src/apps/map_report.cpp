@@ -180,6 +180,16 @@ void printCameras(std::ostream& out, const TrainingMap& map) {
   }
 }
 
+/// What the receivers leave in the positions.
+void printErrors(std::ostream& out, const TrainingMap& map) {
+  const std::vector<Session>& sessions = map.header().sessions;
+  for (std::size_t s = 0; s < std::min(sessions.size(), kMostSessions); ++s) {
+    out << key(s == 0 ? "errors" : "");
+    if (sessions.size() > 1) out << s << ": ";
+    out << (sessions[s].fixes ? describe(*sessions[s].fixes) : "not known: built before map version 8") << '\n';
+  }
+}
+
 void printCoverage(std::ostream& out, const TrainingMap& map, const MapSurvey& survey) {
   const Area& area = map.area();
   const double cell_m2 = SightGrid::kCell_m * SightGrid::kCell_m;
@@ -301,6 +311,7 @@ void printMapReport(std::ostream& out, const std::string& path, const TrainingMa
   printLandmarks(out, map, findings.landmarks);
   printSessions(out, map, findings.survey);
   printCameras(out, map);
+  printErrors(out, map);
   printCoverage(out, map, findings.survey);
   printDensity(out, map, findings);
   printHeadings(out, map, findings.survey);

@@ -114,9 +114,11 @@ ClockCheck judged(const std::optional<ClockOffset>& found) {
     check.remark = {"clocks: not checked: pictures turn against the path: images are mirrored or upside down", true};
   } else if (isOffset(*found)) {
     check.offset_s = found->offset_s;
+    check.sigma_s = found->sigma_s;
     check.remark = {"clocks: by the turns, fixes are stamped " + inWords(*found) + ": corrected"};
   } else {
     const double within_s = std::max(std::abs(found->offset_s), 2.0 * found->sigma_s);
+    check.sigma_s = std::hypot(found->offset_s, found->sigma_s);
     check.remark = {"clocks: by the turns, fixes and images agree within " + seconds(within_s)};
   }
   return check;
@@ -200,7 +202,7 @@ ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::
   requireCommonTime(bag, images, of_images, of_fixes);
   const std::vector<PictureShift> pictures = motion.finish();
   const Paths paths = pathsOf(fixes, config.trajectory);
-  if (const auto step = stepOf(pictures, paths)) return {0.0, false, *step};
+  if (const auto step = stepOf(pictures, paths)) return {0.0, 0.0, false, *step};
   std::optional<ClockOffset> found = offsetOf(pictures, paths);
   const auto exchanged =
       agrees(found) ? std::nullopt : offsetOf(pictures, pathsOf(exchangedIn(fixes), config.trajectory));

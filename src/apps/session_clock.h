@@ -13,6 +13,7 @@ namespace visual_localization::apps {
 /// What the stamps of a recording's fixes say against those of its images.
 struct ClockCheck {
   double offset_s = 0.0;   ///< to be taken off the fixes' stamps
+  double sigma_s = 0.0;    ///< of what is left then; 0: not checked
   bool exchanged = false;  ///< the fixes' latitude and longitude are to be exchanged
   Remark remark;
 };

@@ -106,6 +106,19 @@ class Adjustment {
     return sigmas;
   }
 
+  /// Parameters of some that move, spread over all.
+  std::vector<std::pair<double*, int>> someCameras() {
+    constexpr std::size_t kSome = 7;
+    std::vector<std::pair<double*, int>> moving;
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      if (window_.moves(i)) moving.emplace_back(cameras_[i].data(), 6);
+    }
+    std::vector<std::pair<double*, int>> some;
+    const std::size_t stride = strideFor(moving.size(), kSome);
+    for (std::size_t i = stride / 2; i < moving.size(); i += stride) some.push_back(moving[i]);
+    return some;
+  }
+
  private:
   static constexpr double kRegular = 1e-9;  ///< on the diagonal: a landmark at a great distance is hardly determined
 
@@ -171,11 +184,11 @@ class Adjustment {
       double* bias = session.fix_bias_m.data();
       double* delay = &session.fix_delay_s;
       if (!ceres_.HasParameterBlock(bias)) continue;
-      ceres_.AddResidualBlock(automatic<PriorResidual<2>, 2, 2>({Eigen::Vector2d::Constant(config_.fix_bias_sigma_m)}),
+      ceres_.AddResidualBlock(automatic<PriorResidual<2>, 2, 2>({Eigen::Vector2d::Constant(session.fix_bias_sigma_m)}),
                               nullptr, bias);
       if (problem_.sessions.size() == 1) ceres_.SetParameterBlockConstant(bias);
       ceres_.AddResidualBlock(
-          automatic<PriorResidual<1>, 1, 1>({Eigen::Matrix<double, 1, 1>(config_.fix_delay_sigma_s)}), nullptr, delay);
+          automatic<PriorResidual<1>, 1, 1>({Eigen::Matrix<double, 1, 1>(session.fix_delay_sigma_s)}), nullptr, delay);
     }
   }
 
@@ -304,12 +317,20 @@ double adjust(BundleProblem& problem, const BundleConfig& config, const BundleWi
 
 SharedSigmas sharedSigmas(BundleProblem problem, const BundleConfig& config, const BundleWindow& window) {
   Adjustment adjustment(problem, config, window);
-  const std::vector<double> sigmas =
-      adjustment.sigmasOf({{problem.lenses.front().correction.data(), 6}, {&problem.sessions.front().fix_delay_s, 1}});
+  std::vector<std::pair<double*, int>> blocks{{problem.lenses.front().correction.data(), 6},
+                                              {&problem.sessions.front().fix_delay_s, 1}};
+  const std::vector<std::pair<double*, int>> cameras = adjustment.someCameras();
+  blocks.insert(blocks.end(), cameras.begin(), cameras.end());
+  const std::vector<double> sigmas = adjustment.sigmasOf(blocks);
   SharedSigmas shared;
   if (sigmas.empty()) return shared;
   shared.lens = Eigen::Map<const LensCorrection>(sigmas.data());
-  shared.fix_delay_s = sigmas.back();
+  shared.fix_delay_s = sigmas[6];
+  std::vector<double> horizontal_m;
+  for (std::size_t i = 7; i < sigmas.size(); i += 6) {
+    horizontal_m.push_back(std::sqrt(0.5) * std::hypot(sigmas[i + 3], sigmas[i + 4]));
+  }
+  shared.position_m = median(std::move(horizontal_m));
   return shared;
 }
 

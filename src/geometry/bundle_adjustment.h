@@ -65,9 +65,11 @@ struct BundleSession {
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();        ///< see AveragedRotations
   Eigen::Vector3d mounting_sigma_rad{0.5, 0.5, 0.02};            ///< of that: pitch, yaw, roll of a level camera
   Eigen::Vector2d fix_bias_m = Eigen::Vector2d::Zero();  ///< its fixes are this far off; not for a single session
+  double fix_bias_sigma_m = 0.3;                         ///< of that, per axis
   Eigen::Vector3d antenna_m = Eigen::Vector3d::Zero();   ///< in the camera's optical frame; known
   double fix_height_m = 0.0;                             ///< its altitudes are this far off
   double fix_delay_s = 0.0;  ///< a fix says where the antenna was this long before its stamp, by the clock of images
+  double fix_delay_sigma_s = 0.1;
 };
 
 /// Cameras session by session, each in order of time, what they saw, and what is known besides.
@@ -89,8 +91,6 @@ struct BundleConfig {
   double position_loss = 1.0;  ///< scale of the loss of a fix, sigmas: Cauchy's if believed, else Geman and McClure's
   Eigen::Vector3d tilt_sigma_rad{0.02, 0.1, 0.02};  ///< of a robot about its direction of travel: pitch, yaw, roll
   double slope_sigma = 0.1;                         ///< rise over run
-  double fix_bias_sigma_m = 0.3;                    ///< per axis, of a session's fixes
-  double fix_delay_sigma_s = 0.1;
   int max_iterations = 50;
   double tolerance = 1e-4;  ///< relative change of the cost at which it ends
   /// One sigma of each entry of a calibration; zero: all calibrations stay as they are.
@@ -126,6 +126,7 @@ void moveAsOne(BundleProblem& problem, const BundleConfig& config);
 struct SharedSigmas {
   LensCorrection lens = LensCorrection::Zero();  ///< of the first lens
   double fix_delay_s = 0.0;                      ///< of the first session
+  double position_m = 0.0;                       ///< of a camera that moves, per horizontal axis; of some the median
 };
 /// Of an adjusted problem, by the curvature of its cost there. Zero where nothing depends on it.
 SharedSigmas sharedSigmas(BundleProblem problem, const BundleConfig& config, const BundleWindow& window = {});

@@ -1,6 +1,8 @@
 #include "geometry/reconstruction.h"
 
 #include <algorithm>
+#include <cstdlib>
+#include <iostream>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -28,14 +30,12 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
                          const AveragedRotations& rotations, const std::vector<double>& directions,
                          const FeatureSets& sets) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
-  std::vector<double> sigmas_m;
   for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
-    sigmas_m.push_back(fix.sigma_m);
     fix.image += begin;
     fix.sigma_m *= config_.fix_correlation;
     fixes_.push_back(fix);
   }
-  fix_sigmas_m_.push_back(sigmas_m.empty() ? config_.fix_sigma_m : median(sigmas_m));
+  budgets_.emplace_back();
   const Eigen::Vector3d antenna_m = session.mount.antennaInCamera_m();
   BundleSession& added = problem_.sessions.emplace_back();
   added.begin = begin;
@@ -45,6 +45,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
   added.mounting_sigma_rad = mounting.sigma_rad;
   added.mounting_rad = rotations.mounting_rad;
   added.antenna_m = antenna_m;
+  added.fix_delay_sigma_s = session.clock_sigma_s;
   const PathHeights heights = pathHeights(session.images, session.fixes);
   for (std::size_t i = 0; i < session.images.size(); ++i) {
     const TrajectoryPoint& image = session.images[i];
@@ -90,7 +91,7 @@ void Reconstruction::append(const Reconstruction& other) {
   }
   const auto add = [](const auto& from, auto& to) { to.insert(to.end(), from.begin(), from.end()); };
   add(other.sessions_, sessions_);
-  add(other.fix_sigmas_m_, fix_sigmas_m_);
+  add(other.budgets_, budgets_);
   add(other.problem_.cameras, problem_.cameras);
   add(other.problem_.road, problem_.road);
   sets_.append(other.sets_);
@@ -125,6 +126,7 @@ void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d
 }
 
 void Reconstruction::tie(const std::vector<ImagePair>& ties) {
+  for (std::size_t k = 0; k < sessions(); ++k) problem_.sessions[k].fix_bias_sigma_m = budgets_[k].sigma_m;
   orderBy(ties);
   for (const ImagePair& pair : ties) sets_.join(pair);
 }
@@ -327,7 +329,7 @@ void Reconstruction::keepSignificant() {
   double& delay_s = problem_.sessions.front().fix_delay_s;
   if (std::abs(delay_s) > kSignificantDelay * shared_.fix_delay_s) return;
   delay_s = shared_.fix_delay_s = 0.0;
-  bundle_.fix_delay_sigma_s = kHeld;
+  problem_.sessions.front().fix_delay_sigma_s = kHeld;
 }
 
 /// The rays of all keypoints from a session on, by the lenses as they are now.

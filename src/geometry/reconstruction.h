@@ -11,6 +11,7 @@
 
 #include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
+#include "geometry/fix_budget.h"
 #include "geometry/rays.h"
 #include "geometry/relative_rotation.h"
 #include "geometry/session_geometry.h"
@@ -19,9 +20,23 @@
 
 namespace visual_localization {
 
-/// Where the fixes have each image: of those around it (nearer to it than to the next image, half a second at most) the
-/// median, axis by axis, moved along the cleaned path to the moment of the image, and the median of their sigmas, 2 cm
-/// to 10 m, and the velocity along that path; `sigma_m` for fixes without one. Images without such fixes have none.
+/// A fix, moved along the cleaned path to the moment of the image that it is nearest to.
+struct FixAtImage {
+  std::uint32_t image = 0;
+  std::int64_t stamp_ns = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  double sigma_m = 0.0;                                    ///< per axis, 2 cm to 10 m
+  Eigen::Vector2d velocity_m_s = Eigen::Vector2d::Zero();  ///< along that path
+  bool believed = true;
+};
+
+/// Of those around each image (nearer to it than to the next image, half a second at most), in order of time; `sigma_m`
+/// for fixes without one.
+std::vector<FixAtImage> fixesAtImages(const std::vector<TrajectoryPoint>& images, const std::vector<MapFix>& fixes,
+                                      double sigma_m);
+
+/// Where the fixes have each image: the median of fixesAtImages(), axis by axis, and of their sigmas, and the velocity
+/// along that path; of those alone that are believed, if there are any. Images without such fixes have none.
 std::vector<PositionObservation> positionsAt(const std::vector<TrajectoryPoint>& images,
                                              const std::vector<MapFix>& fixes, double sigma_m);
 
@@ -93,6 +108,8 @@ class Reconstruction {
   /// What the images do not tell apart from nothing stays as it was published from now on: entries of the lenses, and
   /// the delay of the fixes.
   void keepSignificant();
+  /// Finds what errors of the receiver may have left in a single session, which has been adjusted.
+  void findBudget();
   /// What it came to, session by session; landmark ids begin with `first_id`.
   std::vector<SessionGeometry> results(std::uint32_t first_id) const;
 
@@ -119,8 +136,9 @@ class Reconstruction {
   bool isAstray(std::size_t image) const;
   double distance_m(const Landmark& landmark) const;
   std::vector<TiedSessions> tiedSessions() const;
-  double mapSigma_m(const TiedSessions& tied) const;
-  ImageGeometry imageAt(std::size_t image, const TiedSessions& tied) const;
+  CommonBudget commonBudgetOf(const std::vector<TiedSessions>& tied) const;
+  double mapSigma_m(const TiedSessions& tied, const CommonBudget& common) const;
+  ImageGeometry imageAt(std::size_t image, double sigma_m) const;
   void addLandmark(const FeatureTrack& track, double gate_px);
   std::size_t addLens(const BundleLens& lens);
   void adjustWindows();
@@ -133,13 +151,14 @@ class Reconstruction {
   std::vector<bool> confirmedByFixes() const;
   std::vector<double> distancesFromFixes_m() const;
   std::vector<std::optional<double>> distancesOffFixes() const;
+  std::vector<FixResidual> fixResiduals(std::size_t session) const;
   std::optional<double> usual(const std::vector<std::optional<double>>& values, std::size_t image) const;
   void addPath(std::vector<ImageGeometry> images, std::vector<SessionGeometry>& geometries) const;
 
   const GeometryConfig& config_;
   BundleConfig bundle_;
   std::vector<const UnadjustedSession*> sessions_;
-  std::vector<double> fix_sigmas_m_;  ///< of a usual fix of each session
+  std::vector<FixBudget> budgets_;  ///< of each session
   std::vector<Image> images_;
   std::vector<PositionObservation> fixes_;  ///< all of them
   FeatureSets sets_;                        ///< of what the images show

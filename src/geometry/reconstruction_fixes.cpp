@@ -107,36 +107,47 @@ std::optional<Line> lineAt(double along_m, const std::vector<Altitude>& altitude
 
 }  // namespace
 
-std::vector<PositionObservation> positionsAt(const std::vector<TrajectoryPoint>& images,
-                                             const std::vector<MapFix>& fixes, double sigma_m) {
+std::vector<FixAtImage> fixesAtImages(const std::vector<TrajectoryPoint>& images, const std::vector<MapFix>& fixes,
+                                      double sigma_m) {
   const Trajectory path(images);
-  std::vector<PositionObservation> positions;
+  std::vector<FixAtImage> found;
   auto fix = fixes.begin();
   for (std::size_t i = 0; i < images.size(); ++i) {
     const std::int64_t stamp_ns = images[i].stamp_ns;
     const std::int64_t before_ns = i == 0 ? kReach_ns : reach(images[i - 1].stamp_ns, stamp_ns);
     const std::int64_t after_ns = i + 1 == images.size() ? kReach_ns : reach(stamp_ns, images[i + 1].stamp_ns);
+    while (fix != fixes.end() && fix->stamp_ns < stamp_ns - before_ns) ++fix;
+    for (; fix != fixes.end() && fix->stamp_ns < stamp_ns + after_ns; ++fix) {
+      const std::optional<TrajectoryPoint> then = path.at(fix->stamp_ns);
+      if (!then) continue;
+      const double claimed_m =
+          fix->sigma_m > 0.0 ? std::clamp(fix->sigma_m, kSmallestSigma_m, kLargestSigma_m) : sigma_m;
+      found.push_back({static_cast<std::uint32_t>(i), fix->stamp_ns,
+                       fix->position_m + images[i].position_m - then->position_m, claimed_m, velocityAt_m_s(images, i),
+                       fix->believed});
+    }
+  }
+  return found;
+}
+
+std::vector<PositionObservation> positionsAt(const std::vector<TrajectoryPoint>& images,
+                                             const std::vector<MapFix>& fixes, double sigma_m) {
+  const std::vector<FixAtImage> all = fixesAtImages(images, fixes, sigma_m);
+  std::vector<PositionObservation> positions;
+  for (auto begin = all.begin(); begin != all.end();) {
+    const auto end = std::find_if(begin, all.end(), [&](const FixAtImage& one) { return one.image != begin->image; });
+    const bool believed = std::any_of(begin, end, [](const FixAtImage& one) { return one.believed; });
     std::vector<double> east;
     std::vector<double> north;
     std::vector<double> sigmas_m;
-    while (fix != fixes.end() && fix->stamp_ns < stamp_ns - before_ns) ++fix;
-    const auto begin = fix;
-    while (fix != fixes.end() && fix->stamp_ns < stamp_ns + after_ns) ++fix;
-    const bool believed = std::any_of(begin, fix, [](const MapFix& one) { return one.believed; });
-    for (auto one = begin; one != fix; ++one) {
-      const std::optional<TrajectoryPoint> then = path.at(one->stamp_ns);
-      if (!then || one->believed != believed) continue;
-      const Eigen::Vector2d moved = one->position_m + images[i].position_m - then->position_m;
-      east.push_back(moved.x());
-      north.push_back(moved.y());
-      sigmas_m.push_back(one->sigma_m > 0.0 ? std::clamp(one->sigma_m, kSmallestSigma_m, kLargestSigma_m) : sigma_m);
+    for (auto one = begin; one != end; ++one) {
+      if (one->believed != believed) continue;
+      east.push_back(one->position_m.x());
+      north.push_back(one->position_m.y());
+      sigmas_m.push_back(one->sigma_m);
     }
-    if (east.empty()) continue;
-    positions.push_back({static_cast<std::uint32_t>(i),
-                         {median(east), median(north)},
-                         median(sigmas_m),
-                         velocityAt_m_s(images, i),
-                         believed});
+    positions.push_back({begin->image, {median(east), median(north)}, median(sigmas_m), begin->velocity_m_s, believed});
+    begin = end;
   }
   return positions;
 }

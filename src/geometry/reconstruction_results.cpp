@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/numbers.h"
+#include "base/time.h"
 #include "geometry/bundle_adjustment.h"
 #include "geometry/rays.h"
 #include "geometry/reconstruction.h"
@@ -24,6 +25,7 @@ constexpr double kOffFixes = 3.7;
 constexpr double kLeastExplained = 1.0 / 3.0;  ///< of what is matched; leaves and people move
 constexpr double kAttitudeSigma_rad = 0.004;   ///< of a training image in the map
 constexpr double kDrift = 0.04;                ///< metres that images stray in a metre without fixes, one sigma
+constexpr double kLeastSigma_m = 0.01;         ///< of a path
 
 }  // namespace
 
@@ -33,7 +35,12 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   std::vector<std::size_t> tracked(sessions_.size());
   std::vector<ImageGeometry> images(images_.size());
   const std::vector<TiedSessions> tied = tiedSessions();
-  for (std::size_t i = 0; i < images.size(); ++i) images[i] = imageAt(i, tied[i]);
+  const CommonBudget common = commonBudgetOf(tied);
+  std::vector<std::vector<double>> sigmas_m(sessions_.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    sigmas_m[sessionOf(i)].push_back(mapSigma_m(tied[i], common));
+    images[i] = imageAt(i, sigmas_m[sessionOf(i)].back());
+  }
   for (const Landmark& landmark : problem_.landmarks) {
     const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_);
     ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
@@ -62,6 +69,8 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
     geometry.focal_scale = std::exp(lensCorrection(k)[kFocalLength]);
     geometry.focal_sigma = shared_.lens[kFocalLength];
     geometry.delay_sigma_s = shared_.fix_delay_s;
+    geometry.fixes = budgets_[k];
+    geometry.fixes.sigma_m = median(std::move(sigmas_m[k]));
   }
   return geometries;
 }
@@ -88,23 +97,73 @@ std::vector<Reconstruction::TiedSessions> Reconstruction::tiedSessions() const {
   return tied;
 }
 
-/// Receivers err slowly, each recording by itself: where several are tied, their errors average out. Where no fix
-/// confirms the path, images stray from it.
-double Reconstruction::mapSigma_m(const TiedSessions& tied) const {
-  double information = 0.0;
-  for (const auto& [session, away_m] : tied) {
-    const double bias_m = std::max(config_.fix_bias * fix_sigmas_m_[session], 0.01);
-    const double drift_m = kDrift * away_m;
-    information += 1.0 / (bias_m * bias_m + drift_m * drift_m);
+/// Of the believed fixes of a session from the adjusted path. Its bias is left in.
+std::vector<FixResidual> Reconstruction::fixResiduals(std::size_t session) const {
+  const UnadjustedSession& of = *sessions_[session];
+  const double delay_s = problem_.sessions[session].fix_delay_s;
+  std::vector<FixResidual> residuals;
+  for (const FixAtImage& fix : fixesAtImages(of.images, of.fixes, config_.fix_sigma_m)) {
+    if (!fix.believed) continue;
+    const std::size_t image = begin(session) + fix.image;
+    const Eigen::Vector3d antenna_m = antennaInMap_m(problem_.cameras[image], image);
+    residuals.push_back({secondsBetween(of.images.front().stamp_ns, fix.stamp_ns),
+                         fix.position_m + delay_s * fix.velocity_m_s - antenna_m.head<2>(), fix.sigma_m});
   }
-  return 1.0 / std::sqrt(information);
+  return residuals;
 }
 
-ImageGeometry Reconstruction::imageAt(std::size_t image, const TiedSessions& tied) const {
+void Reconstruction::findBudget() {
+  FixBudget& budget = budgets_.front();
+  budget = fixBudget(fixResiduals(0));
+  budget.assumed = claimNothing(sessions_.front()->fixes);
+  if (budget.declared_m == 0.0) budget.sigma_m = budget.declared_m = config_.fix_sigma_m;  // no fixes
+  budget.sigma_m = std::max({budget.sigma_m, shared_.position_m, kLeastSigma_m});
+}
+
+/// Of those sessions that see something together.
+CommonBudget Reconstruction::commonBudgetOf(const std::vector<TiedSessions>& tied) const {
+  std::vector<bool> is_tied(sessions_.size());
+  for (const TiedSessions& together : tied) {
+    for (const auto& [session, away_m] : together) is_tied[session] = is_tied[session] || together.size() > 1;
+  }
+  std::vector<TiedBudget> budgets;
+  for (std::size_t k = 0; k < sessions_.size(); ++k) {
+    if (!is_tied[k]) continue;
+    std::vector<Eigen::Vector3d> off_m;
+    for (const FixResidual& fix : fixResiduals(k)) off_m.emplace_back(fix.off_m.x(), fix.off_m.y(), 0.0);
+    const std::vector<TrajectoryPoint>& images = sessions_[k]->images;
+    budgets.push_back({budgets_[k], off_m.empty() ? Eigen::Vector2d::Zero().eval() : medianOf(off_m).head<2>().eval(),
+                       secondsBetween(0, images.front().stamp_ns), secondsBetween(0, images.back().stamp_ns)});
+  }
+  const CommonBudget of_tied = commonBudget(budgets);
+  CommonBudget common{std::vector<std::size_t>(sessions_.size()), of_tied.stretch};
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < sessions_.size(); ++k) {
+    if (is_tied[k]) common.receivers[k] = of_tied.receivers[next++];
+  }
+  return common;
+}
+
+/// Receivers err each by itself: where several are tied, their errors average out. Where no fix confirms the path,
+/// images stray from it.
+double Reconstruction::mapSigma_m(const TiedSessions& tied, const CommonBudget& common) const {
+  const double stretch = tied.size() > 1 ? common.stretch : 1.0;
+  std::map<std::size_t, double> information;  // of each receiver
+  for (const auto& [session, away_m] : tied) {
+    const double bias_m = std::max(stretch * budgets_[session].sigma_m, kLeastSigma_m);
+    const double drift_m = kDrift * away_m;
+    double& best = information[common.receivers[session]];
+    best = std::max(best, 1.0 / (bias_m * bias_m + drift_m * drift_m));
+  }
+  double sum = 0.0;
+  for (const auto& [receiver, of_receiver] : information) sum += of_receiver;
+  return 1.0 / std::sqrt(sum);
+}
+
+ImageGeometry Reconstruction::imageAt(std::size_t image, double sigma_m) const {
   ImageGeometry geometry;
   geometry.camera = problem_.cameras[image];
   Eigen::Matrix<double, 6, 1> sigmas;
-  const double sigma_m = mapSigma_m(tied);
   sigmas << sigma_m, sigma_m, sigma_m, kAttitudeSigma_rad, kAttitudeSigma_rad, kAttitudeSigma_rad;
   geometry.covariance = sigmas.cwiseAbs2().asDiagonal();
   return geometry;

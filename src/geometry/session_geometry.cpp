@@ -178,6 +178,7 @@ class SessionAdjuster {
     reconstruction_.keepSignificant();
     reconstruction_.moveAsOne();
     reconstruction_.adjustAndPrune(kFine, Reconstruction::kMinViews);
+    reconstruction_.findBudget();
   }
 
   const UnadjustedSession& session_;
@@ -359,12 +360,11 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"geometry/fix_correlation", "1",
                 "fixes err alike for many images: this multiple of their sigma is that of one image's position"},
                fix_correlation, 1.0, 100.0);
-  visitor.real({"geometry/fix_loss", "1",
-                "fixes much farther from the adjusted path than this multiple of that sigma have no influence"},
-               fix_loss, 0.01, 1000.0);
-  visitor.real({"geometry/fix_bias", "1",
-                "what slow errors of the receiver leave in the map, per axis, as a multiple of a fix's sigma"},
-               fix_bias, 0.0, 100.0);
+  visitor.real(
+      {"geometry/fix_loss", "1",
+       "scale of the robust loss of a fix, as a multiple of that sigma: of fixes that cleaning believes Cauchy's, of "
+       "the others Geman and McClure's, by which one that is much farther off has no influence"},
+      fix_loss, 0.01, 1000.0);
   visitor.integer(
       {"geometry/window", "1",
        "images adjusted at a time: more of them, alone or tied, one stretch after the other; limits memory"},

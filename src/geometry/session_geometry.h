@@ -16,6 +16,7 @@
 #include "visual_localization/features/sift.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/camera_pose.h"
+#include "visual_localization/geometry/fix_budget.h"
 #include "visual_localization/geometry/image_geometry.h"
 
 namespace visual_localization {
@@ -37,7 +38,8 @@ struct UnadjustedSession {
   std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>();    ///< of these features
   const CameraModel* camera = nullptr;
   SensorMount mount;
-  std::vector<MapFix> fixes;  ///< in order of time
+  std::vector<MapFix> fixes;   ///< in order of time
+  double clock_sigma_s = 0.1;  ///< how well their stamps are known to agree with those of the images
 };
 
 /// What the adjustment of a session came to, with all poses and landmarks.
@@ -45,6 +47,7 @@ struct SessionGeometry : SessionLandmarks {
   std::vector<std::optional<ImageGeometry>> images;        ///< nothing where too few landmarks are seen
   Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero();  ///< see AveragedRotations
   Intrinsics lens;                                         ///< the calibration as the images have it
+  FixBudget fixes;  ///< how far off its positions may be; where sessions are tied, those of all together
 };
 
 /// Landmarks and camera poses of sessions from their images and fixes: matches of neighbouring images and of those that

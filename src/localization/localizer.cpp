@@ -25,6 +25,12 @@ CameraModel adjustedCamera(const MapHeader& map, const CameraModel& published) {
   return published;
 }
 
+/// Of the positions of a session, by errors of its receiver that last.
+double mapVariance_m2(const TrainingMap& map, std::size_t image) {
+  const auto& fixes = map.header().sessions[static_cast<std::size_t>(map.pose(image).session)].fixes;
+  return fixes ? fixes->sigma_m * fixes->sigma_m : 0.0;
+}
+
 }  // namespace
 
 Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config)
@@ -313,7 +319,7 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
   PoseEstimate pose;
   pose.position_m = positionOf_m(tracked, recognised);
   pose.covariance_m2 = state == LocalizationState::kTracking ? tracked.mode_covariance_m2 : tracked.cloud_covariance_m2;
-  pose.covariance_m2 += floor_m2 * Eigen::Matrix2d::Identity();
+  pose.covariance_m2 += (floor_m2 + mapVariance_m2(*map_, tracked.best_image)) * Eigen::Matrix2d::Identity();
   const Heading heading =
       headingAt(*map_, pose.position_m, recognised ? std::optional(tracked.best_image) : std::nullopt, neighbours_);
   pose.yaw_rad = heading.yaw_rad;

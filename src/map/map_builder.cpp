@@ -8,6 +8,7 @@
 #include "base/files.h"
 #include "base/time.h"
 #include "features/image_size.h"
+#include "geometry/fix_budget.h"
 #include "map/extraction_pool.h"
 #include "map/map_geometry.h"
 #include "map/map_writer.h"
@@ -187,15 +188,25 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
   if (config_.geometry.enabled && config_.geometry.self_calibration) calibrate(*unpruned);
   std::vector<std::optional<SessionGeometry>> geometries(header_.sessions.size());
-  if (adjusts()) geometries = geometryOf(*unpruned, header_.sessions, fixes_, config_.geometry, resources_.threads);
+  std::vector<double> clock_sigmas_s;
+  for (const SessionImages& session : report_.session_images) clock_sigmas_s.push_back(session.camera.clock_sigma_s);
+  if (adjusts()) {
+    geometries = geometryOf(*unpruned, header_.sessions, fixes_, clock_sigmas_s, config_.geometry, resources_.threads);
+  }
   for (std::size_t i = 0; i < geometries.size(); ++i) {
+    FixBudget& budget = report_.session_images[i].fixes;
+    budget = fixBudget(report_.sessions[i].trajectory, fixes_[i], config_.geometry.fix_sigma_m);
+    header_.sessions[i].fixes = budget;
     if (!geometries[i]) continue;
     report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks
     Session& session = header_.sessions[i];
     if (geometries[i]->contradicts_calibration || geometries[i]->contradicts_fixes) {
       geometries[i].reset();
       session.camera.reset();
-    } else if (const CameraModel adjusted(geometries[i]->lens); adjusted != *session.camera) {
+      continue;
+    }
+    session.fixes = budget = geometries[i]->fixes;
+    if (const CameraModel adjusted(geometries[i]->lens); adjusted != *session.camera) {
       session.published = std::exchange(session.camera, adjusted);
     }
   }

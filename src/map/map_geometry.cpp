@@ -314,6 +314,7 @@ void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry
 std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& unpruned,
                                                        const std::vector<Session>& sessions,
                                                        const std::vector<std::vector<MapFix>>& fixes,
+                                                       const std::vector<double>& clock_sigmas_s,
                                                        const GeometryConfig& config, std::size_t threads) {
   const std::vector<std::size_t> begin = begins(unpruned, sessions.size());
   std::vector<UnadjustedSession> calibrated;
@@ -321,6 +322,7 @@ std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& unprun
   for (std::size_t k = 0; k < sessions.size(); ++k) {
     if (!sessions[k].camera) continue;
     calibrated.push_back(unadjusted(unpruned, begin[k], begin[k + 1], sessions[k], fixes[k]));
+    calibrated.back().clock_sigma_s = clock_sigmas_s[k];
     which.push_back(k);
   }
   std::vector<SessionGeometry> adjusted = adjustSessions(calibrated, config, threads);

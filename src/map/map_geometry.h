@@ -103,11 +103,12 @@ std::vector<TrajectoryPoint> adjustedPath(const std::vector<TrajectoryPoint>& by
 void placeByCamera(TrainingImage& image, const SensorMount& mount, ImageGeometry geometry);
 
 /// Landmarks and poses of the sessions that have a camera, from their images, which follow each other session by
-/// session. Not pruned: what only images farther apart have in common holds the path together as well. `fixes`: of each
-/// session.
+/// session. Not pruned: what only images farther apart have in common holds the path together as well. `fixes` and
+/// `clock_sigmas_s`: of each session.
 std::vector<std::optional<SessionGeometry>> geometryOf(const TrainingMap& unpruned,
                                                        const std::vector<Session>& sessions,
                                                        const std::vector<std::vector<MapFix>>& fixes,
+                                                       const std::vector<double>& clock_sigmas_s,
                                                        const GeometryConfig& config, std::size_t threads);
 
 /// Cameras of the sessions that have none, by their images: see calibrateByImages() of a single one.

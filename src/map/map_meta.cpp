@@ -16,9 +16,11 @@ namespace {
 constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
 constexpr const char* kPublished = "/published_camera/";
 constexpr const char* kMount = "/mount/";  ///< likewise
+constexpr const char* kFixes = "/fixes/";  ///< likewise
 constexpr const char* kMask = "/mask";
 constexpr const char* kKind = "features/kind";
 constexpr const char* kDimension = "features/dimension";  ///< of a descriptor
+constexpr double kLargestBudget = 1e9;                    ///< metres or seconds
 constexpr const char* kGeometryCount = "geometry/images";
 constexpr const char* kHistory = "history/";  ///< before the number of the edit
 
@@ -135,6 +137,31 @@ std::optional<SensorMount> takeMount(ParameterValues& meta, const std::string& s
   return mount;
 }
 
+ParameterValues toValues(const FixBudget& fixes) {
+  return {{"declared_m", fixes.declared_m}, {"assumed", std::int64_t{fixes.assumed}},
+          {"residual_m", fixes.residual_m}, {"correlation_s", fixes.correlation_s},
+          {"duration_s", fixes.duration_s}, {"sigma_m", fixes.sigma_m}};
+}
+
+std::optional<FixBudget> takeFixes(ParameterValues& meta, const std::string& session) {
+  ParameterValues values = takeGroup(meta, session + kFixes);
+  if (values.empty()) return std::nullopt;
+  FixBudget fixes;
+  for (const auto& [name, to] : {std::pair<const char*, double*>{"declared_m", &fixes.declared_m},
+                                 {"residual_m", &fixes.residual_m},
+                                 {"correlation_s", &fixes.correlation_s},
+                                 {"duration_s", &fixes.duration_s},
+                                 {"sigma_m", &fixes.sigma_m}}) {
+    *to = take<double>(values, name);
+    if (*to >= 0.0 && *to <= kLargestBudget) continue;
+    throw std::runtime_error("meta value '" + session + kFixes + name + "' = " + std::to_string(*to) +
+                             " is not in [0, " + std::to_string(kLargestBudget) + "]");
+  }
+  fixes.assumed = takeFlag(values, "assumed");
+  if (values.empty()) return fixes;
+  throw std::runtime_error("meta value '" + session + kFixes + values.begin()->first + "' is unknown");
+}
+
 /// Of masks that differ, in memory; packed they are small.
 void requireMasks(std::size_t count, const cv::Size& size) {
   constexpr std::size_t kMost_bytes = std::size_t{256} << 20U;
@@ -206,6 +233,7 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
       session.mask = takeMask(meta, sessions.size(), masks, decoded);
     }
     if (version >= kSincePublished) session.published = takeCamera(meta, key, kPublished);
+    if (version >= kSinceFixes) session.fixes = takeFixes(meta, key);
     if (!session.mask.empty()) ++used;
     sessions.push_back(std::move(session));
   }
@@ -259,6 +287,9 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
     addCamera(session.published, key + kPublished, meta);
     if (session.mount) {
       for (const auto& [name, value] : toValues(*session.mount)) meta[key + kMount + name] = value;
+    }
+    if (session.fixes) {
+      for (const auto& [name, value] : toValues(*session.fixes)) meta[key + kFixes + name] = value;
     }
     if (session.mask.empty()) continue;
     const std::vector<std::uint8_t>& bits = *masks.insert(packMask(session.mask)).first;

@@ -47,6 +47,8 @@ constexpr int kSinceUpright = 7;
 
 /// From this version on a map says which kind of local features it holds.
 constexpr int kSinceKinds = 8;
+/// From this version on a session says how far off its positions may be.
+constexpr int kSinceFixes = 8;
 /// From this version on a session's camera may differ from the calibration that was published for it.
 constexpr int kSincePublished = 7;
 

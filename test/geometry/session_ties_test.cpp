@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "test/geometry/recorded_street.h"
+#include "test/support/stamps.h"
 
 namespace visual_localization {
 namespace {
@@ -30,6 +31,15 @@ RecordedDrive again(const std::vector<WorldPoint>& world, const Eigen::Vector2d&
   RecordedDrive drive = test::record(poses, world, kFixNoise_m, random);
   for (MapFix& fix : drive.fixes) fix.position_m += bias_m;
   return drive;
+}
+
+/// Receivers err anew on another day.
+UnadjustedSession onDay(int day, const RecordedDrive& drive) {
+  UnadjustedSession session = drive.unadjusted();
+  const std::int64_t later_ns = day * 86'400 * test::kSecond_ns;
+  for (TrajectoryPoint& image : session.images) image.stamp_ns += later_ns;
+  for (MapFix& fix : session.fixes) fix.stamp_ns += later_ns;
+  return session;
 }
 
 /// How far two sessions have what both see apart: the mean over landmarks that both name.
@@ -64,14 +74,27 @@ TEST(SessionGeometry, TwoTiedSessionsKnowWhereTheyAreBetterThanOne) {
   const auto world = test::pointsAlong(test::drive({}), kDensity, random);
   const std::vector<RecordedDrive> drives{again(world, {0.1, 0.0}, 22), again(world, {-0.1, 0.0}, 23)};
   const auto alone = adjustSessions({drives[0].unadjusted()}, {}, 1);
-  const auto tied = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  const auto tied = adjustSessions({onDay(0, drives[0]), onDay(1, drives[1])}, {}, 1);
   for (const SessionGeometry& session : tied) {
     for (std::size_t i = 0; i < session.images.size(); ++i) {
       const auto& covariance = session.images[i]->covariance;
-      EXPECT_NEAR(covariance(0, 0), 0.5 * alone.front().images[i]->covariance(0, 0), 1e-12);
+      const double of_one = alone.front().images[i]->covariance(0, 0);
+      EXPECT_LT(covariance(0, 0), 0.55 * of_one) << "the mean of two";
+      EXPECT_GT(covariance(0, 0), 0.5 * 4.0 / 6.0 * 0.9 * of_one) << "that agree: the prior of four stays";
       EXPECT_EQ(covariance(5, 5), alone.front().images[i]->covariance(5, 5));
     }
   }
+}
+
+TEST(SessionGeometry, TwoTiedSessionsOfOneHourKnowNoMoreThanOne) {
+  std::mt19937 random(21);
+  const auto world = test::pointsAlong(test::drive({}), kDensity, random);
+  const std::vector<RecordedDrive> drives{again(world, {0.1, 0.0}, 22), again(world, {-0.1, 0.0}, 23)};
+  const auto first = adjustSessions({drives[0].unadjusted()}, {}, 1);
+  const auto second = adjustSessions({drives[1].unadjusted()}, {}, 1);
+  const auto tied = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  const double better = std::min(first.front().fixes.sigma_m, second.front().fixes.sigma_m);
+  for (const SessionGeometry& session : tied) EXPECT_NEAR(session.fixes.sigma_m, better, 1e-9);
 }
 
 TEST(SessionGeometry, KnowsLessFarFromFixesUnlessAnotherSessionHasSome) {
@@ -80,7 +103,7 @@ TEST(SessionGeometry, KnowsLessFarFromFixesUnlessAnotherSessionHasSome) {
   std::mt19937 random(21);
   const auto world = test::pointsAlong(test::drive({}), kDensity, random);
   std::vector<RecordedDrive> drives{again(world, {0.0, 0.0}, 22), again(world, {0.0, 0.0}, 23)};
-  const auto all = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  const auto all = adjustSessions({onDay(0, drives[0]), onDay(1, drives[1])}, {}, 1);
   auto& fixes = drives[0].fixes;
   const auto at = [&](std::size_t image) {
     return fixes.begin() + static_cast<std::ptrdiff_t>(image * fixes.size() / drives[0].truth.size());
@@ -97,10 +120,11 @@ TEST(SessionGeometry, KnowsLessFarFromFixesUnlessAnotherSessionHasSome) {
     EXPECT_NEAR(std::sqrt(variance(alone, i) - near), 0.04 * away_m, 0.05) << i;
   }
   EXPECT_GT(variance(alone, (kFirst + kLast) / 2), near + 0.15 * 0.15);
-  const auto tied = adjustSessions({drives[0].unadjusted(), drives[1].unadjusted()}, {}, 1);
+  const auto tied = adjustSessions({onDay(0, drives[0]), onDay(1, drives[1])}, {}, 1);
   for (std::size_t i = 0; i < alone.images.size(); ++i) {
     EXPECT_LE(variance(tied[0], i), near) << i;
-    EXPECT_GE(variance(tied[0], i), 0.99 * variance(all[0], i)) << i;
+    // What fixes show about the path differs a little without ten seconds of them.
+    EXPECT_GE(variance(tied[0], i), 0.8 * variance(all[0], i)) << i;
   }
 }
 

@@ -27,7 +27,6 @@ struct GeometryConfig {
   double fix_sigma_m = 0.3;
   double fix_correlation = 3.3;
   double fix_loss = 1.0;
-  double fix_bias = 0.45;
   int window = 2000;
   int min_landmarks = 12;
   double spacing_m = 2.0;

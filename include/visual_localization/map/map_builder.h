@@ -16,6 +16,7 @@
 #include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/local_feature_kind.h"
 #include "visual_localization/geo/trajectory_cleaner.h"
+#include "visual_localization/geometry/fix_budget.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/training_map.h"
 
@@ -54,6 +55,7 @@ struct SessionCamera {
   Mask mask = {};                         ///< features under it are not used; empty: all are
   std::optional<SensorMount> mount = {};  ///< none: camera and antenna are where the robot is
   cv::Size image_size = {};               ///< of most of its images, pixels; empty: that of its first image
+  double clock_sigma_s = 0.1;             ///< how well the stamps of images and fixes are known to agree
 };
 
 /// What one session brought.
@@ -64,6 +66,7 @@ struct SessionImages {
   SessionCamera camera;
   bool calibrated_by_images = false;  ///< nobody gave `camera` a model: its images did
   SessionLandmarks geometry = {};     ///< complete when the map is built
+  FixBudget fixes = {};               ///< the same
   /// How many images had another size than `recorded`, by width and height in pixels.
   std::map<std::pair<int, int>, std::size_t> other_sizes = {};
 };

@@ -18,6 +18,7 @@
 #include "visual_localization/features/sift.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/camera_pose.h"
+#include "visual_localization/geometry/fix_budget.h"
 #include "visual_localization/geometry/image_geometry.h"
 
 namespace visual_localization {
@@ -66,6 +67,8 @@ struct Session {
   std::optional<SensorMount> mount = {};   ///< of the robot that recorded it; none: nobody said
   /// The calibration that `camera` was adjusted from, for the same images; none: it is as it was published.
   std::optional<CameraModel> published = {};
+  /// How far off its positions may be by its fixes; none: not known.
+  std::optional<FixBudget> fixes = {};
 };
 
 /// What holds for all images of a map.
