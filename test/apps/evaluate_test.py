@@ -184,8 +184,8 @@ class EvaluateTest(ProgramTest):
         self.assert_done(self.evaluate('--merge', self.whole))
         provenance = self.output / 'provenance.csv'
         text = provenance.read_text(encoding='utf-8')
-        self.assertIn('unit_format,3\n', text)
-        provenance.write_text(text.replace('unit_format,3\n', ''), encoding='utf-8')
+        self.assertIn('unit_format,4\n', text)
+        provenance.write_text(text.replace('unit_format,4\n', ''), encoding='utf-8')
         self.assert_refused(self.evaluate(), 1, 'another version (provenance.csv differs)')
 
     def test_the_report_can_be_drawn_again(self):

@@ -226,7 +226,7 @@ TEST(Experiment, RefusesMethodsThatCannotBeRun) {
                  {"name: swarm", "name: \"a\\nb\"", "'methods[0]/name' must be a name of one line"},
                  {"tracker: dpso", "tracker: crystal_ball", "(beside the trackers: exhaustive, sequence, topological)"},
                  {kBestMethod, "{name: x, tracker: exhaustive, features: hybrid}", "hybrid needs a tracker's cloud"},
-                 {kBestMethod, "{name: x, features: smell}", "one of sift, global, hybrid"},
+                 {kBestMethod, "{name: x, features: smell}", "one of sift, learned, global, hybrid"},
                  {kBestMethod, "{name: x, parameters: {prune: false}}", "'prune' holds for all methods"},
                  {kBestMethod, "{name: x, parameters: {nonsense: 1}}", "'nonsense' = 1 is unknown"},
                  {kBestMethod, "{name: x, parameters: 3}", "must be a mapping of parameter names to values"},

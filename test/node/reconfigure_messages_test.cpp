@@ -38,11 +38,26 @@ auto valueOf(const Parameters& parameters, const std::string& name) {
 }
 
 TEST_F(ReconfigureMessages, EverythingThatCanChangeIsDescribedAndNothingElse) {
-  const std::set<std::string> at_start{
-      "map",           "map_directory",  "map_cache_mb",     "image_transport", "tf_mode",      "global_frame_id",
-      "odom_frame_id", "base_frame_id",  "camera_info_file", "mask_file",       "camera_mount", "sift_backend",
-      "seed",          "tf_metric_only", "use_odometry",     "tf_rate",         "tf_smoothing", "usage_file",
-      "session_folder"};
+  const std::set<std::string> at_start{"map",
+                                       "map_directory",
+                                       "map_cache_mb",
+                                       "image_transport",
+                                       "tf_mode",
+                                       "global_frame_id",
+                                       "odom_frame_id",
+                                       "base_frame_id",
+                                       "camera_info_file",
+                                       "mask_file",
+                                       "camera_mount",
+                                       "sift_backend",
+                                       "seed",
+                                       "tf_metric_only",
+                                       "use_odometry",
+                                       "tf_rate",
+                                       "tf_smoothing",
+                                       "usage_file",
+                                       "session_folder",
+                                       "model"};
   std::set<std::string> expected;
   for (const auto& entry : parameters::values(declare_)) {
     if (at_start.count(entry.first) == 0) expected.insert(entry.first);
