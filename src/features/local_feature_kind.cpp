@@ -48,8 +48,6 @@ LocalFeatures LocalFeatureKind::unpack(Keypoints keypoints, const std::uint8_t* 
   return LocalFeatures(std::move(keypoints), std::vector<std::uint8_t>(bytes, bytes + size));
 }
 
-std::vector<std::shared_ptr<const LocalFeatureKind>> localFeatureKinds() { return registered(); }
-
 std::vector<std::string> localFeatureNames() {
   std::vector<std::string> names;
   for (const auto& kind : registered()) names.push_back(kind->name());

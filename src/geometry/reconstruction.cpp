@@ -1,8 +1,6 @@
 #include "geometry/reconstruction.h"
 
 #include <algorithm>
-#include <cstdlib>
-#include <iostream>
 #include <iterator>
 #include <optional>
 #include <utility>

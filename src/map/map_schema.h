@@ -23,8 +23,8 @@ namespace visual_localization::map_schema {
 /// "vlmp" in the file's header (PRAGMA application_id): tells a map from any other SQLite file.
 constexpr std::int64_t kApplicationId = 0x766C6D70;
 constexpr std::int64_t kMaxImages = 100'000'000;
-constexpr std::int64_t kMaxFeaturesPerImage = 20000;  ///< the time to match two images grows with its square
-constexpr std::int64_t kMaxDescriptorBytes = 1024;    ///< of one descriptor in a file
+constexpr std::int64_t kMaxFeaturesPerImage = kMostLocalFeatures;
+constexpr std::int64_t kMaxDescriptorBytes = 1024;  ///< of one descriptor in a file
 constexpr std::size_t kMaxSessions = 10'000;
 constexpr std::size_t kMaxNameBytes = 1000;      ///< of a session; each image that is exported has one
 constexpr std::size_t kMaxMetaValues = 400'000;  ///< a session has about 30

@@ -186,8 +186,8 @@ TEST(NativeSift, DenseNoiseHasNoMoreFeaturesThanCanBeMatched) {
   cv::Mat noise(2048, 2816, CV_8UC1);
   cv::RNG(7).fill(noise, cv::RNG::UNIFORM, 0, 256);
   const std::size_t kept = extract(noise).size();
-  EXPECT_GE(kept, static_cast<std::size_t>(SiftConfig::kMostFeatures)) << "there are more";
-  EXPECT_LE(kept, SiftConfig::kMostFeatures + 5U);
+  EXPECT_GE(kept, static_cast<std::size_t>(kMostLocalFeatures)) << "there are more";
+  EXPECT_LE(kept, kMostLocalFeatures + 5U);
 }
 
 TEST(NativeSift, RefusesWhatIsNoGreyImage) {

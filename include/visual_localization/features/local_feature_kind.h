@@ -65,10 +65,9 @@ class LocalFeatureKind {
   void requireSize(std::size_t keypoints, std::size_t size) const;
 };
 
-/// All kinds, each with its usual parameters.
-std::vector<std::shared_ptr<const LocalFeatureKind>> localFeatureKinds();
+/// Of all kinds.
 std::vector<std::string> localFeatureNames();
-/// One of them. Throws std::invalid_argument, naming those there are.
+/// One of them, with its usual parameters. Throws std::invalid_argument, naming those there are.
 std::unique_ptr<LocalFeatureKind> makeLocalFeatureKind(const std::string& name);
 /// One more kind, from now on; another one of the same name is replaced.
 void registerLocalFeatureKind(std::shared_ptr<const LocalFeatureKind> kind);

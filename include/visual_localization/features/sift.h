@@ -25,17 +25,13 @@ struct SiftConfig {
   bool upright = false;
   bool hellinger = false;
 
-  /// What holds instead of max_features 0: far more than an image with structure has, and few enough that dense noise,
-  /// with four features per 1000 pixels, is matched in a second or two; time grows with the square.
-  static constexpr int kMostFeatures = 20000;
-
   /// What survives another light and another season: many weak features of one orientation each, which a camera that
   /// keeps its roll needs no more of.
   static SiftConfig uprightHellinger();
 
   void declare(ParameterVisitor& visitor);
   /// How many features are kept, the strongest.
-  int mostFeatures() const { return max_features == 0 ? kMostFeatures : max_features; }
+  int mostFeatures() const { return max_features == 0 ? kMostLocalFeatures : max_features; }
 };
 
 /// Names of the extractors: our own, and OpenCV's. Their features can be matched with each other, so a map does not

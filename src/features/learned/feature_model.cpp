@@ -67,7 +67,7 @@ bool isPlane(const cv::Mat& output) { return output.dims == 4 && output.size[0] 
 
 }  // namespace
 
-FeatureModel::FeatureModel(const std::string& path) : path_(path) {
+FeatureModel::FeatureModel(const std::string& path) {
   const Silence silence;
   try {
     if (path.empty()) throw std::runtime_error("learned features need the ONNX file of their network (--model)");

@@ -42,7 +42,6 @@ class FeatureModel {
   void takeHead();
   void sample(const Level& level, double x, double y, float* to) const;
 
-  std::string path_;
   std::string checksum_;
   cv::dnn::Net net_;
   std::vector<std::string> names_;  ///< of the outputs: scores, descriptors level by level, head

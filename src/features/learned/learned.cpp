@@ -104,7 +104,7 @@ class LearnedExtractor final : public LocalExtractor {
 
 void LearnedConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"learned/max_features", "1", "keep at most this number of features, the strongest"}, max_features, 1,
-                  20000);
+                  kMostLocalFeatures);
   visitor.real({"learned/min_score", "1", "weakest accepted score of the network"}, min_score, 0.0, 1.0);
 }
 

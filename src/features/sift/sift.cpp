@@ -89,8 +89,8 @@ void SiftConfig::declare(ParameterVisitor& visitor) {
                1000.0);
   visitor.real({"sift/sigma", "px", "blur of the first scale"}, sigma_px, 0.5, 10.0);
   visitor.integer({"sift/max_features", "1",
-                   "keep at most this number of features, the strongest; 0: " + std::to_string(kMostFeatures)},
-                  max_features, 0, kMostFeatures);
+                   "keep at most this number of features, the strongest; 0: " + std::to_string(kMostLocalFeatures)},
+                  max_features, 0, kMostLocalFeatures);
   visitor.flag({"sift/upright", "",
                 "one orientation for all features: that of the image, as a camera that keeps its roll "
                 "sees it; otherwise that of the strongest gradients around each, as in the papers"},
