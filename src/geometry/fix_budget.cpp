@@ -137,12 +137,25 @@ bool claimNothing(const std::vector<MapFix>& fixes) {
   return 2 * without > static_cast<std::ptrdiff_t>(fixes.size());
 }
 
+namespace {
+
+/// By what the receiver claims and the residuals show alone.
+double sigmaByReceiver_m(const FixBudget& budget) {
+  const double hidden = std::max(0.0, std::pow(budget.declared_m, 2) - std::pow(budget.residual_m, 2));
+  const double mean = budget.duration_s > 0.0 ? budget.correlation_s / budget.duration_s : 1.0;
+  return std::sqrt(hidden + std::pow(budget.residual_m, 2) * mean);
+}
+
+}  // namespace
+
 std::string describe(const FixBudget& budget) {
+  constexpr double kMore = 1.1;
   std::ostringstream text;
   text << std::fixed << std::setprecision(2) << budget.sigma_m << " m per axis (one sigma): fixes "
        << (budget.assumed ? "claim no sigma, assumed (geometry/fix_sigma) " : "claim ") << budget.declared_m
        << " m and are " << budget.residual_m << " m off the path (rms), alike for " << std::setprecision(0)
        << budget.correlation_s << " of " << budget.duration_s << " s";
+  if (budget.sigma_m > kMore * sigmaByReceiver_m(budget)) text << "; the adjustment leaves more open than they do";
   return text.str();
 }
 

@@ -75,6 +75,12 @@ class ClocksTest(RecordingTest):
         self.assertAlmostEqual(self.offset(18.0), 18.0, delta=1.0)
         self.assertAlmostEqual(self.offset(18.0) - self.offset(-5.0), 23.0, delta=0.1)
 
+    def test_an_offset_that_is_not_sure_is_not_called_agreement(self):
+        said = self.said(self.with_fixes_later(2.0))
+        agreed = re.search(r'fixes and images agree within ([\d.]+) s', said)
+        self.assertFalse(agreed and float(agreed.group(1)) < 2.0, said)
+        self.assertRegex(said, r'leave up to [2-9]\.\d+ s open|: corrected')
+
     def test_clocks_that_agree_are_left_alone(self):
         said = self.said(SUNNY)
         self.assertRegex(said, r'clocks: by the turns, fixes and images agree within 0\.\d+ s')

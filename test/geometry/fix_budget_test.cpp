@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <random>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -110,6 +111,15 @@ TEST(FixBudget, FindsHowLongAReceiverErrsAlike) {
   };
   for (const double x : {0.25, 1.0, 4.0, 40.0}) EXPECT_NEAR(of(x) * x / 400.0, 1.0, 0.1) << x;
   EXPECT_DOUBLE_EQ(receiverCorrelation_s({1.0, false, 0.0, 0.0, 400.0, 1.0}), 3600.0);
+}
+
+TEST(FixBudget, SaysWhenTheAdjustmentLeavesMoreOpen) {
+  const auto saysMore = [](double sigma_m) {
+    return describe({0.05, false, 0.02, 1.0, 6.0, sigma_m}).find("the adjustment leaves more open") !=
+           std::string::npos;
+  };
+  EXPECT_FALSE(saysMore(0.047));
+  EXPECT_TRUE(saysMore(0.84));
 }
 
 FixBudget budgetOf(double sigma_m) { return {1.0, false, 0.9, 10.0, 400.0, sigma_m}; }
