@@ -38,7 +38,7 @@ void MetricConfig::declare(ParameterVisitor& visitor) {
                match_ratio, 0.1, 1.0);
   visitor.real({"metric/tolerance", "px", "farthest of an inlier from the projection of its landmark"}, tolerance_px,
                0.1, 100.0);
-  visitor.real({"metric/keypoint_sigma", "px", "standard deviation of the position of a small SIFT feature"},
+  visitor.real({"metric/keypoint_sigma", "px", "standard deviation of the position of a small local feature"},
                keypoint_sigma_px, 0.01, 100.0);
   visitor.integer({"metric/min_inliers", "1", "a pose on fewer landmarks is not believed"}, min_inliers, 6, 10000);
   visitor.integer({"metric/min_inliers_predicted", "1", "the same where the motion since the last pose predicts it"},

@@ -82,14 +82,15 @@ void StateConfig::declare(ParameterVisitor& visitor) {
       witness, {"probability", "similarity"});
   visitor.real({"state/min_probability", "1", "a lower probability around the estimate does not confirm it"},
                min_probability, 0.5, 1.0);
-  visitor.real({"state/min_similarity", "1", "a weaker best match by SIFT does not confirm a position"}, min_similarity,
-               0.0, 1.0);
-  visitor.integer({"state/min_matches", "1", "fewer matched SIFT features are no evidence, whatever their share"},
+  visitor.real({"state/min_similarity", "1", "a weaker best match by local features does not confirm a position"},
+               min_similarity, 0.0, 1.0);
+  visitor.integer({"state/min_matches", "1", "fewer matched local features are no evidence, whatever their share"},
                   min_matches, 0, 10000);
-  visitor.real({"state/max_scale", "1",
-                "a median size ratio of the matched SIFT features above this, or below its inverse, does not confirm a "
-                "position"},
-               max_scale, 1.0, 100.0);
+  visitor.real(
+      {"state/max_scale", "1",
+       "a median size ratio of the matched local features above this, or below its inverse, does not confirm a "
+       "position"},
+      max_scale, 1.0, 100.0);
   visitor.real(
       {"state/min_global_similarity", "1", "a weaker best match by global features does not confirm a position"},
       min_global_similarity, 0.0, 1.0);
@@ -102,7 +103,8 @@ void StateConfig::declare(ParameterVisitor& visitor) {
                max_step_m, 0.1, 10000.0);
   visitor.flag({"state/place_check", "", "ask the global features whether another place of the map looks more alike"},
                place_check);
-  visitor.real({"state/sure_similarity", "1", "a stronger SIFT match needs no place check"}, sure_similarity, 0.0, 1.0);
+  visitor.real({"state/sure_similarity", "1", "a stronger match of local features needs no place check"},
+               sure_similarity, 0.0, 1.0);
   visitor.real({"state/min_place_ratio", "1",
                 "global similarity here over the best anywhere, mean over the window; below, the position is in doubt"},
                min_place_ratio, 0.0, 1.0);
@@ -114,7 +116,7 @@ void StateConfig::declare(ParameterVisitor& visitor) {
                    "this number of images that confirm nothing, with no TRACKING in between, means OFF_MAP"},
                   off_map_images, 1, 100000);
   visitor.integer(
-      {"state/min_features", "1", "images with fewer SIFT features are blind and say nothing about OFF_MAP"},
+      {"state/min_features", "1", "images with fewer local features are blind and say nothing about OFF_MAP"},
       min_features, 0, 10000);
   visitor.integer({"state/frozen_images", "1",
                    "this number of repetitions of an image to the last bit ends TRACKING; 0: never, for a simulated "

@@ -30,7 +30,7 @@ inline double largerSigma(const Eigen::Matrix2d& covariance) {
 /// A landmark that was matched with a feature of an image.
 struct MatchedLandmark {
   Eigen::Vector2f seen_px = Eigen::Vector2f::Zero();  ///< that feature, pixels of the map's image size
-  std::uint32_t training_feature = 0;                 ///< what shows it in the training image, index of a SIFT feature
+  std::uint32_t training_feature = 0;                 ///< what shows it in the training image, index of a local feature
   bool inlier = false;                                ///< agrees with the pose
 };
 

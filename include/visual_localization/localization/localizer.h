@@ -74,7 +74,7 @@ class Localizer {
 
   const TrainingMap& map() const { return *map_; }
   const std::vector<Particle>& particles() const { return tracker_->particles(); }
-  /// SIFT features of the last image after pruning, for drawing its matches; empty when there was no need for them.
+  /// Local features of the last image after pruning, for drawing its matches; empty when there was no need for them.
   LocalFeatures lastLocal() const { return image_->local() == nullptr ? LocalFeatures() : *image_->local(); }
   /// What the last image's metric pose rests on: landmarks of the training image that shares most inliers with it, for
   /// drawing them; none without a metric pose.
