@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -25,10 +26,6 @@
 
 namespace visual_localization {
 namespace {
-
-constexpr double kShortestWay_m = 0.2;  ///< between cameras that say where a robot drives
-constexpr double kLongestWay_m = 20.0;
-constexpr double kWayNoise_m = 0.05;
 
 /// The problem as Ceres takes it. Losses and parameters must live as long as Ceres works on it.
 class Adjustment {
@@ -231,8 +228,7 @@ class Adjustment {
     ceres_.AddResidualBlock(automatic<HeightResidual, 1, 6>({up_m}), nullptr, cameras_[first].data());
   }
 
-  /// By the cameras on either side, as far as they are of the same session and known. Where a robot hardly moves its
-  /// direction of travel says little.
+  /// By the cameras on either side, as far as they are of the same session and known.
   void addTravel(std::size_t i) {
     BundleSession& session = problem_.sessions[sessions_[i]];
     const RobotAttitude robot(problem_.cameras[i].rotation, session.mounting);
@@ -243,14 +239,9 @@ class Adjustment {
       return other < cameras_.size() && sessions_[other] == sessions_[i] && window_.knows(other);
     };
     if (i == 0 || !is_beside(i - 1) || !is_beside(i + 1)) return;
-    const double way_m = (problem_.cameras[i + 1].position_m - problem_.cameras[i - 1].position_m).norm();
-    if (way_m < kShortestWay_m || way_m > kLongestWay_m) return;
-    const double noise_rad = kWayNoise_m / way_m;
-    const TravelResidual travel{
-        robot,
-        problem_.road[i].direction,
-        {std::hypot(config_.tilt_sigma_rad.y(), noise_rad), std::hypot(config_.tilt_sigma_rad.x(), noise_rad)}};
-    ceres_.AddResidualBlock(automatic<TravelResidual, 2, 6, 6, 6, 3>(travel), &tilt_loss_, cameras_[i].data(),
+    const std::optional<TravelResidual> travel = travelOf(problem_, config_, i);
+    if (!travel) return;
+    ceres_.AddResidualBlock(automatic<TravelResidual, 2, 6, 6, 6, 3>(*travel), &tilt_loss_, cameras_[i].data(),
                             cameras_[i - 1].data(), cameras_[i + 1].data(), correction);
   }
 

@@ -119,7 +119,7 @@ double adjust(BundleProblem& problem, const BundleConfig& config, const BundleWi
 
 /// Turns, scales and shifts a single session as a whole, and turns its mounting, to where fixes, altitudes, slopes and
 /// level robots agree best. What images see of each other does not change, and an adjustment of all of them hardly
-/// feels it: it would need hundreds of iterations.
+/// feels it: it would need hundreds of iterations. Nothing without a believed fix.
 void moveAsOne(BundleProblem& problem, const BundleConfig& config);
 
 /// What an adjustment does not tell by its result: standard deviations of what the images of a session share.

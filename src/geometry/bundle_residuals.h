@@ -1,6 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Core>
@@ -283,6 +286,22 @@ inline SlopeResidual slopeOf(const BundleProblem& problem, const BundleConfig& c
   const double run_m = way_m.head<2>().norm();
   const double correlated_m = std::sqrt(run_m * std::max(run_m, kLength_m));
   return {problem.road[camera].slope * run_m, config.slope_sigma * correlated_m + kRoughness_m};
+}
+
+/// Of a camera with one of its session before and one behind it; nothing where it hardly moves, since its direction of
+/// travel says little there.
+inline std::optional<TravelResidual> travelOf(const BundleProblem& problem, const BundleConfig& config,
+                                              std::size_t camera) {
+  constexpr double kShortestWay_m = 0.2;
+  constexpr double kLongestWay_m = 20.0;
+  constexpr double kWayNoise_m = 0.05;
+  const Eigen::Vector3d way_m = problem.cameras[camera + 1].position_m - problem.cameras[camera - 1].position_m;
+  if (way_m.norm() < kShortestWay_m || way_m.norm() > kLongestWay_m) return std::nullopt;
+  const double noise_rad = kWayNoise_m / way_m.norm();
+  return TravelResidual{
+      RobotAttitude(problem.cameras[camera].rotation, problem.sessionOf(camera).mounting),
+      problem.road[camera].direction,
+      {std::hypot(config.tilt_sigma_rad.y(), noise_rad), std::hypot(config.tilt_sigma_rad.x(), noise_rad)}};
 }
 
 /// Unknowns that are near zero, each to a sigma of its own.

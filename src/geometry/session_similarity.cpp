@@ -1,7 +1,9 @@
 // One session as a whole: turned, scaled and shifted, so that all that its images see of each other stays.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/Geometry>
 #include <ceres/autodiff_cost_function.h>
@@ -47,6 +49,23 @@ struct TurnedLeanResidual {
   }
 };
 
+/// TravelResidual of a camera whose way turns with it, so that only the mounting counts.
+struct TurnedTravelResidual {
+  TravelResidual travel;
+  CameraPose before;
+  CameraPose behind;
+
+  template <class T>
+  bool operator()(const T* correction, T* residual) const {
+    const auto parameters = [](const CameraPose& camera) {
+      const Eigen::Vector3d& at_m = camera.position_m;
+      return std::array<T, 6>{T(0.0), T(0.0), T(0.0), T(at_m.x()), T(at_m.y()), T(at_m.z())};
+    };
+    return travel(parameters(CameraPose{}).data(), parameters(before).data(), parameters(behind).data(), correction,
+                  residual);
+  }
+};
+
 struct MovedPositionResidual {
   Eigen::Vector3d antenna_m;  ///< from the centre of the session
   Eigen::Vector2d fix_m;      ///< likewise
@@ -85,6 +104,8 @@ ceres::CostFunction* automatic(const Residual& residual) {
 
 void moveAsOne(BundleProblem& problem, const BundleConfig& config) {
   if (problem.cameras.size() < 2 || problem.sessions.size() != 1) return;
+  if (std::none_of(problem.positions.begin(), problem.positions.end(), [](const auto& fix) { return fix.believed; }))
+    return;
   BundleSession& session = problem.sessions.front();
   std::vector<CameraPose>& cameras = problem.cameras;
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
@@ -104,6 +125,10 @@ void moveAsOne(BundleProblem& problem, const BundleConfig& config) {
                                {cameras[i].rotation.toRotationMatrix(), right, config.tilt_sigma_rad.z()}),
                            new ceres::CauchyLoss(kTiltLoss), similarity.data(), correction.data());
     if (i + 1 == cameras.size()) continue;
+    if (const auto travel = i == 0 ? std::nullopt : travelOf(problem, config, i)) {
+      ceres.AddResidualBlock(automatic<TurnedTravelResidual, 2, 3>({*travel, cameras[i - 1], cameras[i + 1]}),
+                             new ceres::CauchyLoss(kTiltLoss), correction.data());
+    }
     const Eigen::Vector3d way_m = cameras[i + 1].position_m - cameras[i].position_m;
     const SlopeResidual slope = slopeOf(problem, config, i);
     ceres.AddResidualBlock(automatic<MovedRiseResidual, 1, 7, 1>({way_m, slope.rise_m, slope.sigma_m}), nullptr,

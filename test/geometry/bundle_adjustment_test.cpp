@@ -107,6 +107,19 @@ TEST(BundleAdjustment, FindsHowTheCameraIsMounted) {
   EXPECT_LT((found - looks).norm(), 0.5 * 0.0115);
 }
 
+// A camera that is turned by 60 degrees on the robot would explain a lean by its pitch, but not where the robot drives.
+TEST(MoveAsOne, TurnsNoMountingAsideToExplainALean) {
+  std::mt19937 random(3);
+  test::StreetDrive street;
+  street.roll_rad = 0.06;
+  street.pitch_rad = 0.04;
+  BundleProblem problem = truthOf(test::drive(street), 0.0, random);
+  moveAsOne(problem, thorough());
+  const Eigen::Vector3d& found_rad = problem.sessions.front().mounting_rad;
+  EXPECT_NEAR(found_rad.x(), street.pitch_rad, 0.01);
+  EXPECT_NEAR(found_rad.y(), 0.0, 0.01);
+}
+
 // The images know when the robot turned, the fixes where.
 TEST(BundleAdjustment, FindsHowLateTheFixesAre) {
   std::mt19937 random(5);
