@@ -1,6 +1,7 @@
 #include "geometry/reconstruction.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -17,7 +18,8 @@ constexpr double kAstray_m = 2.0;          ///< an image moved by this more or l
 constexpr double kAstray_rad = 0.1;        ///< so did one that was turned by this more or less
 constexpr double kFarthest_m = 1000.0;     ///< a landmark farther away has no position to rely on
 constexpr double kSignificant = 3.0;       ///< sigmas
-constexpr double kSignificantDelay = 4.0;  ///< the same: of late fixes and of a bent path images see alike
+constexpr double kSignificantDelay = 2.0;  ///< the same, of which half wrong is as bad either way
+constexpr double kStampSigma_s = 0.03;     ///< what stamps of exact clocks still leave: exposure, transport, rounding
 constexpr double kHeld = 1e-9;             ///< a sigma that holds
 constexpr std::size_t kLensWindows = 5;    ///< that are asked for the calibration, about
 constexpr std::size_t kOverlap = 4;        ///< a window shares this part of its images with the next one
@@ -325,7 +327,7 @@ void Reconstruction::keepSignificant() {
     bundle_.lens_sigma[entry] = std::min(bundle_.lens_sigma[entry], kHeld);
   }
   double& delay_s = problem_.sessions.front().fix_delay_s;
-  if (std::abs(delay_s) > kSignificantDelay * shared_.fix_delay_s) return;
+  if (std::abs(delay_s) > kSignificantDelay * std::hypot(shared_.fix_delay_s, kStampSigma_s)) return;
   delay_s = shared_.fix_delay_s = 0.0;
   problem_.sessions.front().fix_delay_sigma_s = kHeld;
 }

@@ -65,6 +65,27 @@ TEST(SessionGeometry, FindsHowLateTheFixesAre) {
   EXPECT_LT(pathError_m(geometry, drive.truth), 0.15);
 }
 
+// Half a second of a slow robot is less than its fixes' noise, and two and a half sigmas; a hundredth of a second
+// is none however exact the receiver.
+TEST(SessionGeometry, FindsASmallDelayOfASlowRobotAndNoneOfExactStamps) {
+  const auto found_s = [](double spacing_m, double noise_m, std::int64_t late_ns) {
+    std::mt19937 random(17);
+    test::StreetDrive street;
+    street.spacing_m = spacing_m;
+    const auto poses = test::drive(street);
+    RecordedDrive drive = test::record(poses, test::pointsAlong(poses, 4.0 / spacing_m, random), noise_m, random);
+    for (MapFix& fix : drive.fixes) {
+      fix.stamp_ns += late_ns;
+      fix.sigma_m = noise_m;
+    }
+    UnadjustedSession session = drive.unadjusted();
+    session.clock_sigma_s = 0.5;
+    return adjustSessions({session}, {}, 1).front().fix_delay_s;
+  };
+  EXPECT_NEAR(found_s(0.7, 0.1, 500'000'000), 0.5, 0.2);
+  EXPECT_DOUBLE_EQ(found_s(4.0, 0.02, 10'000'000), 0.0);
+}
+
 TEST(SessionGeometry, HoldsForACameraThatLooksUp) {
   test::StreetDrive street;
   street.pitch_rad = 5.0 * kPi / 180.0;
