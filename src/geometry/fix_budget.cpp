@@ -98,11 +98,12 @@ double usualStep_s(const std::vector<FixResidual>& residuals) {
 
 }  // namespace
 
-FixBudget fixBudget(const std::vector<FixResidual>& residuals) {
+FixBudget fixBudget(const std::vector<FixResidual>& residuals, double adjusted_m) {
   FixBudget budget;
   std::vector<double> sigmas_m;
   for (const FixResidual& residual : residuals) sigmas_m.push_back(residual.sigma_m);
-  budget.sigma_m = budget.declared_m = median(std::move(sigmas_m));
+  budget.declared_m = median(std::move(sigmas_m));
+  budget.sigma_m = std::max(budget.declared_m, adjusted_m);
   if (residuals.size() < 2) return budget;
   const std::vector<Eigen::Vector2d> off = normalised(residuals);
   const double shown = std::accumulate(off.begin(), off.end(), 0.0, [&](double sum, const Eigen::Vector2d& one) {
@@ -114,8 +115,10 @@ FixBudget fixBudget(const std::vector<FixResidual>& residuals) {
   budget.residual_m = budget.declared_m * std::sqrt(shown);
   budget.correlation_s = shown > 0.0 ? width_s * summed / shown : 0.0;
   budget.duration_s = width_s * static_cast<double>(bins.size());
+  const double bent = std::max(0.0, covarianceAt(1, bins) - 1.0);
   const double share = std::max(0.0, 1.0 - shown) + summed / static_cast<double>(bins.size());
-  budget.sigma_m = budget.declared_m * std::sqrt(share);
+  budget.sigma_m =
+      std::hypot(std::max(budget.declared_m * std::sqrt(share), adjusted_m), budget.declared_m * std::sqrt(bent));
   return budget;
 }
 

@@ -20,8 +20,10 @@ struct FixResidual {
 
 /// What a receiver promises and its fixes do not show about the path lies in the path: a slow error bends it with
 /// itself. sigma^2 = max(0, declared^2 - residual^2) + residual^2 correlation / duration: the second part is the error
-/// of a mean over correlated residuals. No correlation time of the receiver is assumed. `residuals`: in order of time.
-FixBudget fixBudget(const std::vector<FixResidual>& residuals);
+/// of a mean over correlated residuals. No correlation time of the receiver is assumed. Never below `adjusted_m`, what
+/// an adjustment of the path leaves open. On top comes what is alike from one second to the next beyond the claim: the
+/// path is bent, or the receiver claims too little. `residuals`: in order of time.
+FixBudget fixBudget(const std::vector<FixResidual>& residuals, double adjusted_m = 0.0);
 /// Of a path that was cleaned, but not adjusted. `assumed_m`: sigma of fixes that claim none.
 FixBudget fixBudget(const Trajectory& path, const std::vector<MapFix>& fixes, double assumed_m);
 

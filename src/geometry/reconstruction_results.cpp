@@ -114,10 +114,10 @@ std::vector<FixResidual> Reconstruction::fixResiduals(std::size_t session) const
 
 void Reconstruction::findBudget() {
   FixBudget& budget = budgets_.front();
-  budget = fixBudget(fixResiduals(0));
+  budget = fixBudget(fixResiduals(0), shared_.position_m);
   budget.assumed = claimNothing(sessions_.front()->fixes);
   if (budget.declared_m == 0.0) budget.sigma_m = budget.declared_m = config_.fix_sigma_m;  // no fixes
-  budget.sigma_m = std::max({budget.sigma_m, shared_.position_m, kLeastSigma_m});
+  budget.sigma_m = std::max(budget.sigma_m, kLeastSigma_m);
 }
 
 /// Of those sessions that see something together.

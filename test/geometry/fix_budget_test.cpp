@@ -93,6 +93,16 @@ TEST(FixBudget, FewOutliersShowNoSlowErrors) {
   EXPECT_GT(fixBudget(residuals).sigma_m, 0.8 * kSigma_m);
 }
 
+TEST(FixBudget, CountsWhatIsAlikeBeyondTheClaimAsABendOfThePath) {
+  std::mt19937 random(6);
+  std::vector<FixResidual> residuals = errorsOf(5.0, 0.0, 0.5, random);
+  for (FixResidual& residual : residuals) residual.sigma_m = kSigma_m / 2.0;
+  EXPECT_GT(fixBudget(residuals).sigma_m, 0.6 * kSigma_m) << "of the sqrt(3/4) that the claim does not explain";
+  residuals = errorsOf(0.0, 1.0, 0.2, random);
+  for (FixResidual& residual : residuals) residual.sigma_m = kSigma_m / 2.0;
+  EXPECT_LT(fixBudget(residuals).sigma_m, 0.2 * kSigma_m) << "white noise bends no path";
+}
+
 TEST(FixBudget, CountsNoPauseAsTimeWithFixes) {
   std::mt19937 random(5);
   std::vector<FixResidual> residuals = errorsOf(60.0, 0.0, 1.0, random);
