@@ -68,17 +68,28 @@ std::string plusMinus(double sigma) {
   return out.str();
 }
 
+/// What the images want to change most, and what that points to.
+void printContradiction(const SessionImages& session, const GeometryConfig& config) {
+  const SessionLandmarks& geometry = session.geometry;
+  constexpr std::array<const char*, 6> kEntries{"focal length",         "ratio of the focal lengths",
+                                                "principal point in x", "principal point in y",
+                                                "distortion k1",        "distortion k2"};
+  Eigen::Index entry = 0;
+  const double sigmas = geometry.lens_sigmas.cwiseAbs().maxCoeff(&entry);
+  std::cout << session.name << ": the images contradict the calibration, most of all its "
+            << kEntries[static_cast<std::size_t>(entry)] << " (" << sigmas << " sigmas of a calibration): they ask for "
+            << 100.0 * geometry.focal_scale
+            << " % of its focal length (one sigma of a calibration: " << 100.0 * config.focal_sigma << " %). "
+            << (entry == 0
+                    ? "Another camera, or K of the raw images with rectified ones?"
+                    : "The calibration of another size of the images, or of images that are distorted otherwise?")
+            << " A map of places\n";
+}
+
 void printGeometry(const SessionImages& session, const GeometryConfig& config) {
   const SessionLandmarks& geometry = session.geometry;
   if (!session.camera.model) return;
-  if (geometry.contradicts_calibration) {
-    std::cout << session.name << ": the images contradict the calibration: they ask for "
-              << 100.0 * geometry.focal_scale
-              << " % of its focal length (one sigma of a calibration: " << 100.0 * config.focal_sigma
-              << " %). Another camera, or K of the raw images with rectified ones? A map "
-              << "of places\n";
-    return;
-  }
+  if (geometry.contradicts_calibration) return printContradiction(session, config);
   if (geometry.contradicts_fixes) {
     std::cout << session.name << ": images and fixes disagree: of " << session.kept << " images " << geometry.off_fixes
               << " lie elsewhere than the fixes around them, and around " << geometry.unexplained

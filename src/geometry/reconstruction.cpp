@@ -8,14 +8,18 @@
 
 #include "base/numbers.h"
 #include "geometry/rays.h"
+#include "geometry/seen_landmarks.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr double kMinAngle_rad = 0.01;     ///< between two rays to a landmark
-constexpr std::size_t kNeighbours = 7;     ///< on each side of an image
-constexpr double kAstray_m = 2.0;          ///< an image moved by this more or less than its neighbours lost its way
-constexpr double kAstray_rad = 0.1;        ///< so did one that was turned by this more or less
+constexpr double kMinAngle_rad = 0.01;  ///< between two rays to a landmark
+constexpr std::size_t kNeighbours = 7;  ///< on each side of an image
+constexpr double kAstray_m = 2.0;       ///< an image moved by this more or less than its neighbours lost its way
+constexpr double kAstray_rad = 0.1;     ///< so did one that was turned by this more or less
+constexpr double kMostExplained = 0.5;
+constexpr double kResected_px = 3.0;  ///< from the projection of a landmark that a pose explains
+constexpr int kResections = 5;
 constexpr double kFarthest_m = 1000.0;     ///< a landmark farther away has no position to rely on
 constexpr double kSignificant = 3.0;       ///< sigmas
 constexpr double kSignificantDelay = 2.0;  ///< the same, of which half wrong is as bad either way
@@ -147,9 +151,16 @@ bool Reconstruction::isWithin(double farthest_m, const PositionObservation& fix)
 void Reconstruction::moveAsOne() { visual_localization::moveAsOne(problem_, bundle_); }
 
 void Reconstruction::triangulateAll(double gate_px, std::size_t max_views) {
+  triangulateWithout(std::vector<bool>(images_.size()), gate_px, max_views);
+}
+
+void Reconstruction::triangulateWithout(const std::vector<bool>& left_out, double gate_px, std::size_t max_views) {
   problem_.landmarks.clear();
   const auto session_of = [this](std::uint32_t image) { return sessionOf(image); };
-  for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
+  for (FeatureTrack& track : sets_.tracks(kMinViews)) {
+    track.erase(std::remove_if(track.begin(), track.end(), [&](const auto& seen) { return left_out[seen.image]; }),
+                track.end());
+    if (track.size() < 2) continue;
     for (const FeatureTrack& piece : cutTrack(track, max_views, session_of)) addLandmark(piece, gate_px);
   }
 }
@@ -259,15 +270,70 @@ Eigen::Vector3d Reconstruction::usualTurn_rad(std::size_t image) const {
   return medianOf(turns_rad);
 }
 
-bool Reconstruction::isAstray(std::size_t image) const {
+/// Of what each image matches in several others, what landmarks explain; nothing where that is little.
+std::vector<std::optional<double>> Reconstruction::explainedShares() const {
+  std::vector<std::size_t> tracked(images_.size());
+  for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
+    for (const FeatureObservation& seen : track) ++tracked[seen.image];
+  }
+  std::vector<std::size_t> sightings(images_.size());
+  for (const Landmark& landmark : problem_.landmarks) {
+    for (const LandmarkSighting& sighting : landmark.sightings) ++sightings[sighting.image];
+  }
+  std::vector<std::optional<double>> shares(images_.size());
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (tracked[i] < kEnoughTracked) continue;
+    shares[i] = static_cast<double>(sightings[i]) / static_cast<double>(tracked[i]);
+  }
+  return shares;
+}
+
+/// Where most of what it matches fits it is not, whatever fixes say.
+bool Reconstruction::isAstray(std::size_t image, const std::optional<double>& explained) const {
+  if (explained.value_or(0.0) > kMostExplained) return false;
   return !((shiftOf_m(image) - usualShift_m(image)).norm() <= kAstray_m &&
            (turnOf_rad(image) - usualTurn_rad(image)).norm() <= kAstray_rad);
 }
 
+/// Of some images, landmarks that others show of what they match.
+std::vector<std::vector<LandmarkMatch>> Reconstruction::landmarksOf(const std::vector<bool>& some) const {
+  const SeenLandmarks landmarks(problem_.landmarks);
+  std::vector<std::vector<LandmarkMatch>> matches(images_.size());
+  for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
+    const auto shown = std::find_if(track.begin(), track.end(), [&](const auto& seen) { return landmarks.at(seen); });
+    if (shown == track.end()) continue;
+    const Eigen::Vector3d& landmark_m = landmarks.at(*shown)->position_m;
+    for (const auto& [image, feature] : track) {
+      if (!some[image]) continue;
+      const KeypointRays& rays = images_[image].rays;
+      matches[image].push_back(
+          {feature, 0, rays.normalised[feature], rays.sigmas[feature], landmark_m, Eigen::Matrix3d::Zero()});
+    }
+  }
+  return matches;
+}
+
+void Reconstruction::resect(double gate_px, std::size_t max_views) {
+  for (int round = 0; round < kResections; ++round) {
+    std::vector<bool> lost;
+    for (const auto& explained : explainedShares()) lost.push_back(explained.value_or(1.0) < kMostExplained);
+    if (std::none_of(lost.begin(), lost.end(), [](bool is_lost) { return is_lost; })) return;
+    triangulateWithout(lost, gate_px, max_views);
+    const std::vector<std::vector<LandmarkMatch>> matches = landmarksOf(lost);
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      const auto solved =
+          solvePose(matches[i], kResected_px / focal_px(i), static_cast<std::size_t>(config_.min_landmarks));
+      if (solved) problem_.cameras[i] = solved->camera;
+    }
+    triangulateAll(gate_px, max_views);
+  }
+}
+
 void Reconstruction::bringBack() {
   std::vector<std::pair<std::size_t, CameraPose>> back;
+  const std::vector<std::optional<double>> explained = explainedShares();
   for (std::size_t i = 0; i < images_.size(); ++i) {
-    if (!isAstray(i)) continue;
+    if (!isAstray(i, explained[i])) continue;
     CameraPose pose{images_[i].start * Eigen::Quaterniond(exponential(usualTurn_rad(i))), Eigen::Vector3d::Zero()};
     pose.position_m = startOf_m(i) + usualShift_m(i) - antennaInMap_m(pose, i);
     back.emplace_back(i, pose);
@@ -311,18 +377,19 @@ void Reconstruction::adjustLenses(const std::vector<BundleWindow>& windows) {
 /// By a window in the middle, if there are several: it knows them less well than all of them.
 SharedSigmas Reconstruction::sharedSigmasNow() const {
   const std::vector<BundleWindow> all = windows();
-  if (all.size() == 1) return sharedSigmas(problem_, bundle_, all.front());
+  if (all.size() == 1) return visual_localization::sharedSigmas(problem_, bundle_, all.front());
   BundleWindow window = all[all.size() / 2];
   window.known_begin = window.begin;
   window.known_end = window.end;
-  return sharedSigmas(problemOf(window), bundle_, window);
+  return visual_localization::sharedSigmas(problemOf(window), bundle_, window);
 }
 
-void Reconstruction::keepSignificant() {
+void Reconstruction::keepSignificant(bool focal_is_known) {
   shared_ = sharedSigmasNow();
   LensCorrection& correction = problem_.lenses.front().correction;
   for (Eigen::Index entry = 0; entry < correction.size(); ++entry) {
     if (std::abs(correction[entry]) > kSignificant * shared_.lens[entry]) continue;
+    if (entry == kFocalLength && !focal_is_known) continue;
     correction[entry] = shared_.lens[entry] = 0.0;
     bundle_.lens_sigma[entry] = std::min(bundle_.lens_sigma[entry], kHeld);
   }

@@ -12,6 +12,7 @@
 #include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
 #include "geometry/fix_budget.h"
+#include "geometry/pose_solver.h"
 #include "geometry/rays.h"
 #include "geometry/relative_rotation.h"
 #include "geometry/session_geometry.h"
@@ -56,8 +57,9 @@ PathHeights pathHeights(const std::vector<TrajectoryPoint>& images, const std::v
 /// Images of one session or several, and what they show, while they are adjusted.
 class Reconstruction {
  public:
-  static constexpr std::size_t kMinViews = 3;    ///< of a landmark, in the end
-  static constexpr double kBelievedFix_m = 1.0;  ///< from the cleaned path, of a fix that confirms it
+  static constexpr std::size_t kMinViews = 3;        ///< of a landmark, in the end
+  static constexpr std::size_t kEnoughTracked = 20;  ///< features of an image, for their share to say anything
+  static constexpr double kBelievedFix_m = 1.0;      ///< from the cleaned path, of a fix that confirms it
 
   explicit Reconstruction(const GeometryConfig& config) : config_(config) { problem_.lenses.clear(); }
 
@@ -101,13 +103,18 @@ class Reconstruction {
   void adjustAndPrune(double tolerance, std::size_t min_views);
   /// See the function of that name.
   void moveAsOne();
+  /// Images where little of what they match fits start again where the landmarks of others have them, and so on from
+  /// there: fixes that are metres off let no landmark begin beside them. `gate_px`, `max_views`: see triangulateAll().
+  void resect(double gate_px, std::size_t max_views);
   /// A single image may end in a minimum of its own, metres off. It starts again among its neighbours.
   void bringBack();
   /// From now on the calibrations are adjusted as well. `sigma`: what is known of each entry before.
   void freeLenses(const LensCorrection& sigma) { bundle_.lens_sigma = sigma; }
-  /// What the images do not tell apart from nothing stays as it was published from now on: entries of the lenses, and
-  /// the delay of the fixes.
-  void keepSignificant();
+  /// What the images do not tell apart from nothing stays as it was published from now on: entries of the lenses (the
+  /// focal length only if it is known from somewhere), and the delay of the fixes.
+  void keepSignificant(bool focal_is_known);
+  /// By keepSignificant(); zero for what is held.
+  const SharedSigmas& sharedSigmas() const { return shared_; }
   /// Finds what errors of the receiver may have left in a single session, which has been adjusted.
   void findBudget();
   /// What it came to, session by session; landmark ids begin with `first_id`.
@@ -133,7 +140,10 @@ class Reconstruction {
   std::vector<std::size_t> neighboursOf(std::size_t image) const;
   Eigen::Vector3d usualShift_m(std::size_t image) const;
   Eigen::Vector3d usualTurn_rad(std::size_t image) const;
-  bool isAstray(std::size_t image) const;
+  bool isAstray(std::size_t image, const std::optional<double>& explained) const;
+  std::vector<std::optional<double>> explainedShares() const;
+  std::vector<std::vector<LandmarkMatch>> landmarksOf(const std::vector<bool>& some) const;
+  void triangulateWithout(const std::vector<bool>& left_out, double gate_px, std::size_t max_views);
   double distance_m(const Landmark& landmark) const;
   std::vector<TiedSessions> tiedSessions() const;
   CommonBudget commonBudgetOf(const std::vector<TiedSessions>& tied) const;
@@ -164,7 +174,7 @@ class Reconstruction {
   FeatureSets sets_;                        ///< of what the images show
   BundleProblem problem_;
   std::vector<std::size_t> ranks_;  ///< of the images, in windows
-  SharedSigmas shared_;             ///< by keepSignificant(); zero for what is held
+  SharedSigmas shared_;
 };
 
 /// Moves each session of `reconstruction` to where those before it have what both see: its landmarks beside theirs, by

@@ -7,7 +7,6 @@
 #include <map>
 #include <numeric>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 
 #include "base/numbers.h"
@@ -15,11 +14,11 @@
 #include "geometry/bundle_adjustment.h"
 #include "geometry/rays.h"
 #include "geometry/reconstruction.h"
+#include "geometry/seen_landmarks.h"
 
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kEnoughTracked = 20;  ///< features of an image, for their share to say anything
 /// Sigmas from believed fixes, where it is as likely by chance as 3.4 sigmas on a line.
 constexpr double kOffFixes = 3.7;
 constexpr double kLeastExplained = 1.0 / 3.0;  ///< of what is matched; leaves and people move
@@ -221,21 +220,14 @@ std::optional<double> Reconstruction::usual(const std::vector<std::optional<doub
 /// get none: their places stay.
 void Reconstruction::addPath(std::vector<ImageGeometry> images, std::vector<SessionGeometry>& geometries) const {
   const std::vector<std::optional<double>> off_fixes = distancesOffFixes();
-  std::vector<std::optional<double>> explained(images.size());
-  std::vector<std::size_t> tracked(images.size());
-  for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
-    for (const FeatureObservation& seen : track) ++tracked[seen.image];
-  }
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    if (tracked[i] < kEnoughTracked) continue;
-    explained[i] = static_cast<double>(images[i].landmarks.size()) / static_cast<double>(tracked[i]);
-  }
+  const std::vector<std::optional<double>> explained = explainedShares();
   std::vector<std::size_t> trackable(geometries.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     SessionGeometry& geometry = geometries[sessionOf(i)];
     std::optional<ImageGeometry>& image = geometry.images.emplace_back();
-    if (tracked[i] >= kEnoughTracked) ++trackable[sessionOf(i)];
-    if (images[i].landmarks.size() < static_cast<std::size_t>(config_.min_landmarks) || isAstray(i)) continue;
+    if (explained[i]) ++trackable[sessionOf(i)];
+    if (images[i].landmarks.size() < static_cast<std::size_t>(config_.min_landmarks) || isAstray(i, explained[i]))
+      continue;
     const bool is_off = usual(off_fixes, i).value_or(0.0) > kOffFixes;
     const bool is_unexplained = usual(explained, i).value_or(1.0) < kLeastExplained;
     if (is_off) ++geometry.off_fixes;
@@ -252,8 +244,9 @@ void Reconstruction::addPath(std::vector<ImageGeometry> images, std::vector<Sess
   for (std::size_t k = 0; k < geometries.size(); ++k) {
     SessionGeometry& geometry = geometries[k];
     if (geometry.located > 0) geometry.mean_shift_m /= static_cast<double>(geometry.located);
-    // Most images lie elsewhere, or most of those that match each other have no place where their matches fit.
-    geometry.contradicts_fixes = 2 * geometry.off_fixes > geometry.located || 2 * geometry.located < trackable[k];
+    // A third of the images lie elsewhere (of mirrored fixes two in five, of good recordings at most one in eight), or
+    // most of those that match each other have no place where their matches fit.
+    geometry.contradicts_fixes = 3 * geometry.off_fixes > geometry.located || 2 * geometry.located < trackable[k];
   }
 }
 
@@ -268,36 +261,17 @@ struct Offset {
   Eigen::Vector3d shift_m;
 };
 
-/// Landmarks by what shows them. The reconstruction must keep its landmarks meanwhile; they may move.
-class SeenLandmarks {
- public:
-  explicit SeenLandmarks(const Reconstruction& reconstruction) {
-    for (const Landmark& landmark : reconstruction.landmarks()) {
-      for (const LandmarkSighting& sighting : landmark.sightings) {
-        positions_[key(sighting.image, sighting.feature)] = &landmark.position_m;
-      }
-    }
+/// From the landmarks of image b to those of image a: the median over their matches.
+std::optional<Eigen::Vector3d> offset(const SeenLandmarks& landmarks, const ImagePair& pair) {
+  std::vector<Eigen::Vector3d> differences;
+  for (const FeatureMatch& match : pair.matches) {
+    const Landmark* a = landmarks.at({pair.a, match.a});
+    const Landmark* b = landmarks.at({pair.b, match.b});
+    if (a != nullptr && b != nullptr) differences.push_back(a->position_m - b->position_m);
   }
-
-  /// From the landmarks of image b to those of image a: the median over their matches.
-  std::optional<Eigen::Vector3d> offset(const ImagePair& pair) const {
-    std::vector<Eigen::Vector3d> differences;
-    for (const FeatureMatch& match : pair.matches) {
-      const auto a = positions_.find(key(pair.a, match.a));
-      const auto b = positions_.find(key(pair.b, match.b));
-      if (a != positions_.end() && b != positions_.end()) differences.push_back(*a->second - *b->second);
-    }
-    if (differences.size() < kLeastShared) return std::nullopt;
-    return medianOf(differences);
-  }
-
- private:
-  static std::uint64_t key(std::uint32_t image, std::uint32_t feature) {
-    return (static_cast<std::uint64_t>(image) << 32U) | feature;
-  }
-
-  std::unordered_map<std::uint64_t, const Eigen::Vector3d*> positions_;
-};
+  if (differences.size() < kLeastShared) return std::nullopt;
+  return medianOf(differences);
+}
 
 /// The median of the ties near each image, or else the nearest one. `offsets`: in order of the image, one at least.
 std::vector<Eigen::Vector3d> shiftsAlong(std::size_t images, const std::vector<Offset>& offsets) {
@@ -358,7 +332,7 @@ void Reconstruction::orderBy(const std::vector<ImagePair>& ties) {
 }
 
 std::vector<double> alignSessions(const std::vector<ImagePair>& ties, Reconstruction& reconstruction) {
-  const SeenLandmarks landmarks(reconstruction);  // moves with them
+  const SeenLandmarks landmarks(reconstruction.landmarks());  // moves with them
   std::vector<double> apart_m(reconstruction.sessions(), 0.0);
   for (std::size_t session = 1; session < apart_m.size(); ++session) {
     const std::size_t begin = reconstruction.begin(session);
@@ -366,7 +340,7 @@ std::vector<double> alignSessions(const std::vector<ImagePair>& ties, Reconstruc
     std::vector<double> lengths_m;
     for (const ImagePair& tie : ties) {
       if (reconstruction.sessionOf(tie.b) != session) continue;
-      const auto shift_m = landmarks.offset(tie);
+      const auto shift_m = offset(landmarks, tie);
       if (!shift_m) continue;
       offsets.push_back({tie.b - begin, *shift_m});
       lengths_m.push_back(shift_m->norm());

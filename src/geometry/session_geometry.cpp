@@ -27,8 +27,9 @@ constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 constexpr double kRough = 1e-3;
 constexpr double kCoarse = 1e-4;
 constexpr double kFine = 1e-6;
-constexpr double kUnknownFocal = 0.3;   ///< one sigma of the logarithm of a focal length that nobody calibrated
-constexpr double kAspectSigma = 0.002;  ///< of square pixels
+constexpr double kUnknownFocal = 0.3;       ///< one sigma of the logarithm of a focal length that nobody calibrated
+constexpr double kAspectSigma = 0.002;      ///< of square pixels
+constexpr double kStretchedAspect = 0.005;  ///< likewise, where the shutter of a camera that moves stretches them
 /// Landmarks that many images show tie all of these to each other, which costs time. Until positions are about right
 /// their tracks are cut.
 constexpr std::size_t kCoarseViews = 20;
@@ -116,7 +117,10 @@ class SessionAdjuster {
   SessionGeometry result(std::uint32_t first_id) const {
     SessionGeometry geometry = std::move(reconstruction_.results(first_id).front());
     const LensCorrection& lens = reconstruction_.lensCorrection(0);
-    geometry.contradicts_calibration = (lens.array().abs() > kContradiction * lens_sigma_.array()).any();
+    LensCorrection known = lens_sigma_;
+    known[kAspect] = kStretchedAspect;
+    geometry.lens_sigmas = lens.cwiseQuotient(known);
+    geometry.contradicts_calibration = (geometry.lens_sigmas.array().abs() > kContradiction).any();
     return geometry;
   }
   const Reconstruction& reconstruction() const { return reconstruction_; }
@@ -166,16 +170,18 @@ class SessionAdjuster {
     reconstruction_.useFixes(Reconstruction::kBelievedFix_m, kCoarseLoss * config_.fix_loss);
     reconstruction_.triangulateAll(20.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kRough, 2);
+    reconstruction_.resect(20.0, kCoarseViews);
     reconstruction_.bringBack();
     reconstruction_.useFixes(kAllFixes_m, config_.fix_loss);
     reconstruction_.freeLenses(lens_sigma_);
     reconstruction_.triangulateAll(4.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
+    reconstruction_.resect(4.0, kCoarseViews);
     reconstruction_.bringBack();
     reconstruction_.moveAsOne();
     reconstruction_.triangulateAll(4.0, kAllViews);
     reconstruction_.adjustAndPrune(kRough, 2);
-    reconstruction_.keepSignificant();
+    reconstruction_.keepSignificant(lens_sigma_[kFocalLength] < kUnknownFocal);
     reconstruction_.moveAsOne();
     reconstruction_.adjustAndPrune(kFine, Reconstruction::kMinViews);
     reconstruction_.findBudget();
@@ -269,13 +275,6 @@ std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>
   return geometries;
 }
 
-double focalScaleOf(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads) {
-  LensCorrection sigma = lensSigmaOf(config);
-  sigma[kFocalLength] = kUnknownFocal;
-  const SessionAdjuster adjuster(session, config, sigma, threads);
-  return std::exp(adjuster.reconstruction().lensCorrection(0)[kFocalLength]);
-}
-
 namespace {
 
 constexpr double kUsual = 0.8;   ///< focal length as a share of the image's longer side: 64 degrees
@@ -283,8 +282,14 @@ constexpr double kBeyond = 1.3;  ///< where the second search begins, as a multi
 constexpr double kWidest = 0.3;
 constexpr double kLongest = 4.0;
 constexpr int kMostSteps = 12;
-constexpr double kSettled = 0.002;  ///< the last change of a search
-constexpr double kSame = 0.01;      ///< difference between the ends of two searches
+constexpr double kSettled = 0.002;  ///< the last change of a search; or its sigma
+constexpr double kSame = 3.0;       ///< sigmas between the ends of two searches
+
+/// A focal length that images ask for.
+struct Focal {
+  double px = 0.0;
+  double sigma = 0.0;  ///< of its logarithm
+};
 
 CameraModel pinhole(const cv::Size& size, double focal_px) {
   return CameraModel(
@@ -297,21 +302,31 @@ class FocalSearch {
   FocalSearch(UnadjustedSession& session, const cv::Size& size, const GeometryConfig& config, std::size_t threads)
       : session_(session), size_(size), config_(config), threads_(threads) {}
 
-  /// Pixels; nothing when it does not settle.
-  std::optional<double> from(double focal_px) const {
+  /// Nothing when it does not settle.
+  std::optional<Focal> from(double focal_px) const {
     const double longer_px = std::max(size_.width, size_.height);
     for (int step = 0; step < kMostSteps; ++step) {
-      const CameraModel camera = pinhole(size_, focal_px);
-      session_.camera = &camera;
-      const double scale = focalScaleOf(session_, config_, threads_);
-      focal_px *= scale;
+      const Focal asked = askedFrom(focal_px);
+      const double change = std::abs(std::log(asked.px / focal_px));
+      focal_px = asked.px;
       if (!(focal_px >= kWidest * longer_px && focal_px <= kLongest * longer_px)) return std::nullopt;
-      if (std::abs(scale - 1.0) <= kSettled) return focal_px;
+      if (change <= std::max(kSettled, asked.sigma)) return asked;
     }
     return std::nullopt;
   }
 
  private:
+  /// Where the camera is far off, so is the answer: ask again from there.
+  Focal askedFrom(double focal_px) const {
+    const CameraModel camera = pinhole(size_, focal_px);
+    session_.camera = &camera;
+    LensCorrection sigma = lensSigmaOf(config_);
+    sigma[kFocalLength] = kUnknownFocal;
+    const SessionAdjuster adjuster(session_, config_, sigma, threads_);
+    const double scale = std::exp(adjuster.reconstruction().lensCorrection(0)[kFocalLength]);
+    return {focal_px * scale, adjuster.reconstruction().sharedSigmas().lens[kFocalLength]};
+  }
+
   UnadjustedSession& session_;
   const cv::Size& size_;
   const GeometryConfig& config_;
@@ -324,11 +339,14 @@ std::optional<CameraModel> calibrateByImages(UnadjustedSession session, const cv
                                              const GeometryConfig& config, std::size_t threads) {
   const FocalSearch search(session, size, config, threads);
   const double usual_px = kUsual * std::max(size.width, size.height);
-  const std::optional<double> first_px = search.from(usual_px);
-  if (!first_px) return std::nullopt;
-  const std::optional<double> second_px = search.from(*first_px * (*first_px > usual_px ? kBeyond : 1.0 / kBeyond));
-  if (!second_px || std::abs(*first_px / *second_px - 1.0) > kSame) return std::nullopt;
-  return pinhole(size, std::sqrt(*first_px * *second_px));
+  const std::optional<Focal> first = search.from(usual_px);
+  if (!first) return std::nullopt;
+  const std::optional<Focal> second = search.from(first->px * (first->px > usual_px ? kBeyond : 1.0 / kBeyond));
+  if (!second) return std::nullopt;
+  const double sigma = std::max(first->sigma, second->sigma);
+  if (sigma > config.focal_sigma || std::abs(std::log(first->px / second->px)) > std::max(kSame * sigma, kSettled))
+    return std::nullopt;
+  return pinhole(size, std::sqrt(first->px * second->px));
 }
 
 void GeometryConfig::declare(ParameterVisitor& visitor) {

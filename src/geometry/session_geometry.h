@@ -58,13 +58,10 @@ struct SessionGeometry : SessionLandmarks {
 std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>& sessions,
                                             const GeometryConfig& config, std::size_t threads);
 
-/// What the images of a session say the focal length is, as a share of its camera's. Where that is far off, so is this:
-/// ask again with what it says.
-double focalScaleOf(const UnadjustedSession& session, const GeometryConfig& config, std::size_t threads);
-
 /// The focal length that the images of a session ask for: a pinhole with square pixels and its principal point in the
-/// middle, for images of `size`. Two searches come from either side; only when they end at the same focal length the
-/// images say what it is, and nothing otherwise. The camera of `session` is not looked at.
+/// middle, for images of `size`. Two searches come from either side; nothing unless they end at the same focal length
+/// within their sigmas, and know it as well as a calibration does (geometry/focal_sigma). The camera of `session` is
+/// not looked at.
 std::optional<CameraModel> calibrateByImages(UnadjustedSession session, const cv::Size& size,
                                              const GeometryConfig& config, std::size_t threads);
 
