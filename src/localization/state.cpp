@@ -147,7 +147,8 @@ LocalizationState StateAssessor::doubt(bool recovering) {
 LocalizationState StateAssessor::update(std::int64_t stamp_ns, const TrackerEstimate& estimate,
                                         const Evidence& evidence) {
   remember(stamp_ns, estimate, evidence);
-  const bool certain = evidence.verified.value_or(evidence.probability ? lastConfirms() : isCertain());
+  const bool verified = evidence.verified.value_or(false);
+  const bool certain = verified || (evidence.probability ? lastConfirms() : !evidence.verified && isCertain());
   ever_confirmed_ = ever_confirmed_ || certain;
   // Matched local features are of a mapped place, even while the position is not certain.
   const bool sees_map =

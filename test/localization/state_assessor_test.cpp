@@ -277,6 +277,17 @@ TEST(StateAssessor, AStepAsLongAsIsAllowedKeepsTheConfirmations) {
   }
 }
 
+// In other light landmarks fail where the place is certain.
+TEST(StateAssessor, WithoutAVerifiedPoseTheProbabilityDecides) {
+  StateAssessor assessor{StateConfig()};
+  Said unverified = sift();
+  unverified.evidence.verified = false;
+  unverified.evidence.probability = 0.99;
+  EXPECT_EQ(assess(assessor, kGood, unverified), LocalizationState::kTracking);
+  unverified.evidence.probability = 0.9;
+  EXPECT_EQ(assess(assessor, kGood, unverified), LocalizationState::kUncertain);
+}
+
 TEST(StateAssessor, AVerifiedPoseDecidesAlone) {
   StateAssessor assessor{StateConfig()};
   Said verified = sift();
