@@ -25,9 +25,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kNearest_m = 0.05;
-constexpr int kLeastSamples = 30;
 constexpr double kSharpness = 16.0;  ///< an inlier's noise is about a quarter of the tolerance
-constexpr int kMostSamples = 200;
 constexpr std::size_t kLeast = 4;
 constexpr int kMostSteps = 10;
 constexpr int kImprovements = 4;    ///< least squares steps for a better sample
@@ -159,38 +157,25 @@ CameraPose moved(const CameraPose& pose, const Vector6& step) {
           pose.position_m + step.head<3>()};
 }
 
-/// RANSAC (Fischler and Bolles 1981) over the poses that three matches allow.
-class PoseSampler {
+/// For mostSupported(): the poses that three matches allow.
+class PoseEstimator {
  public:
-  PoseSampler(const std::vector<LandmarkMatch>& matches, double tolerance) : matches_(matches), tolerance_(tolerance) {
+  using Model = CameraPose;
+  using Sample = std::array<std::size_t, 3>;
+  static constexpr std::size_t kSampleSize = 3;
+  static constexpr int kLeastSamples = 30;
+  static constexpr int kMostSamples = 200;
+
+  PoseEstimator(const std::vector<LandmarkMatch>& matches, double tolerance)
+      : matches_(matches), tolerance_(tolerance) {
     // Relative to their middle, so that OpenCV need not subtract large numbers.
     for (const LandmarkMatch& match : matches) origin_ += match.landmark_m / static_cast<double>(matches.size());
   }
 
-  /// That with the best support; the same for the same matches.
-  std::optional<CameraPose> best() {
-    int samples = kMostSamples;
-    for (int i = 0; i < samples; ++i) {
-      for (const CameraPose& pose : posesOf(drawDistinct<3>(matches_.size(), random_))) {
-        if (!keepIfBest(pose)) continue;
-        improveBest();
-        const double share = static_cast<double>(most_.inliers) / static_cast<double>(matches_.size());
-        samples = samplesNeeded(share, 3, kLeastSamples, kMostSamples);
-      }
-    }
-    return best_;
-  }
-
- private:
-  using Sample = std::array<std::size_t, 3>;
-
-  struct Support {
-    std::size_t inliers = 0;
-    double score = 0.0;  ///< less for an inlier that is farther off (Geman and McClure 1987)
-  };
+  std::size_t count() const { return matches_.size(); }
 
   /// At most four, by AP3P (Ke and Roumeliotis 2017).
-  std::vector<CameraPose> posesOf(const Sample& sample) const {
+  std::vector<CameraPose> modelsOf(const Sample& sample, std::minstd_rand&) const {
     std::array<cv::Point3d, 3> landmarks;
     std::array<cv::Point2d, 3> seen;
     for (std::size_t k = 0; k < sample.size(); ++k) {
@@ -213,22 +198,14 @@ class PoseSampler {
     return poses;
   }
 
-  bool keepIfBest(const CameraPose& pose) {
-    const Support support = supportOf(pose);
-    if (support.score <= most_.score) return false;
-    best_ = pose;
-    most_ = support;
-    return true;
-  }
-
-  /// Three points that lie close together, or far away, leave much of a pose to their noise; its inliers know better
-  /// (Chum, Matas and Kittler 2003).
-  void improveBest() {
+  /// Three points that lie close together, or far away, leave much of a pose to their noise; its inliers know better.
+  template <class Keep>
+  void improve(const CameraPose& best, std::minstd_rand&, const Keep& keep) const {
     for (int i = 0; i < kImprovements; ++i) {
-      const std::vector<std::size_t> inliers = inliersOf(matches_, *best_, tolerance_);
+      const std::vector<std::size_t> inliers = inliersOf(matches_, best, tolerance_);
       if (inliers.size() < kLeast) return;
-      const std::optional<Vector6> step = equationsOf(matches_, inliers, *best_).step();
-      if (!step || !keepIfBest(moved(*best_, *step))) return;
+      const std::optional<Vector6> step = equationsOf(matches_, inliers, best).step();
+      if (!step || !keep(moved(best, *step))) return;
     }
   }
 
@@ -246,12 +223,10 @@ class PoseSampler {
     return support;
   }
 
+ private:
   const std::vector<LandmarkMatch>& matches_;
   const double tolerance_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  std::minstd_rand random_;
-  std::optional<CameraPose> best_;
-  Support most_;  ///< of the best
 };
 
 /// `equations`: of the inliers at the pose. Nothing when they leave it open.
@@ -400,7 +375,7 @@ std::optional<SolvedPose> solvePose(const std::vector<LandmarkMatch>& matches, d
                                     std::size_t min_inliers, double moving_evidence) {
   min_inliers = std::max(min_inliers, kLeast);
   if (matches.size() < min_inliers) return std::nullopt;
-  const std::optional<CameraPose> start = PoseSampler(matches, tolerance).best();
+  const std::optional<CameraPose> start = mostSupported(PoseEstimator(matches, tolerance));
   if (!start) return std::nullopt;
   const std::vector<bool> counts = ofOneSession(matches, *start);
   std::vector<std::size_t> counted;

@@ -13,9 +13,6 @@
 namespace visual_localization {
 namespace {
 
-constexpr int kSampleSize = 5;
-constexpr int kLeastSamples = 10;
-constexpr int kMostSamples = 2000;
 constexpr int kDescentSteps = 8;
 constexpr double kSolved = 1e-12;  ///< sum of the squared residuals of a sample that needs no further step
 constexpr double kFitted = 0.01;   ///< the same in squared tolerances, of a sample that a motion explains
@@ -64,11 +61,17 @@ class MotionStep {
   Eigen::Matrix<double, 3, 2> across_;
 };
 
-/// Local optimisation RANSAC over the motions that explain five matches.
-class MotionSampler {
+/// For mostSupported(): the motions that explain five matches.
+class MotionEstimator {
  public:
-  MotionSampler(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
-                const std::vector<FeatureMatch>& matches, double tolerance)
+  using Model = Motion;
+  using Sample = std::array<std::size_t, 5>;
+  static constexpr std::size_t kSampleSize = 5;
+  static constexpr int kLeastSamples = 10;
+  static constexpr int kMostSamples = 2000;
+
+  MotionEstimator(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
+                  const std::vector<FeatureMatch>& matches, double tolerance)
       : a_(3, matches.size()), b_(3, matches.size()), squared_tolerance_(tolerance * tolerance) {
     for (std::size_t i = 0; i < matches.size(); ++i) {
       a_.col(static_cast<Eigen::Index>(i)) = a[matches[i].a].homogeneous();
@@ -76,115 +79,36 @@ class MotionSampler {
     }
   }
 
-  /// That with the most support; the same for the same matches.
-  std::optional<Motion> best() {
-    int samples = kMostSamples;
-    for (int i = 0; i < samples; ++i) {
-      const std::optional<Motion> motion = explained(drawDistinct<kSampleSize>(count(), random_));
-      if (!motion || !keepIfBest(*motion)) continue;
-      improveBest();
-      const double share = static_cast<double>(inliersOf(*best_).size()) / static_cast<double>(count());
-      samples = samplesNeeded(share, kSampleSize, kLeastSamples, kMostSamples);
-    }
-    if (best_) keepIfBest(refined(*best_, kLastSteps));
-    return best_;
-  }
-
-  std::vector<std::size_t> inliersOf(const Motion& motion) const {
-    const Eigen::ArrayXd squared = squaredErrors(motion);
-    std::vector<std::size_t> inliers;
-    for (Eigen::Index i = 0; i < squared.size(); ++i) {
-      if (squared[i] <= 1.0) inliers.push_back(static_cast<std::size_t>(i));
-    }
-    return inliers;
-  }
-
- private:
-  using Sample = std::array<std::size_t, kSampleSize>;
-
   std::size_t count() const { return static_cast<std::size_t>(a_.cols()); }
 
-  /// Four times Sampson's errors (1982), in squared tolerances: where a match is as far from both epipoles, the sum of
-  /// the squared distances from both epipolar lines. Not a number at an epipole in both.
-  Eigen::ArrayXd squaredErrors(const Motion& motion) const {
-    const Eigen::Matrix3d essential = motion.essential();
-    const Eigen::Matrix3Xd lines_b = essential * a_;
-    const Eigen::Matrix<double, 2, Eigen::Dynamic> lines_a = essential.transpose().topRows<2>() * b_;
-    const Eigen::ArrayXd residuals = b_.cwiseProduct(lines_b).colwise().sum().transpose();
-    const Eigen::ArrayXd lengths =
-        (lines_b.topRows<2>().colwise().squaredNorm() + lines_a.colwise().squaredNorm()).transpose();
-    return 4.0 / squared_tolerance_ * residuals.square() / lengths;
+  std::vector<Motion> modelsOf(const Sample& sample, std::minstd_rand& random) const {
+    const std::optional<Motion> motion = explained(sample, anyDirection(random));
+    return motion ? std::vector<Motion>{*motion} : std::vector<Motion>();
   }
 
-  /// Levenberg and Marquardt's descent to where the five lie on their epipolar lines, if it leads there.
-  std::optional<Motion> explained(const Sample& sample) {
-    Motion motion{Eigen::Matrix3d::Identity(), anyDirection()};
-    Vector5 residuals = residualsOf(sample, motion);
-    double damping = 1e-6;
-    for (int i = 0; i < kDescentSteps && residuals.squaredNorm() > kSolved; ++i) {
-      const MotionStep step(motion);
-      Matrix5 jacobian;
-      for (int k = 0; k < kSampleSize; ++k) {
-        const auto match = static_cast<Eigen::Index>(sample[static_cast<std::size_t>(k)]);
-        jacobian.row(k) = step.derivative(a_.col(match), b_.col(match));
-      }
-      Matrix5 information = jacobian.transpose() * jacobian;
-      information.diagonal().array() += damping * information.diagonal().maxCoeff();
-      const Motion next = step.taken(-information.ldlt().solve(jacobian.transpose() * residuals));
-      const Vector5 next_residuals = residualsOf(sample, next);
-      const bool is_better = next_residuals.squaredNorm() < residuals.squaredNorm();
-      damping *= is_better ? 0.1 : 10.0;
-      if (!is_better) continue;
-      motion = next;
-      residuals = next_residuals;
-    }
-    const bool fits = residuals.squaredNorm() <= kFitted * squared_tolerance_;
-    return fits ? std::optional<Motion>(motion) : std::nullopt;
-  }
-
-  Eigen::Vector3d anyDirection() {
-    std::normal_distribution<double> normal;
-    const double x = normal(random_);
-    const double y = normal(random_);
-    return Eigen::Vector3d(x, y, normal(random_)).normalized();
-  }
-
-  Vector5 residualsOf(const Sample& sample, const Motion& motion) const {
-    const Eigen::Matrix3d essential = motion.essential();
-    Vector5 residuals;
-    for (int k = 0; k < kSampleSize; ++k) {
-      const auto match = static_cast<Eigen::Index>(sample[static_cast<std::size_t>(k)]);
-      residuals[k] = b_.col(match).dot(essential * a_.col(match));
-    }
-    return residuals;
-  }
-
-  bool keepIfBest(const Motion& motion) {
+  Support supportOf(const Motion& motion) const {
     const Eigen::ArrayXd squared = squaredErrors(motion);
-    double support = 0.0;
+    Support support;
     for (Eigen::Index i = 0; i < squared.size(); ++i) {
-      if (squared[i] <= kReach) support += supportOf(squared[i]);
+      if (squared[i] <= 1.0) ++support.inliers;
+      if (squared[i] <= kReach) support.score += weightOf(squared[i]);
     }
-    if (!(support > support_)) return false;
-    best_ = motion;
-    support_ = support;
-    return true;
+    return support;
   }
-
-  static double supportOf(double squared_error) { return 1.0 / (1.0 + squared_error / kHalfSupport); }
 
   /// Ahead of a camera that drives forwards, the least squares have many minima (Vedaldi, Guidi and Soatto 2007).
   /// Subsets of the inliers lead out of a wrong one.
-  void improveBest() {
+  template <class Keep>
+  void improve(const Motion& best, std::minstd_rand& random, const Keep& keep) const {
     for (int i = 0; i < kSubsets; ++i) {
-      const std::vector<std::size_t> inliers = inliersOf(*best_);
+      const std::vector<std::size_t> inliers = inliersOf(best);
       if (inliers.size() <= kSampleSize) return;
       std::vector<std::size_t> subset;
       std::uniform_int_distribution<std::size_t> any(0, inliers.size() - 1);
-      for (std::size_t k = 0; k < kSubsetSize; ++k) subset.push_back(inliers[any(random_)]);
-      Motion motion = *best_;
+      for (std::size_t k = 0; k < kSubsetSize; ++k) subset.push_back(inliers[any(random)]);
+      Motion motion = best;
       for (int k = 0; k < kSubsetSteps; ++k) motion = stepped(motion, subset);
-      keepIfBest(refined(motion, 1));
+      keep(refined(motion, 1));
     }
   }
 
@@ -201,6 +125,73 @@ class MotionSampler {
     return motion;
   }
 
+  std::vector<std::size_t> inliersOf(const Motion& motion) const {
+    const Eigen::ArrayXd squared = squaredErrors(motion);
+    std::vector<std::size_t> inliers;
+    for (Eigen::Index i = 0; i < squared.size(); ++i) {
+      if (squared[i] <= 1.0) inliers.push_back(static_cast<std::size_t>(i));
+    }
+    return inliers;
+  }
+
+ private:
+  /// Four times Sampson's errors (1982), in squared tolerances: where a match is as far from both epipoles, the sum of
+  /// the squared distances from both epipolar lines. Not a number at an epipole in both.
+  Eigen::ArrayXd squaredErrors(const Motion& motion) const {
+    const Eigen::Matrix3d essential = motion.essential();
+    const Eigen::Matrix3Xd lines_b = essential * a_;
+    const Eigen::Matrix<double, 2, Eigen::Dynamic> lines_a = essential.transpose().topRows<2>() * b_;
+    const Eigen::ArrayXd residuals = b_.cwiseProduct(lines_b).colwise().sum().transpose();
+    const Eigen::ArrayXd lengths =
+        (lines_b.topRows<2>().colwise().squaredNorm() + lines_a.colwise().squaredNorm()).transpose();
+    return 4.0 / squared_tolerance_ * residuals.square() / lengths;
+  }
+
+  /// Levenberg and Marquardt's descent to where the five lie on their epipolar lines, if it leads there.
+  std::optional<Motion> explained(const Sample& sample, const Eigen::Vector3d& start) const {
+    Motion motion{Eigen::Matrix3d::Identity(), start};
+    Vector5 residuals = residualsOf(sample, motion);
+    double damping = 1e-6;
+    for (int i = 0; i < kDescentSteps && residuals.squaredNorm() > kSolved; ++i) {
+      const MotionStep step(motion);
+      Matrix5 jacobian;
+      for (std::size_t k = 0; k < kSampleSize; ++k) {
+        const auto match = static_cast<Eigen::Index>(sample[k]);
+        jacobian.row(static_cast<Eigen::Index>(k)) = step.derivative(a_.col(match), b_.col(match));
+      }
+      Matrix5 information = jacobian.transpose() * jacobian;
+      information.diagonal().array() += damping * information.diagonal().maxCoeff();
+      const Motion next = step.taken(-information.ldlt().solve(jacobian.transpose() * residuals));
+      const Vector5 next_residuals = residualsOf(sample, next);
+      const bool is_better = next_residuals.squaredNorm() < residuals.squaredNorm();
+      damping *= is_better ? 0.1 : 10.0;
+      if (!is_better) continue;
+      motion = next;
+      residuals = next_residuals;
+    }
+    const bool fits = residuals.squaredNorm() <= kFitted * squared_tolerance_;
+    return fits ? std::optional<Motion>(motion) : std::nullopt;
+  }
+
+  static Eigen::Vector3d anyDirection(std::minstd_rand& random) {
+    std::normal_distribution<double> normal;
+    const double x = normal(random);
+    const double y = normal(random);
+    return Eigen::Vector3d(x, y, normal(random)).normalized();
+  }
+
+  Vector5 residualsOf(const Sample& sample, const Motion& motion) const {
+    const Eigen::Matrix3d essential = motion.essential();
+    Vector5 residuals;
+    for (std::size_t k = 0; k < kSampleSize; ++k) {
+      const auto match = static_cast<Eigen::Index>(sample[k]);
+      residuals[static_cast<Eigen::Index>(k)] = b_.col(match).dot(essential * a_.col(match));
+    }
+    return residuals;
+  }
+
+  static double weightOf(double squared_error) { return 1.0 / (1.0 + squared_error / kHalfSupport); }
+
   /// One step of the least squares on some matches, weighted by their support (Gauss and Newton); the same motion when
   /// they do not determine any.
   Motion stepped(const Motion& motion, const std::vector<std::size_t>& matches) const {
@@ -216,7 +207,7 @@ class MotionSampler {
       const double residual = b.dot(line_b);
       const double by_tolerance =
           4.0 / squared_tolerance_ / (line_b.head<2>().squaredNorm() + line_a.head<2>().squaredNorm());
-      const double support = supportOf(by_tolerance * residual * residual);
+      const double support = weightOf(by_tolerance * residual * residual);
       const Vector5 derivative = step.derivative(a, b);
       information += by_tolerance * support * support * derivative * derivative.transpose();
       gradient += by_tolerance * support * support * residual * derivative;
@@ -229,9 +220,6 @@ class MotionSampler {
   Eigen::Matrix3Xd a_;  ///< homogeneous, of each match
   Eigen::Matrix3Xd b_;
   double squared_tolerance_;
-  std::minstd_rand random_;
-  std::optional<Motion> best_;
-  double support_ = 0.0;  ///< of the best
 };
 
 /// Of the two rotations of an essential matrix, b from a, the smaller.
@@ -247,13 +235,15 @@ Eigen::Quaterniond smallerRotation(const Motion& motion) {
 std::optional<TwoView> verifyTwoViews(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
                                       const std::vector<FeatureMatch>& matches, double tolerance,
                                       std::size_t min_inliers, double max_rotation_rad) {
-  if (matches.size() < std::max<std::size_t>(min_inliers, kSampleSize + 1)) return std::nullopt;
-  MotionSampler sampler(a, b, matches, tolerance);
-  const std::optional<Motion> motion = sampler.best();
+  if (matches.size() < std::max(min_inliers, MotionEstimator::kSampleSize + 1)) return std::nullopt;
+  const MotionEstimator estimator(a, b, matches, tolerance);
+  std::optional<Motion> motion = mostSupported(estimator);
   if (!motion) return std::nullopt;
+  const Motion refined = estimator.refined(*motion, kLastSteps);
+  if (estimator.supportOf(refined).score > estimator.supportOf(*motion).score) motion = refined;
   TwoView view;
   view.b_from_a = smallerRotation(*motion);
-  for (const std::size_t i : sampler.inliersOf(*motion)) view.inliers.push_back(matches[i]);
+  for (const std::size_t i : estimator.inliersOf(*motion)) view.inliers.push_back(matches[i]);
   const double turn_rad = view.b_from_a.angularDistance(Eigen::Quaterniond::Identity());
   if (view.inliers.size() < min_inliers || !(turn_rad <= max_rotation_rad)) return std::nullopt;
   return view;

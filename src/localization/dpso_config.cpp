@@ -10,10 +10,8 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"dpso/phi2", "1", "weight of the attraction to the best particle"}, phi2, 0.0, 4.0);
   visitor.choice({"dpso/confine", "",
                   "where particles may be: anywhere, as in the papers (none), in the bounding box of the training "
-                  "images, or not far from one of them (corridor)"},
+                  "images, or within 20 m of one of them (corridor)"},
                  confine, {"none", "box", "corridor"});
-  visitor.real({"dpso/corridor", "m", "how far from the nearest training image a corridor reaches"}, corridor_m, 0.1,
-               10000.0);
   visitor.choice({"dpso/speed_limit", "",
                   "what is limited: the speed along each axis, or its norm, as in the papers, with each axis in shares "
                   "of its range"},
@@ -23,10 +21,9 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
                   "without those that do not travel, the quantum particles (moving)"},
                  speed_of, {"moving", "all"});
   visitor.choice({"dpso/position", "",
-                  "estimate: the best particle, the centre of the best ones, or the weighted centre of the swarm "
+                  "estimate: the best particle, the centre of the best five, or the weighted centre of the swarm "
                   "(conference paper, section V)"},
                  position, {"best", "k_best", "centre"});
-  visitor.integer({"dpso/best_particles", "1", "how many are the best ones (k)"}, best_particles, 1, 100000);
   visitor.real({"dpso/quantum_share", "1", "share of quantum particles (q_r)"}, quantum_share, 0.0, 1.0);
   visitor.real({"dpso/quantum_std", "1", "spread of quantum particles, share of the area's range (q_d)"}, quantum_std,
                0.0, 1.0);
@@ -57,14 +54,8 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
       {"dpso/phi0_max", "1",
        "random perturbation in recovery, as in the conference paper; up to phi0: not raised, as in the journal"},
       phi0_max, 0.0, 10.0);
-  visitor.real({"dpso/mode_radius", "m", "particles this close to the best one make up its mode"}, mode_radius_m, 0.1,
-               1000.0);
   visitor.integer({"dpso/swarms", "1", "dpso_multi: swarms at most, which share the particles"}, swarms, 2,
                   kMostSwarms);
-  visitor.real({"dpso/exclusion_radius", "m", "dpso_multi: swarms this close to each other become one"},
-               exclusion_radius_m, 0.1, 1000.0);
-  visitor.real({"dpso/rival_share", "1", "dpso_multi: a rival must match so well in relation to the leader"},
-               rival_share, 0.01, 1.0);
   visitor.atMost("dpso/v0_min", v0_min, "dpso/v0", v0);
   visitor.atMost("dpso/v0", v0, "dpso/v0_max", v0_max);
   visitor.atMost("dpso/quantum_share", quantum_share, "dpso/quantum_share_max", quantum_share_max);

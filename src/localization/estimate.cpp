@@ -32,33 +32,10 @@ void MetricConfig::declare(ParameterVisitor& visitor) {
                   "metric: solve the pose from landmarks where the map has them; place: that of "
                   "training images, as in the papers"},
                  pose_source, {"metric", "place"});
-  visitor.integer({"metric/training_images", "1", "landmarks are taken from this number of training images"},
-                  training_images, 1, 50);
-  visitor.real({"metric/match_ratio", "1", "largest ratio of the angles to the nearest and second nearest"},
-               match_ratio, 0.1, 1.0);
-  visitor.real({"metric/tolerance", "px", "farthest of an inlier from the projection of its landmark"}, tolerance_px,
-               0.1, 100.0);
-  visitor.real({"metric/keypoint_sigma", "px", "standard deviation of the position of a small local feature"},
-               keypoint_sigma_px, 0.01, 100.0);
   visitor.integer({"metric/min_inliers", "1", "a pose on fewer landmarks is not believed"}, min_inliers, 6, 10000);
-  visitor.integer({"metric/min_inliers_predicted", "1", "the same where the motion since the last pose predicts it"},
-                  min_inliers_predicted, 6, 10000);
   visitor.integer({"metric/min_inliers_tracking", "1",
                    "TRACKING needs so many inliers, those of the poses before that this one follows included"},
                   min_inliers_tracking, 6, 1000000);
-  visitor.real({"metric/sigma_factor", "1",
-                "landmarks err alike: this multiple of the standard deviations that they would give a pose one by one"},
-               sigma_factor, 0.1, 100.0);
-  visitor.real({"metric/max_sigma", "m", "a pose with a larger standard deviation is not believed"}, max_sigma_m, 0.01,
-               100.0);
-  visitor.real({"metric/max_gap", "s", "the motion predicts poses at most this long after the last one"}, max_gap_s,
-               0.0, 3600.0);
-  visitor.real({"metric/max_prediction_error", "m",
-                "farthest of a pose from the predicted one, plus half the way since and twice the pose's sigma"},
-               max_prediction_error_m, 0.01, 1000.0);
-  visitor.real({"metric/max_focal_error", "1",
-                "no pose is believed while the last images ask for a focal length farther from the calibration's"},
-               max_focal_error, 0.001, 1.0);
 }
 
 double MetricPose::sigma_m() const { return largerSigma_m(covariance); }

@@ -24,17 +24,10 @@ OdometryReading interpolated(const OdometryReading& a, const OdometryReading& b,
 }  // namespace
 
 void OdometryConfig::declare(ParameterVisitor& visitor) {
-  visitor.real({"odometry/max_speed", "m/s", "a faster reading has jumped"}, max_speed_mps, 0.01, 1000.0);
-  visitor.real({"odometry/max_gap", "s", "longest time between two readings"}, max_gap_s, 0.001, 60.0);
   visitor.real({"odometry/distance_sigma", "1", "standard deviation of a position by odometry, share of the way"},
                distance_sigma, 0.0001, 1.0);
   visitor.real({"odometry/turn_sigma", "rad/m", "standard deviation of a heading by odometry, per metre driven"},
                turn_sigma_rad_m, 0.0, 1.0);
-  visitor.real({"odometry/max_distance", "m", "longest way since the last verified pose that odometry bridges"},
-               max_distance_m, 0.0, 100000.0);
-  visitor.real(
-      {"odometry/share", "1", "share of the particles that follow odometry; the others find out if it is wrong"}, share,
-      0.0, 1.0);
 }
 
 void OdometryTrack::add(const OdometryReading& reading) {

@@ -50,13 +50,6 @@ void BayesConfig::declare(ParameterVisitor& visitor) {
        "matches plus one are raised to this to become a likelihood; 0: what suits the kind of features (SIFT 3, "
        "learned 2)"},
       exponent, 0.0, 20.0);
-  visitor.real({"bayes/uniform", "1", "share of the likelihood that is the same for all training images"}, uniform,
-               1e-6, 1.0);
-  visitor.integer(
-      {"bayes/comparisons", "1", "training images that an image is compared with while the position is known"},
-      comparisons, 2, 100000);
-  visitor.integer({"bayes/first_comparisons", "1", "the same while it is not"}, first_comparisons, 2, 1000000);
-  visitor.atMost("bayes/comparisons", comparisons, "bayes/first_comparisons", first_comparisons);
 }
 
 PlaceFilter::PlaceFilter(const TrainingMap& map, const BayesConfig& config)

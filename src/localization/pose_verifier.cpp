@@ -67,6 +67,12 @@ bool FocalCheck::contradicts() const {
   return !images_.empty() && std::abs(scale() - 1.0) > max_error_ + kFocalSigmas * sigma();
 }
 
+bool FocalCheck::wouldContradict(double scale, double sigma) const {
+  FocalCheck together = *this;
+  together.add(scale, sigma);
+  return together.contradicts();
+}
+
 bool FocalCheck::confirms() const { return !images_.empty() && sigma() <= kSureFocalSigma && !contradicts(); }
 
 void MotionEvidence::add(double gain) { sum_ = std::clamp(sum_ + std::min(gain, kMostOfOne), 0.0, kMost); }
@@ -109,11 +115,10 @@ std::optional<MetricPose> PoseVerifier::near(const std::optional<PredictedPose>&
       sessions_.around(prediction->position_m, prediction->yaw_rad, static_cast<std::size_t>(config_.training_images));
   const std::optional<std::size_t> trial = sessions_.trial(prediction->position_m, prediction->yaw_rad);
   if (trial) images.push_back(*trial);
-  const auto pose = solveAround(prediction->position_m, prediction->yaw_rad, images, few, trial);
-  if (!pose) return std::nullopt;
-  if (pose->inliers < static_cast<std::size_t>(config_.min_inliers) && !predictor_.isPredicted(*pose))
-    return std::nullopt;
-  return accepted(*pose);
+  const auto solution = solveAround(prediction->position_m, prediction->yaw_rad, images, few, trial);
+  if (!solution) return std::nullopt;
+  const bool enough = solution->pose.inliers >= static_cast<std::size_t>(config_.min_inliers);
+  return commit(*solution, solution->holds && (enough || predictor_.isPredicted(solution->pose)));
 }
 
 std::optional<MetricPose> PoseVerifier::nearOneOf(const std::vector<std::size_t>& training_images) {
@@ -125,12 +130,13 @@ std::optional<MetricPose> PoseVerifier::nearOneOf(const std::vector<std::size_t>
       continue;
     }
     tried.push_back(position_m);
-    const auto pose = solveAround(position_m, map_.yaw_rad(image),
-                                  sessions_.aroundLike(image, static_cast<std::size_t>(config_.training_images)),
-                                  static_cast<std::size_t>(config_.min_inliers));
-    if (pose) {
-      sessions_.choose(matched_.training_image);
-      return accepted(*pose);
+    const auto solution = solveAround(position_m, map_.yaw_rad(image),
+                                      sessions_.aroundLike(image, static_cast<std::size_t>(config_.training_images)),
+                                      static_cast<std::size_t>(config_.min_inliers));
+    if (solution) {
+      const std::optional<MetricPose> pose = commit(*solution, solution->holds);
+      if (pose) sessions_.choose(matched_.training_image);
+      if (solution->holds) return pose;
     }
     if (tried.size() == kHypotheses) break;
   }
@@ -144,25 +150,32 @@ std::vector<std::size_t> PoseVerifier::compared() const {
 }
 
 /// By the landmarks of these training images of one session. Where they make no pose that would be TRACKING, those of
-/// the nearest images of all sessions join them: what looks most alike need not have the best landmarks.
-std::optional<MetricPose> PoseVerifier::solveAround(const Eigen::Vector2d& position_m, double yaw_rad,
-                                                    std::vector<std::size_t> images, std::size_t min_inliers,
-                                                    std::optional<std::size_t> trial) {
-  const std::optional<MetricPose> pose = solve(images, min_inliers, trial);
-  if (pose && isClear(*pose)) return pose;
+/// the nearest images of all sessions join them: what looks most alike need not have the best landmarks. `trial`: the
+/// last of the training images, if its session is being tried.
+std::optional<PoseVerifier::Solution> PoseVerifier::solveAround(const Eigen::Vector2d& position_m, double yaw_rad,
+                                                                std::vector<std::size_t> images,
+                                                                std::size_t min_inliers,
+                                                                std::optional<std::size_t> trial) {
+  std::optional<Solution> solution = solve(images, min_inliers);
+  if (solution && trial) {
+    solution->trial = {images.front(), static_cast<double>(solution->agreeing.front()), *trial,
+                       static_cast<double>(solution->agreeing.back())};
+  }
+  if (solution && solution->holds && isClear(solution->pose)) return solution;
   const std::size_t of_session = images.size();
   for (const std::size_t image :
        sessions_.aroundAny(position_m, yaw_rad, static_cast<std::size_t>(config_.training_images))) {
     if (std::find(images.begin(), images.end(), image) == images.end()) images.push_back(image);
   }
-  if (images.size() == of_session) return pose;
-  const std::optional<MetricPose> by_all = solve(images, min_inliers);
-  return by_all ? by_all : pose;
+  if (images.size() == of_session) return solution;
+  std::optional<Solution> by_all = solve(images, min_inliers);
+  if (!by_all || (solution && solution->holds && !by_all->holds)) return solution;
+  if (solution) by_all->trial = solution->trial;
+  return by_all;
 }
 
-/// `trial`: the last of the training images, if its session is being tried.
-std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& images, std::size_t min_inliers,
-                                              std::optional<std::size_t> trial) {
+std::optional<PoseVerifier::Solution> PoseVerifier::solve(const std::vector<std::size_t>& images,
+                                                          std::size_t min_inliers) {
   if (images.empty()) return std::nullopt;
   std::vector<LandmarkMatch> sights;
   std::vector<Pair> seen;  // training images share landmarks
@@ -176,23 +189,23 @@ std::optional<MetricPose> PoseVerifier::solve(const std::vector<std::size_t>& im
   }
   const auto solved = solvePose(sights, config_.tolerance_px / focal_px_, min_inliers, moving_.sum());
   if (!solved) return std::nullopt;
-  moving_gain_ = solved->moving_gain;
   std::vector<Pair> inliers;
   for (const std::size_t i : solved->inliers) inliers.push_back(seen[i]);
-  const std::vector<std::size_t> agreeing = keepMatched(images, std::move(inliers));
-  if (trial)
-    sessions_.learn(images.front(), static_cast<double>(agreeing.front()), *trial,
-                    static_cast<double>(agreeing.back()));
-  MetricPose pose;
+  Solution solution;
+  addMatched(images, std::move(inliers), solution);
+  MetricPose& pose = solution.pose;
   pose.camera = solved->camera;
   pose.base = mount_.baseInMap(pose.camera);
   pose.covariance = config_.sigma_factor * config_.sigma_factor * atBase(solved->covariance, pose);
   pose.inliers = solved->agreeing;
   pose.reprojection_px = solved->median_error * focal_px_;
   if (const auto geometry = map_.geometry(images.front())) pose.map_covariance = atBase(geometry->covariance, pose);
-  focal_.add(solved->focal_scale, solved->focal_sigma);
-  const bool is_sure = pose.sigma_m() <= config_.max_sigma_m;
-  return is_sure && !focal_.contradicts() ? std::optional<MetricPose>(pose) : std::nullopt;
+  solution.moving_gain = solved->moving_gain;
+  solution.focal_scale = solved->focal_scale;
+  solution.focal_sigma = solved->focal_sigma;
+  solution.holds =
+      pose.sigma_m() <= config_.max_sigma_m && !focal_.wouldContradict(solution.focal_scale, solution.focal_sigma);
+  return solution;
 }
 
 /// Each training image is compared at most once.
@@ -226,11 +239,9 @@ void PoseVerifier::match(std::size_t training_image, const ImageGeometry& geomet
   }
 }
 
-/// How many inliers each training image shows.
-std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t>& training_images,
-                                                   std::vector<Pair> inliers) {
+void PoseVerifier::addMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers,
+                              Solution& solution) {
   std::sort(inliers.begin(), inliers.end());
-  std::vector<std::size_t> counts;
   std::size_t most = 0;
   for (const std::size_t image : training_images) {
     MatchedLandmarks matched{image, {}};
@@ -241,12 +252,11 @@ std::vector<std::size_t> PoseVerifier::keepMatched(const std::vector<std::size_t
       matched.landmarks.push_back({{keypoint.x_px, keypoint.y_px}, match.training_feature, inlier});
       agreeing += inlier ? 1 : 0;
     }
-    counts.push_back(agreeing);
+    solution.agreeing.push_back(agreeing);
     if (agreeing <= most) continue;
     most = agreeing;
-    matched_ = std::move(matched);
+    solution.matched = std::move(matched);
   }
-  return counts;
 }
 
 /// Of this pose and of those before it that it follows.
@@ -259,11 +269,19 @@ bool PoseVerifier::isClear(const MetricPose& pose) const {
   return inliersTogether(pose) >= static_cast<std::size_t>(config_.min_inliers_tracking);
 }
 
-std::optional<MetricPose> PoseVerifier::accepted(MetricPose pose) {
-  if (predictor_.isAside(pose)) return std::nullopt;
+/// What landmarks say about calibration, plants and sessions counts even where their pose does not.
+std::optional<MetricPose> PoseVerifier::commit(const Solution& solution, bool accepted) {
+  focal_.add(solution.focal_scale, solution.focal_sigma);
+  moving_gain_ = solution.moving_gain;
+  if (const auto& trial = solution.trial) {
+    sessions_.learn(trial->training_image, trial->inliers, trial->tried_image, trial->tried_inliers);
+  }
+  if (!accepted || predictor_.isAside(solution.pose)) return std::nullopt;
+  MetricPose pose = solution.pose;
   const bool clear = isClear(pose);
   inliers_together_ = inliersTogether(pose);
   pose.confirmed = predictor_.add(pose) && focal_.confirms() && clear;
+  matched_ = solution.matched;
   return pose;
 }
 

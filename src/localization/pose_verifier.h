@@ -40,6 +40,8 @@ class FocalCheck {
   bool confirms() const;
   /// They do not agree with it.
   bool contradicts() const;
+  /// The same if this were added.
+  bool wouldContradict(double scale, double sigma) const;
   /// Mean of the last images, weighted; 1 without any.
   double scale() const;
 
@@ -103,7 +105,7 @@ class PoseVerifier {
   std::optional<PredictedPose> predicted() const { return predictor_.predicted(); }
   /// Training images whose landmarks were matched with the image, each once.
   std::vector<std::size_t> compared() const;
-  /// What the last solved pose rests on: of the training image that shares most inliers with it.
+  /// What the last verified pose rests on: of the training image that shares most inliers with it.
   const MatchedLandmarks& matched() const { return matched_; }
   /// What the last images say about the calibration. While they contradict it no pose is verified.
   const FocalCheck& focal() const { return focal_; }
@@ -123,19 +125,36 @@ class PoseVerifier {
     std::vector<Match> matches;
   };
   using Pair = std::pair<std::uint32_t, std::size_t>;  ///< a landmark and a feature of the image
+  /// How many inliers a training image shows and one of the session that is being tried.
+  struct Trial {
+    std::size_t training_image = 0;
+    double inliers = 0.0;
+    std::size_t tried_image = 0;
+    double tried_inliers = 0.0;
+  };
+  /// A pose that landmarks make, and what else they say. Nothing of it counts before commit().
+  struct Solution {
+    MetricPose pose;
+    MatchedLandmarks matched;           ///< with the training image that shares most inliers
+    std::vector<std::size_t> agreeing;  ///< inliers that each training image shows
+    double moving_gain = 0.0;
+    double focal_scale = 1.0;
+    double focal_sigma = 0.0;
+    bool holds = false;  ///< the pose is sure, and by a calibration that the images do not contradict
+    std::optional<Trial> trial;
+  };
 
-  std::optional<MetricPose> solve(const std::vector<std::size_t>& training_images, std::size_t min_inliers,
-                                  std::optional<std::size_t> trial = {});
-  std::optional<MetricPose> solveAround(const Eigen::Vector2d& position_m, double yaw_rad,
-                                        std::vector<std::size_t> training_images, std::size_t min_inliers,
-                                        std::optional<std::size_t> trial = {});
+  std::optional<Solution> solve(const std::vector<std::size_t>& training_images, std::size_t min_inliers);
+  std::optional<Solution> solveAround(const Eigen::Vector2d& position_m, double yaw_rad,
+                                      std::vector<std::size_t> training_images, std::size_t min_inliers,
+                                      std::optional<std::size_t> trial = {});
   const std::vector<Match>& matchesWith(std::size_t training_image);
   void match(std::size_t training_image, const ImageGeometry& geometry, std::vector<Match>& matches);
-  std::vector<std::size_t> keepMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers);
+  void addMatched(const std::vector<std::size_t>& training_images, std::vector<Pair> inliers, Solution& solution);
   std::optional<MetricPose> near(const std::optional<PredictedPose>& prediction);
   std::size_t inliersTogether(const MetricPose& pose) const;
   bool isClear(const MetricPose& pose) const;
-  std::optional<MetricPose> accepted(MetricPose pose);
+  std::optional<MetricPose> commit(const Solution& solution, bool accepted);
 
   const TrainingMap& map_;
   MetricConfig config_;
@@ -143,7 +162,7 @@ class PoseVerifier {
   FocalCheck focal_;
   PosePredictor predictor_;
   MotionEvidence moving_;             ///< of the images before
-  double moving_gain_ = 0.0;          ///< of the pose last solved in the image
+  double moving_gain_ = 0.0;          ///< of the image
   std::size_t inliers_together_ = 0;  ///< of verified poses that follow each other
   const LocalFeatures* features_ = nullptr;
   KeypointRays rays_;  ///< of the features

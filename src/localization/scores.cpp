@@ -16,13 +16,6 @@ void SimilarityConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"similarity/sift_recognised", "1",
                 "a best match below this share of the features is a bad one (journal, section 5)"},
                sift_recognised, 0.0, 1.0);
-  visitor.real({"similarity/votes_recognised", "1", "the same of a best match by votes"}, votes_recognised, 0.0, 1.0);
-  visitor.real({"similarity/votes_exponent", "1", "a share of votes is raised to this to become a weight"},
-               votes_exponent, 1.0, 1000.0);
-  visitor.real({"similarity/global_recognised", "1", "a best global similarity below this is a bad one"},
-               global_recognised, 0.0, 1.0);
-  visitor.real({"similarity/global_exponent", "1", "a global similarity is raised to this to become a weight"},
-               global_exponent, 1.0, 1000.0);
 }
 
 LocalSimilarity::LocalSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px,

@@ -1,8 +1,10 @@
+#include <map>
 #include <set>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "parameters/former_parameters.h"
 #include "test/localization/wall_street.h"
 #include "test/support/swarm_config.h"
 #include "visual_localization/localization/localizer.h"
@@ -108,6 +110,52 @@ TEST(Sweep, AReconfigurationSweepsTheImageAnew) {
   for (int i = 0; i < 200; ++i) drawn.insert(sweep.draw(scores, random));
   EXPECT_EQ(drawn.size(), 5U);
   EXPECT_LT(*drawn.rbegin(), map->size());
+}
+
+TEST(FormerParameters, HaveTheValuesThatTheLocalizerUses) {
+  const LocalizerConfig config;
+  const std::map<std::string, double> in_use{
+      {"bayes/comparisons", config.bayes.comparisons},
+      {"bayes/first_comparisons", config.bayes.first_comparisons},
+      {"bayes/uniform", config.bayes.uniform},
+      {"dpso/best_particles", config.dpso.best_particles},
+      {"dpso/corridor", config.dpso.corridor_m},
+      {"dpso/exclusion_radius", config.dpso.exclusion_radius_m},
+      {"dpso/mode_radius", config.dpso.mode_radius_m},
+      {"dpso/rival_share", config.dpso.rival_share},
+      {"metric/keypoint_sigma", config.metric.keypoint_sigma_px},
+      {"metric/match_ratio", config.metric.match_ratio},
+      {"metric/max_focal_error", config.metric.max_focal_error},
+      {"metric/max_gap", config.metric.max_gap_s},
+      {"metric/max_prediction_error", config.metric.max_prediction_error_m},
+      {"metric/max_sigma", config.metric.max_sigma_m},
+      {"metric/min_inliers_predicted", config.metric.min_inliers_predicted},
+      {"metric/sigma_factor", config.metric.sigma_factor},
+      {"metric/tolerance", config.metric.tolerance_px},
+      {"metric/training_images", config.metric.training_images},
+      {"odometry/max_distance", config.odometry.max_distance_m},
+      {"odometry/max_gap", config.odometry.max_gap_s},
+      {"odometry/max_speed", config.odometry.max_speed_mps},
+      {"odometry/share", config.odometry.share},
+      {"similarity/global_exponent", config.similarity.global_exponent},
+      {"similarity/global_recognised", config.similarity.global_recognised},
+      {"similarity/votes_exponent", config.similarity.votes_exponent},
+      {"similarity/votes_recognised", config.similarity.votes_recognised},
+      {"state/frozen_time", config.state.frozen_time_s},
+      {"state/max_step", config.state.max_step_m},
+      {"state/min_features", config.state.min_features},
+      {"state/min_global_similarity", config.state.min_global_similarity},
+      {"state/min_matches", config.state.min_matches},
+      {"state/sure_similarity", config.state.sure_similarity},
+  };
+  EXPECT_EQ(formerParameters(), in_use);
+}
+
+TEST(FormerParameters, AreDeclaredNoMore) {
+  LocalizerConfig config;
+  const ParameterValues declared =
+      parameters::values([&config](ParameterVisitor& visitor) { config.declare(visitor); });
+  for (const auto& [name, value] : formerParameters()) EXPECT_EQ(declared.count(name), 0U) << name << " = " << value;
 }
 
 }  // namespace

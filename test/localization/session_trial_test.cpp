@@ -1,5 +1,6 @@
 // What landmarks teach about the sessions of a map.
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -162,6 +163,50 @@ TEST_F(SessionsTogether, TooFewOfAllAreNotTracking) {
 
 TEST_F(SessionsTogether, ShowNoKeypointTwice) {
   EXPECT_LE(inliersLike(morning_, withTracking(10'000)), of_evening_ + 2) << "the evening has all of the morning's";
+}
+
+/// The evening's landmarks agree with a pose elsewhere and say themselves that they are known to metres only: the pose
+/// that they make is refused.
+class RefusedRetry : public SessionTrial {
+ protected:
+  static std::shared_ptr<const TrainingMap> withVagueEvening(const TrainingMap& days) {
+    std::vector<TrainingImage> images;
+    for (std::size_t i = 0; i < days.size(); ++i) {
+      images.push_back(days.image(i));
+      ImageGeometry& geometry = *images.back().geometry;
+      if (images.back().session == 0) continue;
+      geometry.camera.position_m += Eigen::Vector3d(10.0, 5.0, 0.0);
+      for (SeenLandmark& landmark : geometry.landmarks) landmark.sigma_along_m = landmark.sigma_across_m = 5.0F;
+    }
+    return std::make_shared<const TrainingMap>(days.header(), std::move(images));
+  }
+
+  const std::size_t image_ = 20;
+  std::shared_ptr<const TrainingMap> vague_ = withVagueEvening(*map_);
+  SessionChoice sessions_of_vague_{*vague_, true};
+  PoseVerifier verifier_of_vague_{*vague_, withTracking(10'000), sessions_of_vague_};
+};
+
+TEST_F(RefusedRetry, LeavesNothingBehind) {
+  const LocalFeatures seen = street_.seenFrom(street_.trueNear(image_, Eigen::Vector3d::Zero()));
+  sessions_of_vague_.startImage(0);
+  verifier_of_vague_.startImage(0, seen, street_.camera());
+  EXPECT_FALSE(verifier_of_vague_.nearOneOf({vague_->size() / 2 + image_})) << "the evening alone";
+  EXPECT_TRUE(verifier_of_vague_.matched().landmarks.empty());
+  EXPECT_EQ(sessions_of_vague_.chosen(), 0U);
+
+  const std::optional<MetricPose> pose = verifier_of_vague_.nearOneOf({image_});
+  ASSERT_TRUE(pose);
+  const Eigen::Vector3d expected_m = vague_->geometry(image_)->camera.position_m;
+  EXPECT_LT((pose->camera.position_m - expected_m).norm(), 0.1);
+  const MatchedLandmarks& matched = verifier_of_vague_.matched();
+  EXPECT_LT(matched.training_image, vague_->size() / 2) << "of the morning, whose pose it is";
+  const auto inliers = std::count_if(matched.landmarks.begin(), matched.landmarks.end(),
+                                     [](const MatchedLandmark& landmark) { return landmark.inlier; });
+  EXPECT_GT(inliers, 10);
+  EXPECT_EQ(sessions_of_vague_.chosen(), 0U);
+  const std::vector<std::size_t> compared = verifier_of_vague_.compared();
+  EXPECT_GE(*std::max_element(compared.begin(), compared.end()), vague_->size() / 2) << "the evening was tried";
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "localization/dpso.h"
 #include "test/support/world.h"
 #include "visual_localization/localization/tracker.h"
 

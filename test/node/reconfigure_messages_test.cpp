@@ -71,7 +71,7 @@ TEST_F(ReconfigureMessages, RangesAndDefaultsAreThoseOfTheDeclarations) {
   EXPECT_EQ(valueOf(message.min.ints, "dpso/particles"), 2);
   EXPECT_EQ(valueOf(message.max.ints, "dpso/particles"), 100000);
   EXPECT_EQ(valueOf(message.dflt.ints, "dpso/particles"), 80);
-  EXPECT_EQ(valueOf(message.max.doubles, "similarity/global_exponent"), 1000.0);
+  EXPECT_EQ(valueOf(message.max.doubles, "fitness/distance_sigma"), 1000.0);
   EXPECT_EQ(valueOf(message.dflt.strs, "tracker"), "bayes");
   EXPECT_EQ(valueOf(message.dflt.bools, "prune"), 0);
 }

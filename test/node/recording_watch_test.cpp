@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "node/map_recorder.h"
+#include "node/recording_watch.h"
 #include "test/support/stamps.h"
 #include "test/support/synthetic.h"
 

@@ -121,7 +121,7 @@ class ReconfigureTest(unittest.TestCase):
             make_plain(path)
             before = self.values()
             self.client.update_configuration({'tracker': 'pf_linear', 'dpso/particles': 80, 'prune': False,
-                                              'state/max_step': 12.5})
+                                              'state/max_distance': 12.5})
             run(*DYNPARAM, 'load', 'localizer', path)
         self.assertEqual(self.values(), before)
         self.assertIn("'dpso/particles': 50", run(*DYNPARAM, 'get', 'localizer'))

@@ -38,8 +38,8 @@ class Localizer {
   /// `grey`: 8-bit, one channel, at least 16 x 16; resized to the map's size. Throws std::invalid_argument for
   /// anything else, and then nothing has changed. An image that repeats the one before to the last bit is no new
   /// evidence: it gets the same answer, unless the localizer was told something meanwhile. After some of them in a row
-  /// (state/frozen_images, state/frozen_time) the camera counts as frozen, and the position must be confirmed anew.
-  /// With state/frozen_images 0 a repeated image with another stamp is an image like any other.
+  /// (state/frozen_images, over StateConfig::frozen_time_s) the camera counts as frozen, and the position must be
+  /// confirmed anew. With state/frozen_images 0 a repeated image with another stamp is an image like any other.
   Estimate process(std::int64_t stamp_ns, const cv::Mat& grey);
 
   /// A reading of odometry, which may help from the next image on; see OdometryTrack::add. Without any the localizer

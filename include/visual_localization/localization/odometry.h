@@ -12,12 +12,12 @@ namespace visual_localization {
 
 /// How far odometry is believed.
 struct OdometryConfig {
-  double max_speed_mps = 10.0;
-  double max_gap_s = 0.5;
+  double max_speed_mps = 10.0;  ///< a faster reading has jumped; no parameter
+  double max_gap_s = 0.5;       ///< between two readings; no parameter
   double distance_sigma = 0.05;
   double turn_sigma_rad_m = 0.01;
-  double max_distance_m = 100.0;
-  double share = 0.5;
+  double max_distance_m = 100.0;  ///< that it bridges, which is 5 m of sigma by then; no parameter
+  double share = 0.5;             ///< of the particles; the others find out if it is wrong; no parameter
 
   void declare(ParameterVisitor& visitor);
 };
@@ -45,9 +45,8 @@ class OdometryTrack {
   /// Readings must come in order of time: a late one is ignored, and where time goes back by more than kLate_s all
   /// begins anew. Throws std::invalid_argument when a number is not finite, and then nothing has changed.
   void add(const OdometryReading& reading);
-  /// Nothing unless readings cover the time: a gap (odometry/max_gap) or a jump (odometry/max_speed, or a turn faster
-  /// than 2 pi/s) in it, or one before
-  /// the first or too long after the last of them. Up to odometry/max_gap after the last one the motion goes on.
+  /// Nothing unless readings cover the time, without a gap (max_gap_s) or a jump (max_speed_mps, or a turn faster than
+  /// 2 pi/s), from the first of them on. Up to max_gap_s after the last one the motion goes on.
   std::optional<OdometryIncrement> between(std::int64_t from_ns, std::int64_t to_ns) const;
 
   static constexpr double kLate_s = 1.0;

@@ -38,10 +38,10 @@ struct Score {
 /// What a similarity means, for each kind of features.
 struct SimilarityConfig {
   double sift_recognised = 0.05;
-  double votes_recognised = 0.016;
-  double votes_exponent = 2.0;
+  double votes_recognised = 0.016;  ///< no parameter, nor is what follows
+  double votes_exponent = 2.0;      ///< a share of votes is raised to this to become a weight
   double global_recognised = 0.6;
-  double global_exponent = 20.0;
+  double global_exponent = 20.0;  ///< the same of a global similarity (Weiss et al., section IV.A)
 
   /// The least similarity that is no accident.
   double recognised(FeatureKind features, const MatchConfig& match) const {

@@ -27,27 +27,27 @@ enum class LocalizationState : std::uint8_t {
 /// "NO_MAP", "INITIALIZING", ...
 std::string toString(LocalizationState state);
 
-/// When a position counts as confirmed.
+/// When a position counts as confirmed. What has a comment is no parameter.
 struct StateConfig {
   std::string witness = "probability";
   double min_probability = 0.97;
   double min_similarity = 0.08;
-  int min_matches = 5;
+  int min_matches = 5;  ///< of few features a large share matches by chance
   double max_scale = 1.2;
-  double min_global_similarity = 0.65;
+  double min_global_similarity = 0.65;  ///< of a best match by global features
   double max_distance_m = 5.0;
   int window = 5;
   int images_to_confirm = 4;
-  double max_step_m = 10.0;
+  double max_step_m = 10.0;  ///< a larger jump of the estimate voids earlier confirmations
   bool place_check = true;
-  double sure_similarity = 0.2;
+  double sure_similarity = 0.2;  ///< a stronger match of local features needs no place check
   double min_place_ratio = 0.985;
   int motion_length = 10;
   double max_motion_residual_m = 2.5;
   int off_map_images = 10;
-  int min_features = 10;
+  int min_features = 10;  ///< an image with fewer is blind and says nothing about OFF_MAP
   int frozen_images = 3;
-  double frozen_time_s = 1.0;
+  double frozen_time_s = 1.0;  ///< a stream may repeat each image to reach its rate
 
   void declare(ParameterVisitor& visitor);
 };

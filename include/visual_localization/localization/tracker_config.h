@@ -20,11 +20,11 @@ struct DpsoConfig {
   double phi0 = 0.3;
   double phi2 = 0.6;
   std::string confine = "box";
-  double corridor_m = 20.0;
+  double corridor_m = 20.0;  ///< from the nearest training image; no parameter
   std::string speed_limit = "axis";
   std::string speed_of = "moving";
   std::string position = "best";
-  int best_particles = 5;
+  int best_particles = 5;  ///< of position k_best; no parameter
   double quantum_share = 0.10;
   double quantum_std = 0.15;
   double high_energy_share = 0.10;
@@ -42,11 +42,11 @@ struct DpsoConfig {
   double quantum_share_max = 0.20;
   double phi2_min = 0.01;
   double phi0_max = 0.0;
-  double mode_radius_m = 5.0;
+  double mode_radius_m = 5.0;  ///< particles this close to the best one make up its mode; no parameter
   static constexpr int kMostSwarms = 5;
   int swarms = 3;
-  double exclusion_radius_m = 15.0;
-  double rival_share = 0.5;
+  double exclusion_radius_m = 15.0;  ///< swarms this close to each other become one; no parameter
+  double rival_share = 0.5;          ///< a rival must match so well in relation to the leader; no parameter
 
   void declare(ParameterVisitor& visitor);
 };
@@ -68,9 +68,9 @@ struct ParticleFilterConfig {
 struct BayesConfig {
   double anywhere = 0.02;
   double exponent = 0.0;
-  double uniform = 0.03;
-  int comparisons = 60;
-  int first_comparisons = 400;
+  double uniform = 0.03;        ///< share of the likelihood that is the same everywhere; no parameter
+  int comparisons = 60;         ///< of an image while the position is known; no parameter
+  int first_comparisons = 400;  ///< while it is not; no parameter
 
   void declare(ParameterVisitor& visitor);
 };
