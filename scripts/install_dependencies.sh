@@ -17,7 +17,7 @@ libnanoflann-dev: search for the training images near a position
 libgeographiclib-dev: GPS positions to metres
 libcli11-dev: command lines of the programs
 libboost-dev: polygons; bags
-libjpeg-dev libpng-dev: previews, masks, compressed images
+libjpeg-dev libpng-dev libturbojpeg0-dev: previews, masks, compressed images
 libyaml-cpp-dev: configuration files
 nlohmann-json3-dev: GeoJSON export of maps
 libhwy-dev: vectorised SIFT and comparison of descriptors

@@ -127,13 +127,13 @@ main() {
   ((${#chosen[@]})) || chosen=("${releases[@]}")
   if [[ -z $mirror ]]; then mirror=$(mirror_of_host); fi
   require_trees
-  mkdir -p "$directory"
-  touch "$directory/CATKIN_IGNORE"
-  directory=$(cd "$directory" && pwd)
+  directory=$(realpath --canonicalize-missing "$directory")
   local tree
   for release in "${chosen[@]}"; do
     for tree in "$directory/$release" "$directory/$release-package"; do require_own_tree; done
   done
+  mkdir -p "$directory"
+  touch "$directory/CATKIN_IGNORE"
 
   echo "Tests $(git -C "$repo" log -1 --format='%h %s') on ${chosen[*]}. Logs: $directory/*.log"
   for release in "${chosen[@]}"; do test_release || result=1; done

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
-#include <iomanip>
 #include <numeric>
 #include <optional>
 #include <sstream>
@@ -60,67 +59,85 @@ json feature(const std::string& type, json where, json properties) {
           {"properties", std::move(properties)}};
 }
 
-/// Of at least two positions.
-json line(json positions, json properties) {
-  if (positions.size() == 1) positions.push_back(positions.front());
-  return feature("LineString", std::move(positions), std::move(properties));
+/// Images of each session, in the order of the map.
+using SessionImages = std::vector<std::vector<std::size_t>>;
+
+SessionImages imagesOfSessions(const TrainingMap& map) {
+  SessionImages images(map.header().sessions.size());
+  for (std::size_t i = 0; i < map.size(); ++i) images[static_cast<std::size_t>(map.pose(i).session)].push_back(i);
+  return images;
 }
 
-/// One feature a line, so that a large map is never a tree in memory.
+/// One feature a line, each written before the next one is made: a map may have very many images.
 class FeatureCollection {
  public:
-  void add(const json& feature) {
-    text_ += text_.empty() ? "" : ",\n";
-    // The name of a session need not be UTF-8.
-    text_ += feature.dump(-1, ' ', false, json::error_handler_t::replace);
+  FeatureCollection(const TrainingMap& map, const TextSink& write) : map_(map), write_(write) {
+    write_("{\"type\":\"FeatureCollection\",\"features\":[\n");
   }
-  std::string text() const { return "{\"type\":\"FeatureCollection\",\"features\":[\n" + text_ + "\n]}\n"; }
+
+  void addPoint(std::size_t image, json properties) {
+    begin();
+    write_(text(feature("Point", coordinates(map_, image), std::move(properties))));
+  }
+
+  /// Through images from `first` to `last`, neither of them the end.
+  template <class Image>
+  void addLine(Image first, Image last, json properties) {
+    begin();
+    write_("{\"geometry\":{\"coordinates\":[" + coordinates(map_, *first).dump());
+    Image image = first;
+    do {  // GeoJSON's line has at least two positions
+      if (image != last) ++image;
+      write_("," + coordinates(map_, *image).dump());
+    } while (image != last);
+    write_("],\"type\":\"LineString\"},\"properties\":" + text(properties) + ",\"type\":\"Feature\"}");
+  }
+
+  void end() { write_("\n]}\n"); }
 
  private:
-  std::string text_;
+  /// The name of a session need not be UTF-8.
+  static std::string text(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+  void begin() {
+    if (!first_) write_(",\n");
+    first_ = false;
+  }
+
+  const TrainingMap& map_;
+  const TextSink& write_;
+  bool first_ = true;
 };
 
-void addPaths(const TrainingMap& map, FeatureCollection& features) {
-  std::vector<json> paths(map.header().sessions.size());
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    paths[static_cast<std::size_t>(map.pose(i).session)].push_back(coordinates(map, i));
-  }
-  for (std::size_t s = 0; s < paths.size(); ++s) {
-    if (paths[s].empty()) continue;
-    const std::size_t images = paths[s].size();
-    features.add(line(std::move(paths[s]), {{"session", sessionOf(map, static_cast<int>(s))}, {"images", images}}));
+void addPaths(const TrainingMap& map, const SessionImages& images, FeatureCollection& features) {
+  for (std::size_t s = 0; s < images.size(); ++s) {
+    if (images[s].empty()) continue;
+    features.addLine(images[s].begin(), images[s].end() - 1,
+                     {{"session", sessionOf(map, static_cast<int>(s))}, {"images", images[s].size()}});
   }
 }
 
-/// Each image is looked at once, however the stretches of several sessions are interleaved.
-void addStretches(const TrainingMap& map, const std::vector<Stretch>& stretches, const std::string& flaw,
-                  FeatureCollection& features) {
-  std::vector<json> lines(stretches.size());
-  std::vector<std::vector<std::size_t>> of_session(map.header().sessions.size());
-  for (std::size_t s = stretches.size(); s-- > 0;) {
-    of_session[static_cast<std::size_t>(stretches[s].session)].push_back(s);  // the first one at the back
-  }
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    auto& waiting = of_session[static_cast<std::size_t>(map.pose(i).session)];
-    if (waiting.empty() || i < stretches[waiting.back()].first) continue;
-    lines[waiting.back()].push_back(coordinates(map, i));
-    if (i == stretches[waiting.back()].last) waiting.pop_back();
-  }
-  for (std::size_t s = 0; s < stretches.size(); ++s) {
-    features.add(line(std::move(lines[s]), {{"weak", flaw},
-                                            {"session", sessionOf(map, stretches[s].session)},
-                                            {"images", stretches[s].images},
-                                            {"length_m", rounded(stretches[s].length_m)},
-                                            {"least_features", stretches[s].least_features}}));
+void addStretches(const TrainingMap& map, const SessionImages& images, const std::vector<Stretch>& stretches,
+                  const std::string& flaw, FeatureCollection& features) {
+  for (const Stretch& stretch : stretches) {
+    const std::vector<std::size_t>& session = images[static_cast<std::size_t>(stretch.session)];
+    features.addLine(std::lower_bound(session.begin(), session.end(), stretch.first),
+                     std::lower_bound(session.begin(), session.end(), stretch.last),
+                     {{"weak", flaw},
+                      {"session", sessionOf(map, stretch.session)},
+                      {"images", stretch.images},
+                      {"length_m", rounded(stretch.length_m)},
+                      {"least_features", stretch.least_features}});
   }
 }
 
 void addGaps(const TrainingMap& map, const MapFindings& findings, FeatureCollection& features) {
   for (const Step& step : findings.survey.longest_steps) {
     if (step.length_m <= findings.config.gap_m) continue;
-    features.add(
-        line({coordinates(map, step.from), coordinates(map, step.to)},
-             {{"weak", "gap"}, {"session", sessionOf(map, step.session)}, {"length_m", rounded(step.length_m)}}));
+    const std::array<std::size_t, 2> ends{step.from, step.to};
+    features.addLine(
+        ends.begin(), ends.end() - 1,
+        {{"weak", "gap"}, {"session", sessionOf(map, step.session)}, {"length_m", rounded(step.length_m)}});
   }
 }
 
@@ -135,38 +152,38 @@ void addImages(const TrainingMap& map, const MapFindings& findings, FeatureColle
                     {"features", map.featureCount(i)},
                     {"few_features", map.featureCount(i) < findings.config.few_features}};
     if (!ambiguous.empty()) properties["ambiguous"] = static_cast<bool>(ambiguous[i]);
-    features.add(feature("Point", coordinates(map, i), std::move(properties)));
+    features.addPoint(i, std::move(properties));
   }
 }
 
 }  // namespace
 
-std::string toCsv(const TrainingMap& map, const MapFindings& findings) {
+void writeCsv(const TrainingMap& map, const MapFindings& findings, const TextSink& write) {
   const std::vector<bool> ambiguous = ambiguousImages(map, findings);
-  std::ostringstream out;
-  out << "stamp,session,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,features,weak,ambiguous\n"
-      << std::setprecision(17);
+  write("stamp,session,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,features,weak,ambiguous\n");
   for (std::size_t i = 0; i < map.size(); ++i) {
     const TrainingPose image = map.pose(i);
     const GeodeticPoint point = map.frame().toGeodetic(image.position_m);
-    out << secondsText(image.stamp_ns) << ',' << csvQuoted(sessionOf(map, image.session)) << ',' << image.position_m.x()
+    std::ostringstream row = numberStream();
+    row << secondsText(image.stamp_ns) << ',' << csvQuoted(sessionOf(map, image.session)) << ',' << image.position_m.x()
         << ',' << image.position_m.y() << ',' << image.yaw_rad << ',' << point.latitude_deg << ','
         << point.longitude_deg << ',' << map.featureCount(i) << ','
         << (map.featureCount(i) < findings.config.few_features ? 1 : 0) << ',';
-    if (!ambiguous.empty()) out << (ambiguous[i] ? 1 : 0);
-    out << '\n';
+    if (!ambiguous.empty()) row << (ambiguous[i] ? 1 : 0);
+    row << '\n';
+    write(row.str());
   }
-  return out.str();
 }
 
-std::string toGeoJson(const TrainingMap& map, const MapFindings& findings) {
-  FeatureCollection features;
-  addPaths(map, features);
-  addStretches(map, findings.survey.weak, "few features", features);
-  if (findings.ambiguity) addStretches(map, findings.ambiguity->stretches, "ambiguous", features);
+void writeGeoJson(const TrainingMap& map, const MapFindings& findings, const TextSink& write) {
+  const SessionImages images = imagesOfSessions(map);
+  FeatureCollection features(map, write);
+  addPaths(map, images, features);
+  addStretches(map, images, findings.survey.weak, "few features", features);
+  if (findings.ambiguity) addStretches(map, images, findings.ambiguity->stretches, "ambiguous", features);
   addGaps(map, findings, features);
   addImages(map, findings, features);
-  return features.text();
+  features.end();
 }
 
 ColmapSummary writeColmap(const TrainingMap& map, const std::string& folder) {

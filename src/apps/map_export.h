@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <ostream>
@@ -66,12 +67,15 @@ struct MapFindings {
 /// the map's file.
 void printMapReport(std::ostream& out, const std::string& path, const TrainingMap& map, const MapFindings& findings);
 
+/// Takes one piece of a text after the other.
+using TextSink = std::function<void(const std::string&)>;
+
 /// One line per image. `weak` is 1 for few features, `ambiguous` 1 for an image that looks like one far away, empty
 /// when not checked.
-std::string toCsv(const TrainingMap& map, const MapFindings& findings);
+void writeCsv(const TrainingMap& map, const MapFindings& findings, const TextSink& write);
 
 /// Paths, weak stretches and gaps as lines, images as points; WGS84.
-std::string toGeoJson(const TrainingMap& map, const MapFindings& findings);
+void writeGeoJson(const TrainingMap& map, const MapFindings& findings, const TextSink& write);
 
 /// Into a folder that is new or empty: a camera for each calibrated session, images with a geometry as
 /// SESSION/STAMP.png, landmarks as points, metres of the map frame. Throws std::runtime_error, in one line, when

@@ -35,6 +35,23 @@ std::string exportColmap(const TrainingMap& map, const std::string& folder) {
   return text.str();
 }
 
+/// Nothing without a path.
+void exportFile(const std::string& path, const TrainingMap& map, const MapFindings& findings,
+                decltype(writeCsv)& writeTo) {
+  if (path.empty()) return;
+  PartialFile file(path);
+  std::string waiting;  // a call to the system for each line would take longer than the line
+  constexpr std::size_t kWaiting_bytes = std::size_t{1} << 20U;
+  writeTo(map, findings, [&](const std::string& text) {
+    waiting += text;
+    if (waiting.size() < kWaiting_bytes) return;
+    file.write(waiting);
+    waiting.clear();
+  });
+  file.write(waiting);
+  file.commit();
+}
+
 void showMap(const MapInfoOptions& options) {
   if (!options.geojson.empty()) requireNoInput("--export-geojson", options.geojson, {options.map});
   if (!options.csv.empty()) requireNoInput("--export-csv", options.csv, {options.map});
@@ -49,8 +66,8 @@ void showMap(const MapInfoOptions& options) {
   printMapReport(std::cout, options.map, *map, findings);
   if (options.check) std::cout << "\ncheck:       ok\n";
   std::cout << exported;
-  if (!options.geojson.empty()) writeFile(options.geojson, toGeoJson(*map, findings));
-  if (!options.csv.empty()) writeFile(options.csv, toCsv(*map, findings));
+  exportFile(options.geojson, *map, findings, writeGeoJson);
+  exportFile(options.csv, *map, findings, writeCsv);
 }
 
 }  // namespace

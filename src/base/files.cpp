@@ -84,6 +84,9 @@ bool isAt(int descriptor, const std::string& path) {
          open.st_ino == named.st_ino;
 }
 
+/// As in an errno of flock(): the file system has no locks, as a network disk without its lock manager.
+bool isWithoutLocks(int error) { return error == ENOLCK || error == EOPNOTSUPP || error == ENOSYS; }
+
 /// Opens the file and locks it (flock) until the descriptor is closed or the process has ended, however. `flags`: more
 /// of open(). Returns a descriptor, or -1 with errno: EWOULDBLOCK when another process holds it.
 int openLocked(const std::string& path, int flags) {
@@ -356,7 +359,11 @@ OutputLock::OutputLock(const std::string& target) : path_(resolved(target) + std
 bool OutputLock::tryLock() {
   const Change change;
   locked_ = openLocked(path_, O_CREAT);
-  if (locked_ < 0) return errno != EWOULDBLOCK;
+  if (locked_ < 0) {
+    if (errno == EWOULDBLOCK) return false;
+    if (isWithoutLocks(errno)) ::unlink(path_.c_str());  // it keeps nobody away, and nobody else would remove it
+    return true;
+  }
   slot_ = enlist(path_);
   nameHolder(locked_);
   return true;

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
-#include <png.h>
 
 #include "base/files.h"
+#include "base/png_reader.h"
 #include "base/text.h"
 
 namespace visual_localization {
@@ -16,62 +16,28 @@ namespace {
 
 constexpr std::size_t kLargestFile_bytes = std::size_t{64} << 20U;
 constexpr std::uint32_t kLargestSide_px = 8192;
-constexpr std::size_t kSignature = 8;
-constexpr char kWrongKind[] = "must be grey with 8 bits a pixel, without transparency";
 
-std::uint32_t bigEndian(const std::string& bytes, std::size_t at) {
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i) value = value << 8U | static_cast<unsigned char>(bytes[at + i]);
-  return value;
-}
-
-/// The size in pixels of a PNG by its header (https://www.w3.org/TR/png, 11.2.1), before memory is taken for it.
-cv::Size sizeOfPng(const std::string& bytes) {
-  constexpr std::size_t kHeader = 26;  // signature, IHDR with sides, depth and type of colour
-  if (bytes.size() < kHeader || bytes.compare(0, kSignature, "\x89PNG\r\n\x1A\n") != 0 ||
-      bytes.compare(12, 4, "IHDR") != 0) {
-    throw CameraError("is not a PNG image");
+/// The size in pixels, before memory is taken for it.
+cv::Size sizeFrom(PngReader& png, const std::string& bytes) {
+  if (bytes.compare(0, 8, "\x89PNG\r\n\x1A\n") != 0) throw CameraError("is not a PNG image");
+  const std::string most = std::to_string(kLargestSide_px) + " x " + std::to_string(kLargestSide_px) + " are allowed";
+  if (!png.readHeader()) throw CameraError("is damaged or has too many pixels, at most " + most);
+  if (png.width() > kLargestSide_px || png.height() > kLargestSide_px) {
+    throw CameraError("has " + std::to_string(png.width()) + " x " + std::to_string(png.height()) +
+                      " pixels, at most " + most);
   }
-  const std::uint32_t width = bigEndian(bytes, 16);
-  const std::uint32_t height = bigEndian(bytes, 20);
-  if (width < 1 || height < 1 || width > kLargestSide_px || height > kLargestSide_px) {
-    throw CameraError("has " + std::to_string(width) + " x " + std::to_string(height) + " pixels, at most " +
-                      std::to_string(kLargestSide_px) + " x " + std::to_string(kLargestSide_px) + " are allowed");
+  if (!png.isGrey() || png.bits() != 8 || png.isTransparent()) {
+    throw CameraError("must be grey with 8 bits a pixel, without transparency");
   }
-  const int depth = static_cast<unsigned char>(bytes[24]);
-  const int colour = static_cast<unsigned char>(bytes[25]);
-  if (depth != 8 || colour != 0) throw CameraError(kWrongKind);
-  return {static_cast<int>(width), static_cast<int>(height)};
-}
-
-/// A PNG without the chunks that would change its pixels, as gamma does, or take memory, as texts do.
-std::string barePng(const std::string& bytes) {
-  constexpr std::size_t kAround = 12;  // length, type and checksum of a chunk
-  std::string bare = bytes.substr(0, kSignature);
-  for (std::size_t at = kSignature;;) {
-    if (bytes.size() - at < kAround) throw CameraError("is cut off");
-    const std::size_t length = bigEndian(bytes, at);
-    if (length > bytes.size() - at - kAround) throw CameraError("is cut off");
-    const std::string type = bytes.substr(at + 4, 4);
-    if (type == "tRNS") throw CameraError(kWrongKind);
-    if (type == "IHDR" || type == "IDAT" || type == "IEND") bare.append(bytes, at, length + kAround);
-    if (type == "IEND") return bare;
-    at += length + kAround;
-  }
+  return {static_cast<int>(png.width()), static_cast<int>(png.height())};
 }
 
 Mask decoded(const std::string& bytes) {
-  cv::Mat grey(sizeOfPng(bytes), CV_8UC1);
-  const std::string bare = barePng(bytes);
-  png_image png{};
-  png.version = PNG_IMAGE_VERSION;
-  if (::png_image_begin_read_from_memory(&png, bare.data(), bare.size()) == 0) {
-    throw CameraError("cannot be decoded: " + oneLine(png.message));
-  }
-  png.format = PNG_FORMAT_GRAY;
-  if (::png_image_finish_read(&png, nullptr, grey.data, static_cast<png_int_32>(grey.step), nullptr) == 0) {
-    throw CameraError("cannot be decoded: " + oneLine(png.message));
-  }
+  PngReader png(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), kLargestSide_px);
+  cv::Mat grey(sizeFrom(png, bytes), CV_8UC1);
+  std::vector<std::uint8_t*> rows;
+  for (int row = 0; row < grey.rows; ++row) rows.push_back(grey.ptr(row));
+  if (!png.read(rows, 1)) throw CameraError("is damaged or cut off");
   return Mask(grey);
 }
 

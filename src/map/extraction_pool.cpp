@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csetjmp>
-#include <cstdio>
+#include <memory>
 #include <new>
 #include <utility>
 
-#include <jpeglib.h>
+#include <turbojpeg.h>
 
 #include "base/numbers.h"
 #include "base/parallel.h"
@@ -18,71 +17,32 @@ namespace {
 
 constexpr std::size_t kNeighbours = 2;  ///< Weiss et al., section III
 
-/// libjpeg writing an image. It reports errors by a jump, so functions that call it have no objects of their own.
-class JpegWriter {
- public:
-  /// `grey`: 8-bit, one channel, 1 to JPEG_MAX_DIMENSION pixels a side.
-  explicit JpegWriter(const cv::Mat& grey)
-      : grey_(grey), bytes_(kFrame_bytes + 2 * kBlock_px * kBlock_px * blocks(grey.cols) * blocks(grey.rows)) {
-    encoder_.err = ::jpeg_std_error(&errors_);
-    encoder_.client_data = this;
-    errors_.error_exit = [](j_common_ptr encoder) {
-      std::longjmp(static_cast<JpegWriter*>(encoder->client_data)->failed_, 1);
-    };
-    errors_.output_message = [](j_common_ptr) {};
+constexpr long kMostSide_px = 65500;  ///< of a JPEG, for libjpeg
+
+/// The same bytes as by libjpeg with its own settings. OpenCV would do, but its codecs load GDAL with every program.
+/// `grey`: 8-bit, one channel. Throws std::bad_alloc.
+std::vector<std::uint8_t> jpegOf(const cv::Mat& grey, int quality) {
+  const std::unique_ptr<void, int (*)(tjhandle)> encoder(::tjInitCompress(), ::tjDestroy);
+  if (encoder == nullptr) throw std::bad_alloc();
+  std::vector<std::uint8_t> bytes(::tjBufSize(grey.cols, grey.rows, TJSAMP_GRAY));
+  unsigned char* begin = bytes.data();
+  unsigned long size = bytes.size();
+  constexpr int kFlags = TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT;
+  if (::tjCompress2(encoder.get(), grey.data, grey.cols, static_cast<int>(grey.step), grey.rows, TJPF_GRAY, &begin,
+                    &size, TJSAMP_GRAY, quality, kFlags) != 0) {
+    throw std::bad_alloc();  // the only error that such an image leaves
   }
-  ~JpegWriter() { ::jpeg_destroy_compress(&encoder_); }
-  JpegWriter(const JpegWriter&) = delete;
-  JpegWriter& operator=(const JpegWriter&) = delete;
-
-  /// Once. Throws std::bad_alloc.
-  std::vector<std::uint8_t> write(int quality) {
-    unsigned char* begin = bytes_.data();
-    unsigned long size = bytes_.size();
-    if (!compress(quality, begin, size) || begin != bytes_.data()) throw std::bad_alloc();
-    bytes_.resize(size);
-    return std::move(bytes_);
-  }
-
- private:
-  /// As much as libjpeg-turbo's tjBufSize reckons for the worst image, so that libjpeg takes no buffer of its own.
-  static constexpr std::size_t kFrame_bytes = 2048;
-  static constexpr std::size_t kBlock_px = 8;
-  static std::size_t blocks(int side_px) { return (static_cast<std::size_t>(side_px) + kBlock_px - 1) / kBlock_px; }
-
-  bool compress(int quality, unsigned char*& begin, unsigned long& size) {
-    if (setjmp(failed_) != 0) return false;
-    jpeg_create_compress(&encoder_);
-    ::jpeg_mem_dest(&encoder_, &begin, &size);
-    encoder_.image_width = static_cast<JDIMENSION>(grey_.cols);
-    encoder_.image_height = static_cast<JDIMENSION>(grey_.rows);
-    encoder_.input_components = 1;
-    encoder_.in_color_space = JCS_GRAYSCALE;
-    ::jpeg_set_defaults(&encoder_);
-    ::jpeg_set_quality(&encoder_, quality, TRUE);
-    ::jpeg_start_compress(&encoder_, TRUE);
-    while (encoder_.next_scanline < encoder_.image_height) {
-      auto* row = const_cast<JSAMPROW>(grey_.ptr(static_cast<int>(encoder_.next_scanline)));  // only read
-      ::jpeg_write_scanlines(&encoder_, &row, 1);
-    }
-    ::jpeg_finish_compress(&encoder_);
-    return true;
-  }
-
-  const cv::Mat& grey_;
-  std::vector<std::uint8_t> bytes_;
-  jpeg_compress_struct encoder_{};
-  jpeg_error_mgr errors_{};
-  std::jmp_buf failed_{};
-};
+  bytes.resize(size);
+  return bytes;
+}
 
 std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
   constexpr int kPreviewQuality = 70;
   if (width_px <= 0) return {};
   const long height_px = std::lround(1.0 * grey.rows * width_px / grey.cols);
   cv::Mat small;
-  const cv::Size size(width_px, static_cast<int>(std::clamp(height_px, 1L, static_cast<long>(JPEG_MAX_DIMENSION))));
-  return JpegWriter(fitted(grey, size, small)).write(kPreviewQuality);
+  const cv::Size size(width_px, static_cast<int>(std::clamp(height_px, 1L, kMostSide_px)));
+  return jpegOf(fitted(grey, size, small), kPreviewQuality);
 }
 
 }  // namespace

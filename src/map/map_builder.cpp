@@ -57,6 +57,20 @@ std::vector<const LocalFeatures*> pointersTo(const std::vector<std::shared_ptr<c
   return pointers;
 }
 
+std::string whyNone(const MapBuildReport& report) {
+  const std::vector<std::pair<std::size_t, const char*>> reasons{
+      {report.images_disordered, "stamped not after the one that was recorded before"},
+      {report.images_without_position, "before the first or after the last believable fix"},
+      {report.images_of_other_shape, "of another shape than most"},
+      {report.images_unusable, "unusable"},
+      {report.images_standing, "of a robot that stood"}};
+  std::string text;
+  for (const auto& [count, reason] : reasons) {
+    if (count > 0) text += (text.empty() ? ": " : ", ") + std::to_string(count) + ' ' + reason;
+  }
+  return text;
+}
+
 }  // namespace
 
 MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources& resources,
@@ -183,7 +197,7 @@ void MapBuilder::extractWaiting() {
 }
 
 void MapBuilder::finish(const Sink& sink, const Progress& progress) {
-  if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map");
+  if (report_.images_kept == 0) throw std::runtime_error("no image was kept, so there is no map" + whyNone(report_));
   extractWaiting();
   const std::shared_ptr<const TrainingMap> unpruned = spool_->finish(header_);
   if (config_.geometry.enabled && config_.geometry.self_calibration) calibrate(*unpruned);

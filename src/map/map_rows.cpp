@@ -19,7 +19,8 @@ namespace {
 using sqlite::Bytes;
 using sqlite::Statement;
 
-/// The first 100 bytes of a database file, see https://www.sqlite.org/fileformat.html section 1.3.
+/// The first 100 bytes of a database file, see https://www.sqlite.org/fileformat.html section 1.3. SQLite answers only
+/// after it has parsed a schema, which may be anybody's, and takes a file with foreign bytes behind its end.
 class FileHeader {
  public:
   explicit FileHeader(const std::string& path) {

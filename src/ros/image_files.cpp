@@ -4,22 +4,20 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <initializer_list>
 #include <string>
 #include <vector>
 
 #include <jerror.h>
 #include <jpeglib.h>
-#include <png.h>
 
+#include "base/png_reader.h"
 #include "ros/image_depth.h"
 #include "visual_localization/ros/image_conversion.h"
 
-// libjpeg and libpng themselves, whose only way to report an error is a jump. OpenCV 4.6 takes 346 of 348 cut-off JPEGs
-// for whole, and 378 MiB for a PNG of 0.44 MB with compressed texts. TurboJPEG's limit of scans is newer than Debian
-// 11, and stray bytes within a JPEG look to it like a cut-off one. libpng's simplified interface reads the texts too,
-// and corrects gamma, so that its greys are not those of OpenCV.
+// libjpeg itself, whose only way to report an error is a jump; PngReader likewise. OpenCV 4.6 takes 346 of 348 cut-off
+// JPEGs for whole, and 378 MiB for a PNG of 0.44 MB with compressed texts. TurboJPEG's limit of scans is newer than
+// Debian 11, and stray bytes within a JPEG look to it like a cut-off one.
 namespace visual_localization {
 namespace {
 
@@ -124,106 +122,27 @@ cv::Mat greyOfJpeg(const Bytes& data) {
   return grey;
 }
 
-/// libpng decoding an image to grey. It reports errors by a jump, so functions that call it have no objects of their
-/// own. OpenCV's decoder lets it decompress and keep all texts in the file: gigabytes from a few megabytes.
-class PngReader {
- public:
-  explicit PngReader(const Bytes& data) : data_(data) {
-    png_ = ::png_create_read_struct(
-        PNG_LIBPNG_VER_STRING, this,
-        [](png_structp png, png_const_charp) { std::longjmp(of(::png_get_error_ptr(png)).refused_, 1); },
-        [](png_structp, png_const_charp) {});
-    if (png_ != nullptr) info_ = ::png_create_info_struct(png_);
-  }
-  ~PngReader() { ::png_destroy_read_struct(&png_, &info_, nullptr); }
-  PngReader(const PngReader&) = delete;
-  PngReader& operator=(const PngReader&) = delete;
-
-  /// False when broken.
-  bool readHeader() {
-    if (info_ == nullptr || setjmp(refused_) != 0) return false;
-    ::png_set_read_fn(png_, this, [](png_structp png, png_bytep to, std::size_t count) {
-      of(::png_get_io_ptr(png)).read(png, to, count);
-    });
-    ::png_set_user_limits(png_, kMaxImageSide_px, kMaxImageSide_px);
-    skipTexts();
-    ::png_read_info(png_, info_);
-    return true;
-  }
-
-  std::uint64_t width() const { return ::png_get_image_width(png_, info_); }
-  std::uint64_t height() const { return ::png_get_image_height(png_, info_); }
-
-  /// Bytes of a grey pixel: those of colours have one.
-  int pixelBytes() const {
-    return ::png_get_color_type(png_, info_) == PNG_COLOR_TYPE_GRAY && ::png_get_bit_depth(png_, info_) == 16 ? 2 : 1;
-  }
-
-  /// False when broken. `rows`: of pixelBytes() a pixel.
-  bool read(std::vector<png_bytep>& rows) {
-    if (setjmp(refused_) != 0) return false;
-    const auto bytes = static_cast<std::uint64_t>(pixelBytes());
-    bytes == 2 ? keepSixteenBits() : convertToGrey();
-    if (::png_get_rowbytes(png_, info_) != bytes * width()) return false;
-    ::png_read_image(png_, rows.data());
-    ::png_read_end(png_, nullptr);
-    return true;
-  }
-
- private:
-  static PngReader& of(void* reader) { return *static_cast<PngReader*>(reader); }
-
-  void read(png_structp png, png_bytep to, std::size_t count) {
-    if (count > data_.size() - at_) ::png_error(png, "cut off");
-    std::memcpy(to, data_.data() + at_, count);
-    at_ += count;
-  }
-
-  void skipTexts() {
-    static const png_byte kTexts[] = "tEXt\0zTXt\0iTXt\0sPLT\0eXIf";
-    ::png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, kTexts, 5);
-  }
-
-  void keepSixteenBits() {
-    const std::uint16_t one = 1;
-    const bool low_byte_first = *reinterpret_cast<const std::uint8_t*>(&one) == 1;
-    if (low_byte_first) ::png_set_swap(png_);
-    ::png_set_interlace_handling(png_);
-    ::png_read_update_info(png_, info_);
-  }
-
-  /// As OpenCV does, with its weights of red and green.
-  void convertToGrey() {
-    const int colour = ::png_get_color_type(png_, info_);
-    ::png_set_strip_16(png_);
-    ::png_set_strip_alpha(png_);
-    if (colour == PNG_COLOR_TYPE_PALETTE) ::png_set_palette_to_rgb(png_);
-    if ((colour & PNG_COLOR_MASK_COLOR) == 0) ::png_set_expand_gray_1_2_4_to_8(png_);
-    ::png_set_rgb_to_gray(png_, PNG_ERROR_ACTION_NONE, 0.299, 0.587);
-    ::png_set_interlace_handling(png_);
-    ::png_read_update_info(png_, info_);
-  }
-
-  const Bytes& data_;
-  std::size_t at_ = 0;
-  png_structp png_ = nullptr;
-  png_infop info_ = nullptr;
-  std::jmp_buf refused_{};
-};
-
 cv::Size sizeFrom(PngReader& reader) {
   if (!reader.readHeader())
     throw ImageError("PNG is broken or larger than " + std::to_string(kMaxImageSide_px) + " pixels a side");
   return requireImageSize(reader.width(), reader.height());
 }
 
-cv::Mat greyOfPng(const Bytes& data) {
-  PngReader reader(data);
-  const cv::Size size = sizeFrom(reader);
-  cv::Mat grey(size, reader.pixelBytes() == 2 ? CV_16UC1 : CV_8UC1);
+cv::Mat pixelsOf(PngReader& reader, const cv::Size& size, int bytes) {
+  cv::Mat grey(size, bytes == 2 ? CV_16UC1 : CV_8UC1);
   std::vector<std::uint8_t*> rows = imageRows(grey);
-  if (!reader.read(rows)) throw ImageError("PNG is broken");
-  return inEightBits(grey, true);
+  if (!reader.read(rows, bytes)) throw ImageError("PNG is broken");
+  return grey;
+}
+
+cv::Mat greyOfPng(const Bytes& data) {
+  PngReader reader(data.data(), data.size(), kMaxImageSide_px);
+  const cv::Size size = sizeFrom(reader);
+  const cv::Mat grey = pixelsOf(reader, size, reader.bits() == 16 ? 2 : 1);
+  const bool needs_all_bits = grey.depth() == CV_16U && fullScaleOf(grey) == 65535.0;
+  if (reader.isGrey() || !needs_all_bits) return inEightBits(grey, true);
+  PngReader again(data.data(), data.size(), kMaxImageSide_px);  // OpenCV cuts colours before it mixes them
+  return pixelsOf(again, sizeFrom(again), 1);
 }
 
 bool isJpeg(const Bytes& file) { return startsWith(file, {0xFF, 0xD8, 0xFF}); }
@@ -248,7 +167,7 @@ cv::Size compressedSize(const Bytes& file) {
     JpegReader reader;
     return sizeFrom(reader, file);
   }
-  PngReader reader(file);
+  PngReader reader(file.data(), file.size(), kMaxImageSide_px);
   return sizeFrom(reader);
 }
 

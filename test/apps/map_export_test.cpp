@@ -28,6 +28,18 @@ MapFindings findingsOf(const TrainingMap& map) {
   return findings;
 }
 
+std::string toGeoJson(const TrainingMap& map, const MapFindings& findings) {
+  std::string all;
+  writeGeoJson(map, findings, [&all](const std::string& text) { all += text; });
+  return all;
+}
+
+std::string toCsv(const TrainingMap& map, const MapFindings& findings) {
+  std::string all;
+  writeCsv(map, findings, [&all](const std::string& text) { all += text; });
+  return all;
+}
+
 std::vector<json> featuresOf(const json& collection, const std::string& geometry, const std::string& property,
                              const json& value) {
   std::vector<json> found;
@@ -102,6 +114,19 @@ TEST(MapExport, NamesOfSessionsAreQuotedAndRepaired) {
       << "one feature a line";
   EXPECT_THAT(toCsv(map, findingsOf(map)), HasSubstr(",\"a\"\"b\\c   \xC3\xA4\","));
   EXPECT_THAT(toCsv(map, findingsOf(map)), HasSubstr(",\"T???\","));
+}
+
+TEST(MapExport, NoPieceIsLongerThanOneImageNeeds) {
+  const std::string longest(1000, 'n');  // bytes that the name of a session may have
+  const TrainingMap map = mapOf({longest, "tuesday"});
+  const MapFindings findings = findingsOf(map);
+  std::size_t most = 0;
+  const auto measure = [&most](const std::string& text) { most = std::max(most, text.size()); };
+  writeGeoJson(map, findings, measure);
+  EXPECT_LT(most, longest.size() + 500);
+  most = 0;
+  writeCsv(map, findings, measure);
+  EXPECT_LT(most, longest.size() + 500);
 }
 
 }  // namespace

@@ -55,6 +55,34 @@ def later(topic, message, stamp, by_s: float) -> list:
     return [(topic, message, stamp + by)]
 
 
+class ReceiveTimesTest(RecordingTest):
+    """When the messages were written, by a clock that may be anything."""
+
+    END = rospy.Time(2 ** 32 - 1, 999999999)
+
+    def recorded_at(self, time_of, stamped: bool = True) -> Path:
+        """The first 100 s. `time_of`: gets the time of a message and returns another."""
+        def change(topic, message, stamp):
+            if message.header.stamp.to_sec() >= FIRST_S + 100:
+                return []
+            if not stamped:
+                message.header.stamp = rospy.Time()
+            return [(topic, message, time_of(stamp))]
+        return self.record(change)
+
+    def test_they_do_not_matter_where_messages_are_stamped(self):
+        kept = self.kept(self.said(self.recorded_at(lambda stamp: stamp)))
+        for always in (rospy.Time(0, 1), self.END):
+            self.assertEqual(self.kept(self.said(self.recorded_at(lambda stamp, at=always: at))), kept)
+
+    def test_an_order_that_contradicts_the_stamps_is_named(self):
+        backwards = self.recorded_at(lambda stamp: rospy.Time(2 ** 32 - 1 - stamp.secs % 100000, 0))
+        self.assert_refused(self.build(backwards), 1, 'stamped not after the one that was recorded before')
+
+    def test_one_time_for_all_is_out_of_order(self):
+        self.assert_refused(self.build(self.recorded_at(lambda stamp: self.END, stamped=False)), 1, 'out of order')
+
+
 class ClocksTest(RecordingTest):
     """Stamps of fixes against those of images."""
 

@@ -1,4 +1,7 @@
+#include <cerrno>
 #include <chrono>
+#include <cstddef>
+#include <cstring>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -6,8 +9,12 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -199,6 +206,81 @@ TEST(PartialFile, RefusesWhatIsNoFile) {
   EXPECT_THROW(writeFile("/dev/null", "x"), FileError);
   EXPECT_THROW(writeFile(folder / "absent/a", "x"), FileError);
   EXPECT_THROW(writeFile("", "x"), FileError);
+}
+
+/// A network disk that answers each of these calls of this process with `error`, for ever. False where the system has
+/// no such filter.
+bool refuseCalls(const std::vector<unsigned>& calls, int error) {
+  std::vector<sock_filter> filter{BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
+  for (const unsigned call : calls) {
+    filter.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, call, 0, 1));
+    filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | static_cast<unsigned>(error)));
+  }
+  filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+  const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+  return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program) == 0;
+}
+
+constexpr int kNoFilter = 77;
+
+/// What `act` returns in a process of its own whose calls are refused.
+template <class Act>
+int withoutCalls(const std::vector<unsigned>& calls, int error, Act act) {
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(refuseCalls(calls, error) ? act() : kNoFilter);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(PartialFile, AFileSystemWithoutLocksIsWrittenAndLeftClean) {
+  for (const int error : {ENOLCK, EOPNOTSUPP, ENOSYS}) {
+    const test::TemporaryFolder folder;
+    const std::string target = folder / "a";
+    const int outcome = withoutCalls({SYS_flock}, error, [&target] {
+      const OutputLock lock(target);
+      writeFile(target, "new");
+      return 0;
+    });
+    if (outcome == kNoFilter) GTEST_SKIP() << "no filter of system calls here";
+    EXPECT_EQ(outcome, 0);
+    EXPECT_EQ(folder.names().size(), 1U) << "the lock would stay for ever, since nobody can lock it to remove it";
+    EXPECT_EQ(test::readAll(target), "new");
+  }
+}
+
+std::vector<unsigned> renames() {
+  return {
+#ifdef SYS_rename
+      SYS_rename,
+#endif
+#ifdef SYS_renameat
+      SYS_renameat,
+#endif
+      SYS_renameat2};
+}
+
+TEST(PartialFile, ANetworkDiskThatGoesAwayKeepsTheOldFile) {
+  const test::TemporaryFolder folder;
+  const std::string target = folder / "a";
+  writeFile(target, "old");
+  const std::vector<unsigned> flushes{SYS_fsync};
+  for (const std::vector<unsigned>& calls : {renames(), flushes}) {
+    for (const int error : {ESTALE, EIO, EROFS}) {
+      const int outcome = withoutCalls(calls, error, [&] {
+        try {
+          writeFile(target, "new");
+        } catch (const FileError& refusal) {
+          return refusal.what() == target + ": cannot be written: " + std::strerror(error) ? 0 : 1;
+        }
+        return 2;
+      });
+      if (outcome == kNoFilter) GTEST_SKIP() << "no filter of system calls here";
+      EXPECT_EQ(outcome, 0) << std::strerror(error);
+      EXPECT_EQ(folder.names().size(), 1U);
+      EXPECT_EQ(test::readAll(target), "old");
+    }
+  }
 }
 
 TEST(PartialFile, DisappearsWhenTheProcessIsInterrupted) {

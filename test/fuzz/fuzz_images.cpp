@@ -1,4 +1,4 @@
-/// Raw and compressed; the first byte chooses.
+/// Raw and compressed images, and masks; the first byte chooses.
 #include <cstdint>
 #include <string>
 
@@ -9,6 +9,7 @@
 #include "bag/bag_messages.h"
 #include "features/image_size.h"
 #include "test/fuzz/fuzz_support.h"
+#include "visual_localization/camera/mask.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
@@ -27,12 +28,22 @@ void convert(const Message& message) {
   requireImage(toGrey(message), size);
 }
 
+void requireMask(const Mask& mask) {
+  if (mask.empty() || mask.usedShare() <= 0.0) fuzz::fail("a mask that uses nothing");
+  fuzz::countRead();
+}
+
 }  // namespace
 }  // namespace visual_localization
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace visual_localization;
   if (size == 0) return 0;
+  if (data[0] == 'M') {
+    const std::string path = fuzz::inMemoryFile(data + 1, size - 1);
+    fuzz::expect<CameraError>([&] { requireMask(readMask(path)); });
+    return 0;
+  }
   const std::string bytes = fuzz::Input(data + 1, size - 1).rest();
   fuzz::expect<ImageError>([&] {
     if (data[0] % 2 == 0) {

@@ -155,6 +155,29 @@ TEST(ImageConversion, SixteenBitsOfACameraOfLessAreScaledByItsOwn) {
   }
 }
 
+TEST(ImageConversion, ColoursOfACameraOfLessBitsAreScaledByItsOwn) {
+  const auto png = [](const cv::Mat& pixels) {
+    sensor_msgs::CompressedImage message;
+    cv::imencode(".png", pixels, message.data);
+    return toGrey(message);
+  };
+  for (const int channels : {3, 4}) {
+    const auto colours = [channels](int bits) {
+      cv::Mat mixed;
+      cv::merge(std::vector<cv::Mat>(static_cast<std::size_t>(channels), rampOf(bits)), mixed);
+      return mixed;
+    };
+    const cv::Mat expected = png(colours(16));
+    EXPECT_GE(expected.at<std::uint8_t>(0, 63), 254);
+    for (const int bits : {10, 12, 14}) {
+      EXPECT_LE(cv::norm(png(colours(bits)), expected, cv::NORM_INF), 1.0) << channels << " " << bits;
+      const char* name = channels == 3 ? "bgr16" : "bgra16";
+      const cv::Mat raw = toGrey(*cv_bridge::CvImage({}, name, colours(bits)).toImageMsg());
+      EXPECT_LE(cv::norm(raw, expected, cv::NORM_INF), 1.0) << name << " " << bits;
+    }
+  }
+}
+
 TEST(ImageConversion, SixteenBitsAreScaledByTheFullRange) {
   EXPECT_EQ(toGrey(image("mono16", 2, 77)).at<std::uint8_t>(0, 0), 77);
   EXPECT_EQ(toGrey(image("mono16", 2, 255)).at<std::uint8_t>(0, 0), 255);

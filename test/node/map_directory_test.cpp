@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/files.h"
 #include "node/node_config.h"
 #include "test/support/refusal.h"
 #include "test/support/temporary_folder.h"
@@ -67,6 +68,23 @@ TEST_F(MapDirectory, RefusesWhatIsElsewhere) {
         folder_ / "secret.map", folder_ / "maps_of_others/c.map", std::string("link.map"), std::string("up/secret.map"),
         std::string("up/absent.map"), std::string("absent/../../secret.map"), std::string("."), std::string("..")}) {
     EXPECT_THAT(refusal(path), AllOf(StartsWith(path + ": "), HasSubstr("not below ~map_directory '" + directory_)));
+  }
+}
+
+/// As record_session writes its map.
+TEST_F(MapDirectory, NothingIsWrittenOutside) {
+  fs::create_symlink("../absent.map", folder_ / "maps/dangling.map");
+  fs::create_symlink("../maps_of_others", folder_ / "maps/others");
+  for (const char* path : {"link.map", "others/new.map", "others/../../new.map", "up/new.map"}) {
+    EXPECT_THAT(refusal(path), HasSubstr("not below")) << path;
+  }
+  try {
+    writeFile(mapFileBelow(directory_, "dangling.map"), "map");
+  } catch (const std::runtime_error&) {
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "absent.map"));
+  for (const auto& entry : fs::directory_iterator(folder_ / "maps_of_others")) {
+    EXPECT_EQ(entry.path().filename(), "c.map");
   }
 }
 

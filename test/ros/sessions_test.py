@@ -83,6 +83,8 @@ class SessionsTest(unittest.TestCase):
         self.assertIn('already', self.refusal(BEGIN, ''))
         self.drive(60)
         self.assertIn('is not below', self.refusal(END, '/etc/grown.map'))
+        (self.folder / 'outside').symlink_to('/var/tmp')
+        self.assertIn('is not below', self.refusal(END, 'outside/grown.map'))
         self.assertIn('must end in .map', self.refusal(END, 'grown.bag'))
         self.assertIn('absent/grown.map', self.refusal(END, 'absent/grown.map'))
         answer = self.record_session(END, 'grown.map')

@@ -1,7 +1,7 @@
-"""The formulas of doc/faults.md, "Memory": address space in MiB; and images that claim more than they are."""
+"""The formulas of doc/faults.md, "Memory": resident memory in MiB; and images that claim more than they are."""
 import os
 
-BASE, PER_THREAD = 260, 72
+BASE, PER_THREAD = 120, 16
 LARGEST_PIXELS = 4096 * 4096
 SIFT_BYTES, DECODED_BYTES = 140, 8
 IMAGE_BYTES, FIX_BYTES = 2 ** 19, 2000
@@ -47,10 +47,10 @@ def evaluate_bound(threads: int, pixels: int, map_images: int, drive_images: int
 
 
 def peak_mib(pid: int) -> float:
-    """The most address space that a running process has had; 0 when it has ended."""
+    """The most resident memory that a running process has had; 0 when it has ended."""
     try:
         with open(f'/proc/{pid}/status', encoding='utf-8') as status:
-            return max((float(line.split()[1]) / 1024.0 for line in status if line.startswith('VmPeak')), default=0.0)
+            return max((float(line.split()[1]) / 1024.0 for line in status if line.startswith('VmHWM')), default=0.0)
     except OSError:
         return 0.0
 
