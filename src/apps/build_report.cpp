@@ -12,6 +12,7 @@
 
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
+#include "base/numbers.h"
 #include "base/text.h"
 #include "ros/message_readers.h"
 #include "visual_localization/features/front_end.h"
@@ -58,6 +59,27 @@ void printCamera(const SessionImages& session, const MapBuilderOptions& options,
 void printMount(const SessionImages& session) {
   if (!session.camera.mount) return;
   std::cout << session.name << ": " << describe(*session.camera.mount) << '\n';
+}
+
+/// A hand measures a mounting better than that.
+constexpr double kMountingError_rad = 5.0 * kPi / 180.0;
+
+/// How the images turn the camera against the mounting that was said; empty while they agree.
+std::string mountingTrouble(const SessionImages& session) {
+  const Eigen::Vector3d& off_rad = session.geometry.mounting_off_rad;
+  if (!session.camera.mount || off_rad.cwiseAbs().maxCoeff() < kMountingError_rad) return "";
+  constexpr std::array<std::array<const char*, 2>, 3> kWays{
+      {{"up", "down"}, {"to the right", "to the left"}, {"clockwise", "anticlockwise"}}};
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double degrees = toDegrees(off_rad[axis]);
+    text << (axis == 0 ? "" : ", ") << std::abs(degrees) << " degrees "
+         << kWays[static_cast<std::size_t>(axis)][degrees < 0.0 ? 1 : 0];
+  }
+  return session.name +
+         ": where the robot drives the images have the camera turned against its mounting: " + text.str() +
+         "; the heading is off by as much to the side";
 }
 
 /// Empty for what the images do not tell.
@@ -227,6 +249,8 @@ std::vector<std::string> disagreementsOf(const MapBuildReport& report, const std
       found.push_back(session.name + ": images and calibration disagree, so it has places only");
     } else if (session.geometry.contradicts_fixes) {
       found.push_back(session.name + ": images and fixes disagree, so it has places only");
+    } else if (const std::string trouble = mountingTrouble(session); !trouble.empty()) {
+      found.push_back(trouble);
     }
   }
   return found;

@@ -63,6 +63,7 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
     const BundleSession& session = problem_.sessions[k];
     const Eigen::AngleAxisd mounting(session.mounting * Eigen::Quaterniond(exponential(session.mounting_rad)));
     geometry.mounting_rad = mounting.angle() * mounting.axis();
+    geometry.mounting_off_rad = session.mounting * session.mounting_rad;
     geometry.fix_delay_s = problem_.sessions[k].fix_delay_s;
     geometry.lens = lensOf(k);
     geometry.focal_scale = std::exp(lensCorrection(k)[kFocalLength]);

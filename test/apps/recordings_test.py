@@ -258,6 +258,15 @@ class FramesTest(RecordingTest):
         self.assert_refused(self.build(self.with_frames('', 'gps', *links)), 1, "'' (empty)", 'base_link, gps, mast')
         self.assert_refused(self.build(self.with_frames('mast', 'antenna', *links)), 1, "'antenna'", 'robot/antenna')
 
+    def test_a_mounting_that_the_drive_contradicts_is_named(self):
+        calibrated = self.record(lambda topic, message, stamp: [(topic, message, stamp)], calibrated=True)
+        config = self.folder / 'aside.yaml'
+        config.write_text('robot: {camera: "0.3 0 1 0.4 0 0", antenna: "0 0 1"}\n')
+        self.assertRegex(self.said(calibrated, '--config', config),
+                         r'check before use .*turned against its mounting: .* 2[1-5]\.\d degrees to the right')
+        config.write_text('robot: {camera: "0.3 0 1 0 0 0", antenna: "0 0 1"}\n')
+        self.assertNotIn('against its mounting', self.said(calibrated, '--config', config))
+
     def test_half_a_mounting_is_refused(self):
         config = self.folder / 'half.yaml'
         for given, missing in (('camera: "0.3 0 1 0 0 0"', 'robot/antenna'), ('antenna: "0 0 1"', 'robot/camera')):

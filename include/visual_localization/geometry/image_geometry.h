@@ -68,8 +68,11 @@ struct SessionLandmarks {
   double median_error_px = 0.0;    ///< distance of a sighting from its landmark's projection
   double mean_shift_m = 0.0;       ///< of these images from the cleaned path
   double largest_shift_m = 0.0;
-  double fix_delay_s = 0.0;     ///< fixes say where the antenna was this long before their stamps
-  double delay_sigma_s = 0.0;   ///< of that; 0: the images do not tell it from none
+  double fix_delay_s = 0.0;    ///< fixes say where the antenna was this long before their stamps
+  double delay_sigma_s = 0.0;  ///< of that; 0: the images do not tell it from none
+  /// How the images turn the camera against the mounting that was said: about the axes right, down and ahead of a level
+  /// camera that looks where the robot does.
+  Eigen::Vector3d mounting_off_rad = Eigen::Vector3d::Zero();
   double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
   double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
 };
