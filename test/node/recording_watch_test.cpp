@@ -1,8 +1,9 @@
+#include "node/recording_watch.h"
+
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "node/recording_watch.h"
 #include "test/support/stamps.h"
 #include "test/support/synthetic.h"
 
