@@ -79,7 +79,7 @@ std::string mountingTrouble(const SessionImages& session) {
   }
   return session.name +
          ": where the robot drives the images have the camera turned against its mounting: " + text.str() +
-         "; the heading is off by as much to the side";
+         "; headings are off by the turn to the side";
 }
 
 /// Empty for what the images do not tell.

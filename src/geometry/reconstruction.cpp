@@ -377,11 +377,11 @@ void Reconstruction::adjustLenses(const std::vector<BundleWindow>& windows) {
 /// By a window in the middle, if there are several: it knows them less well than all of them.
 SharedSigmas Reconstruction::sharedSigmasNow() const {
   const std::vector<BundleWindow> all = windows();
-  if (all.size() == 1) return visual_localization::sharedSigmas(problem_, bundle_, all.front());
+  if (all.size() == 1) return sharedSigmas(problem_, bundle_, all.front());
   BundleWindow window = all[all.size() / 2];
   window.known_begin = window.begin;
   window.known_end = window.end;
-  return visual_localization::sharedSigmas(problemOf(window), bundle_, window);
+  return sharedSigmas(problemOf(window), bundle_, window);
 }
 
 void Reconstruction::keepSignificant(bool focal_is_known) {

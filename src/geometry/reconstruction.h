@@ -114,7 +114,7 @@ class Reconstruction {
   /// focal length only if it is known from somewhere), and the delay of the fixes.
   void keepSignificant(bool focal_is_known);
   /// By keepSignificant(); zero for what is held.
-  const SharedSigmas& sharedSigmas() const { return shared_; }
+  const SharedSigmas& sigmas() const { return shared_; }
   /// Finds what errors of the receiver may have left in a single session, which has been adjusted.
   void findBudget();
   /// What it came to, session by session; landmark ids begin with `first_id`.

@@ -324,7 +324,7 @@ class FocalSearch {
     sigma[kFocalLength] = kUnknownFocal;
     const SessionAdjuster adjuster(session_, config_, sigma, threads_);
     const double scale = std::exp(adjuster.reconstruction().lensCorrection(0)[kFocalLength]);
-    return {focal_px * scale, adjuster.reconstruction().sharedSigmas().lens[kFocalLength]};
+    return {focal_px * scale, adjuster.reconstruction().sigmas().lens[kFocalLength]};
   }
 
   UnadjustedSession& session_;

@@ -60,7 +60,7 @@ struct SessionLandmarks {
   bool contradicts_calibration = false;  ///< no lens near it explains the images: the session has places only
   /// How far from it, in sigmas of a calibration: focal length, ratio of fy to fx, principal point x and y, k1, k2.
   Eigen::Matrix<double, 6, 1> lens_sigmas = Eigen::Matrix<double, 6, 1>::Zero();
-  bool contradicts_fixes = false;  ///< most of its images do: likewise
+  bool contradicts_fixes = false;  ///< too many images do: likewise
   std::size_t off_fixes = 0;       ///< images that are elsewhere than believed fixes around have them
   std::size_t unexplained = 0;     ///< images without landmarks since too little around them fits together
   double focal_scale = 1.0;        ///< what the images say the focal length is, as a share of the calibration's
