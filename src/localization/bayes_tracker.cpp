@@ -8,11 +8,9 @@
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kOthers = 10;    ///< training images that are compared in turn
-constexpr double kKnown = 0.9;         ///< probability around the estimate, from which on few are compared
-constexpr double kAround_m = 5.0;      ///< or
-constexpr double kPlacesAround = 3.0;  ///< training images, where they are farther apart
-constexpr std::size_t kProposed = 6;   ///< every so-many-th looks alike as a whole
+constexpr std::size_t kOthers = 10;   ///< training images that are compared in turn
+constexpr double kKnown = 0.9;        ///< probability around the estimate, from which on few are compared
+constexpr std::size_t kProposed = 6;  ///< every so-many-th looks alike as a whole
 
 }  // namespace
 
@@ -88,10 +86,11 @@ void BayesTracker::choose(Likelihood& likelihood) {
 /// turn.
 PlaceLikelihood BayesTracker::compare(Likelihood& image) {
   PlaceLikelihood likelihood;
+  likelihood.asked_in_turn = chosen_.size() - others_;
   std::vector<double> usual;
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
-    likelihood.compared.push_back({chosen_[i], filter_.likelihoodOf(image.of(chosen_[i]))});
-    if (i + others_ >= chosen_.size()) usual.push_back(likelihood.compared.back().likelihood);
+    likelihood.compared.push_back(filter_.comparedWith(chosen_[i], image.of(chosen_[i])));
+    if (i >= likelihood.asked_in_turn) usual.push_back(likelihood.compared.back().likelihood);
   }
   likelihood.elsewhere = median(std::move(usual));
   return likelihood;
@@ -99,7 +98,7 @@ PlaceLikelihood BayesTracker::compare(Likelihood& image) {
 
 TrackerEstimate BayesTracker::estimate(Likelihood& likelihood) {
   const CloudMoments mode = filter_.mode();
-  const double around_m = std::max(kAround_m, kPlacesAround * filter_.spacing_m());
+  const double around_m = filter_.around_m();
   is_known_ = filter_.within(mode.mean_m, around_m) >= kKnown;
   TrackerEstimate result;
   result.position_m = mode.mean_m;

@@ -255,7 +255,8 @@ std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) c
   constexpr double kPlaces = 3.0;  // where training images are far apart
   if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kLocal) return std::nullopt;
   const PlaceFilter& filter = tracker_->posterior() != nullptr ? *tracker_->posterior() : *witness_;
-  return filter.within(tracked.position_m, std::max(config_.state.max_distance_m, kPlaces * filter.spacing_m()));
+  const double around_m = std::max(config_.state.max_distance_m, kPlaces * filter.spacing_m());
+  return (1.0 - filter.offMap()) * filter.within(tracked.position_m, around_m);
 }
 
 /// Without landmarks the most similar training image is compared with one of another session beside it.

@@ -102,6 +102,7 @@ void PlaceFilter::reset() {
   independence_ = 1.0;
   log_best_.reset();
   arrivals_.clear();
+  off_map_.reset();
 }
 
 void PlaceFilter::reset(const std::vector<Eigen::Vector2d>& positions_m) {
@@ -110,6 +111,7 @@ void PlaceFilter::reset(const std::vector<Eigen::Vector2d>& positions_m) {
   for (const Eigen::Vector2d& position_m : positions_m) {
     probabilities_[map_.nearest(position_m).image] += 1.0 / static_cast<double>(positions_m.size());
   }
+  off_map_.ruleOut();
 }
 
 PlaceFilter::Arrival& PlaceFilter::arrivalAt(std::size_t image) {
@@ -128,14 +130,22 @@ double PlaceFilter::likelihoodOf(const Score& score) const {
   return std::pow(static_cast<double>(score.matches) + 1.0, independence_ * exponent);
 }
 
+PlaceLikelihood::Compared PlaceFilter::comparedWith(std::size_t training_image, const Score& score) const {
+  PlaceLikelihood::Compared compared{training_image, likelihoodOf(score)};
+  if (score.matches > 0 || score.weight <= 0.0) {
+    compared.log_matches = std::log(static_cast<double>(score.matches) + 1.0);
+  }
+  return compared;
+}
+
 PlaceLikelihood PlaceFilter::likelihoodBeside(const std::vector<Scores::Compared>& compared) {
   constexpr double kMemory = 0.95;
   constexpr double kChance = 0.25;  // most of what a tracker compares is near its estimate: the lowest tell of chance
   PlaceLikelihood likelihood;
   std::vector<double> values;
   for (const Scores::Compared& one : compared) {
-    values.push_back(likelihoodOf(one.score));
-    likelihood.compared.push_back({one.training_image, values.back()});
+    likelihood.compared.push_back(comparedWith(one.training_image, one.score));
+    values.push_back(likelihood.compared.back().likelihood);
   }
   if (values.empty()) return likelihood;
   const double log_best = std::log(*std::max_element(values.begin(), values.end()));
@@ -150,6 +160,7 @@ void PlaceFilter::predict(const Motion& motion) {
   const double way_m = motion.share() > 0.0 ? motion.increment().distance_m : expected_m;
   independence_ = std::clamp(way_m / spacing_m_, kLeastIndependence, 1.0);
   arrivals_.clear();
+  leaving_ = 0.0;
   stayed_ = probabilities_;
   const double least = kLeastMoved * *std::max_element(probabilities_.begin(), probabilities_.end());
   std::vector<std::size_t> moved;
@@ -159,6 +170,7 @@ void PlaceFilter::predict(const Motion& motion) {
     moveFrom(image, motion);
     stayed_[image] = 0.0;
   }
+  off_map_.predict(leaving_);
   const PerSpeed usual = usualSpeeds();
   double sum = 0.0;
   for (std::size_t k = 0; k < speeds_.size(); ++k) {
@@ -181,8 +193,9 @@ void PlaceFilter::moveFrom(std::size_t image, const Motion& motion) {
   const double place_m = kPlaceSigma * spacing_m_;
   const double longest_m = std::max(kSpeeds.back() * pace_m, motion.increment().distance_m);
   const auto sessions = static_cast<double>(map_.header().sessions.size());
-  const double most = std::ceil(3.0 * sessions * (1.0 + longest_m / spacing_m_));
-  map_.nearest(map_.position_m(image), static_cast<std::size_t>(std::min(most, 1.0 * kMostAround)), neighbours_);
+  const double most = std::min(std::ceil(3.0 * sessions * (1.0 + longest_m / spacing_m_)), 1.0 * kMostAround);
+  map_.nearest(map_.position_m(image), static_cast<std::size_t>(most), neighbours_);
+  leaving_ += probabilities_[image] * leavingFrom(image, motion);
   const double yaw_rad = map_.yaw_rad(image);
   const Eigen::Vector2d heading(std::cos(yaw_rad), std::sin(yaw_rad));
   ahead_m_.clear();
@@ -216,7 +229,69 @@ void PlaceFilter::moveFrom(std::size_t image, const Motion& motion) {
         [](Arrival& arrival, double part) { arrival.by_odometry += part; });
 }
 
+/// How likely the motion leads beyond the training images around one, all of which are in `neighbours_`.
+double PlaceFilter::leavingFrom(std::size_t image, const Motion& motion) const {
+  constexpr double kAhead = -0.5;  // cosine: what a sharp bend leads to is not beside the path
+  const double known_m = neighbours_.size() < map_.size() ? neighbours_.back().distance_m : 1e300;
+  const Eigen::Vector2d here_m = map_.position_m(image);
+  const Eigen::Vector2d heading(std::cos(map_.yaw_rad(image)), std::sin(map_.yaw_rad(image)));
+  double ahead_m = 0.0;
+  double behind_m = 0.0;
+  for (const Neighbour& neighbour : neighbours_) {
+    const double along_m = heading.dot(map_.position_m(neighbour.image) - here_m);
+    if (along_m >= kAhead * neighbour.distance_m) ahead_m = std::max(ahead_m, neighbour.distance_m);
+    if (-along_m >= kAhead * neighbour.distance_m) behind_m = std::max(behind_m, neighbour.distance_m);
+  }
+  const auto beyond = [&](double distance_m, double sigma_m) {
+    if (distance_m == 0.0 || std::abs(distance_m) > known_m) return 0.0;
+    const double path_m = (distance_m > 0.0 ? ahead_m : behind_m) + 0.5 * spacing_m_;
+    return 0.5 * std::erfc((path_m - std::abs(distance_m)) / (std::sqrt(2.0) * sigma_m));
+  };
+  const double pace_m = static_cast<double>(pace_mps_[image]) * secondsOf(motion);
+  const double place_m = kPlaceSigma * spacing_m_;
+  double leaving = 0.0;
+  for (std::size_t k = 0; k < kSpeeds.size(); ++k) {
+    const double distance_m = kSpeeds[k] * pace_m;
+    leaving += speeds_[k] * beyond(distance_m, std::hypot(kDistanceSigma * distance_m, place_m));
+  }
+  const Eigen::Vector2d& way_m = motion.increment().translation_m;
+  const double by_odometry = motion.share() > 0.0
+                                 ? beyond(std::copysign(way_m.norm(), way_m.x()), std::hypot(motion.sigma_m(), place_m))
+                                 : 0.0;
+  return (1.0 - motion.share()) * leaving + motion.share() * by_odometry;
+}
+
+void PlaceFilter::updateOffMap(const PlaceLikelihood& likelihood) {
+  if (likelihood.is_verified) return off_map_.ruleOut();
+  asked_.clear();
+  std::vector<double> in_turn;
+  for (std::size_t i = 0; i < likelihood.compared.size(); ++i) {
+    const PlaceLikelihood::Compared& one = likelihood.compared[i];
+    if (!one.log_matches) continue;
+    asked_.push_back({probabilities_[one.training_image], *one.log_matches});
+    if (i >= likelihood.asked_in_turn) in_turn.push_back(*one.log_matches);
+  }
+  if (!off_map_.knowsChance() && !in_turn.empty()) off_map_.learnChance(median(std::move(in_turn)));
+  off_map_.update(asked_);
+}
+
+/// Once the image says where the robot is: what matched there, and what matched far from it.
+void PlaceFilter::learnMatches(const PlaceLikelihood& likelihood) {
+  const auto most = std::max_element(probabilities_.begin(), probabilities_.end()) - probabilities_.begin();
+  const Eigen::Vector2d place_m = map_.position_m(static_cast<std::size_t>(most));
+  std::optional<double> best;
+  for (std::size_t i = 0; i < likelihood.compared.size(); ++i) {
+    const PlaceLikelihood::Compared& one = likelihood.compared[i];
+    if (!one.log_matches) continue;
+    const double distance_m = (map_.position_m(one.training_image) - place_m).norm();
+    if (distance_m <= around_m()) best = std::max(best.value_or(0.0), *one.log_matches);
+    if (distance_m > 2.0 * around_m() && i >= likelihood.asked_in_turn) off_map_.learnChance(*one.log_matches);
+  }
+  if (best) off_map_.learnUsual(*best, independence_ * within(place_m, around_m()));
+}
+
 void PlaceFilter::update(const PlaceLikelihood& likelihood) {
+  updateOffMap(likelihood);
   const auto count = static_cast<double>(map_.size());
   std::fill(likelihoods_.begin(), likelihoods_.end(), likelihood.elsewhere);
   for (const auto& compared : likelihood.compared) likelihoods_[compared.training_image] = compared.likelihood;
@@ -228,6 +303,7 @@ void PlaceFilter::update(const PlaceLikelihood& likelihood) {
   for (std::size_t i = 0; i < likelihoods_.size(); ++i) total += probabilities_[i] *= likelihoods_[i];
   if (total > 0.0) {
     for (double& probability : probabilities_) probability /= total;
+    learnMatches(likelihood);
   } else {
     reset();
   }
@@ -272,6 +348,7 @@ PlaceLikelihood PlaceFilter::around(const Eigen::Vector2d& position_m) const {
   const double sigma_m = std::max(kSigma_m, spacing_m_);
   PlaceLikelihood likelihood;
   likelihood.elsewhere = 0.0;
+  likelihood.is_verified = true;
   const double nearest_m = map_.nearest(position_m).distance_m;
   for (std::size_t i = 0; i < map_.size(); ++i) {
     const double distance_m = (map_.position_m(i) - position_m).norm();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "localization/off_map.h"
 #include "visual_localization/localization/motion.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/scores.h"
@@ -21,9 +23,12 @@ struct PlaceLikelihood {
   struct Compared {
     std::size_t training_image = 0;
     double likelihood = 0.0;
+    std::optional<double> log_matches = {};  ///< see OffMapBelief; nothing of other features, or of a pose
   };
   std::vector<Compared> compared;
-  double elsewhere = 1.0;  ///< of each training image that it was not compared with
+  std::size_t asked_in_turn = 0;  ///< of `compared`, from this one on chosen whatever the image shows
+  double elsewhere = 1.0;         ///< of each training image that it was not compared with
+  bool is_verified = false;       ///< landmarks say that the robot is in the map
 };
 
 /// Discrete Bayes filter over the training images: how likely the robot is at each. It moves along the direction that
@@ -46,6 +51,7 @@ class PlaceFilter {
   /// score counts for a particle where there are none. Images that follow each other more closely than the training
   /// images do are not independent: the nearer they are the less each says.
   double likelihoodOf(const Score& score) const;
+  PlaceLikelihood::Compared comparedWith(std::size_t training_image, const Score& score) const;
   /// What the comparisons that another tracker chose say. It may not have looked at the right place: elsewhere is half
   /// way, on a logarithmic scale, between chance and what matched best lately.
   PlaceLikelihood likelihoodBeside(const std::vector<Scores::Compared>& compared);
@@ -58,6 +64,8 @@ class PlaceFilter {
   void mostProbable(std::size_t count, std::vector<std::size_t>& found) const;
   /// Of being within `radius_m` of a position.
   double within(const Eigen::Vector2d& position_m, double radius_m) const;
+  /// Of being where the map has no image. The other probabilities are given that it is not.
+  double offMap() const { return off_map_.probability(); }
   /// How likely an image is taken at each training image by its distance from a position.
   PlaceLikelihood around(const Eigen::Vector2d& position_m) const;
 
@@ -69,6 +77,8 @@ class PlaceFilter {
   double speed_mps(std::size_t training_image) const;
   /// Usual distance of successive training images.
   double spacing_m() const { return spacing_m_; }
+  /// Training images this near are one place: 5 m, or three of them where they are farther apart.
+  double around_m() const { return std::max(5.0, 3.0 * spacing_m_); }
 
   /// Speeds as shares of the session's.
   static constexpr std::array<double, 11> kSpeeds{-1.0, 0.0, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
@@ -88,6 +98,9 @@ class PlaceFilter {
   Arrival& arrivalAt(std::size_t image);
   double expectedSpeed() const;
   void learnSpeed(double elsewhere);
+  double leavingFrom(std::size_t image, const Motion& motion) const;
+  void updateOffMap(const PlaceLikelihood& likelihood);
+  void learnMatches(const PlaceLikelihood& likelihood);
 
   const TrainingMap& map_;
   BayesConfig config_;
@@ -102,6 +115,9 @@ class PlaceFilter {
   std::vector<std::uint32_t> arrival_of_;  ///< of each training image; holds if the arrival says so too
   std::optional<double> log_best_;         ///< of the likelihoods of late, smoothed
   double independence_ = 1.0;              ///< of the image from the one before, (0, 1]
+  OffMapBelief off_map_;
+  double leaving_ = 0.0;  ///< how likely the motion leads beyond the training images
+  std::vector<OffMapBelief::Compared> asked_;
   mutable std::vector<Neighbour> neighbours_;
   std::vector<double> ahead_m_;
   std::vector<double> kernel_;
