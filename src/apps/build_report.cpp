@@ -126,6 +126,10 @@ void printGeometry(const SessionImages& session, const GeometryConfig& config) {
             << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
             << " %" << plusMinus(100.0 * geometry.focal_sigma) << " of the calibration's; delay of fixes "
             << std::showpos << geometry.fix_delay_s << std::noshowpos << plusMinus(geometry.delay_sigma_s) << " s\n";
+  if (geometry.found_camera) {
+    std::cout << session.name << ": nobody said how the camera is mounted; by the images: "
+              << describe(SensorMount{*geometry.found_camera}) << "; the map keeps that\n";
+  }
   if (geometry.off_fixes + geometry.unexplained > 0) {
     std::cout << session.name << ": " << geometry.off_fixes << " images lie elsewhere than the fixes around them, "
               << geometry.unexplained << " have no landmarks because too little around them fits together\n";

@@ -77,13 +77,21 @@ Eigen::Vector3d parseAntennaMount(const std::string& text) {
 }
 
 std::string describe(const SensorMount& mount) {
+  constexpr double kLevel_deg = 0.5;
   const Eigen::Vector3d ahead = mount.camera.ahead();
   const Eigen::IOFormat row(Eigen::StreamPrecision, Eigen::DontAlignCols);
+  const Eigen::Vector3d level = ahead.cross(Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d right = mount.camera.rotation * Eigen::Vector3d::UnitX();
+  const double roll_deg = toDegrees(std::atan2(-right.dot(level.cross(ahead)), right.dot(level)));
+  std::ostringstream rolled;
+  rolled.imbue(std::locale::classic());
+  rolled << std::fixed << std::setprecision(1) << roll_deg;
   std::ostringstream out;
   out.imbue(std::locale::classic());
   out << std::fixed << std::setprecision(2) << "camera at " << mount.camera.position_m.transpose().format(row)
       << " m, looking " << std::setprecision(1) << toDegrees(std::atan2(ahead.y(), ahead.x()))
-      << " degrees to the left and " << toDegrees(std::asin(std::clamp(ahead.z(), -1.0, 1.0))) << " up; antenna at "
+      << " degrees to the left and " << toDegrees(std::asin(std::clamp(ahead.z(), -1.0, 1.0))) << " up"
+      << (std::abs(roll_deg) < kLevel_deg ? "" : ", rolled by " + rolled.str() + " clockwise") << "; antenna at "
       << std::setprecision(2) << mount.antenna_m.transpose().format(row) << " m";
   return out.str();
 }

@@ -16,6 +16,7 @@ namespace visual_localization {
 /// What two images of one static scene agree on.
 struct TwoView {
   Eigen::Quaterniond b_from_a = Eigen::Quaterniond::Identity();  ///< turns directions of camera a into those of b
+  Eigen::Vector3d travel = Eigen::Vector3d::Zero();              ///< from camera a to b, in the frame of b, of length 1
   std::vector<FeatureMatch> inliers;                             ///< matches that lie on each other's epipolar lines
 };
 
@@ -36,6 +37,7 @@ struct RelativeRotation {
   std::uint32_t a = 0;
   std::uint32_t b = 0;
   Eigen::Quaterniond b_from_a = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d travel = Eigen::Vector3d::Zero();  ///< see TwoView; zero: not known
 };
 
 /// How a camera is mounted, and how well that is known.
@@ -52,6 +54,14 @@ Mounting mountingOf(const SensorMount& mount);
 /// it reverses; it drives ahead most of the time.
 std::vector<double> drivingDirections(const std::vector<double>& courses_rad,
                                       const std::vector<RelativeRotation>& relative);
+
+/// How a camera that nobody described is mounted, by its images: the axis about which they turn where the robot turns
+/// is up, and the direction in which they move where it drives straight is ahead. `headings_rad`: of the robot at each
+/// image. In the frame of the robot (see SensorMount). Nothing where the drive turns too little to tell, or the images
+/// do not agree.
+std::optional<Eigen::Quaterniond> mountingByImages(const std::vector<double>& headings_rad,
+                                                   const std::vector<double>& directions,
+                                                   const std::vector<RelativeRotation>& relative);
 
 /// What the directions of the cameras come to.
 struct AveragedRotations {

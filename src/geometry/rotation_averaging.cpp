@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <optional>
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/loss_function.h>
@@ -89,6 +90,39 @@ std::vector<double> drivingDirections(const std::vector<double>& courses_rad,
   const double ahead = std::accumulate(directions.begin(), directions.end(), 0.0);
   if (ahead < 0.0) std::transform(directions.begin(), directions.end(), directions.begin(), std::negate<>());
   return directions;
+}
+
+std::optional<Eigen::Quaterniond> mountingByImages(const std::vector<double>& headings_rad,
+                                                   const std::vector<double>& directions,
+                                                   const std::vector<RelativeRotation>& relative) {
+  constexpr double kLeastTurned_rad = 1.5;  // there and back, by neighbouring images
+  constexpr double kStraight_rad = 0.05;
+  constexpr double kAgreement = 0.7;  // length of the mean of directions
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();
+  Eigen::Vector3d ahead = Eigen::Vector3d::Zero();
+  double turned = 0.0;
+  double turned_rad = 0.0;
+  double straight = 0.0;
+  for (const RelativeRotation& pair : relative) {
+    const Eigen::AngleAxisd turn(pair.b_from_a);
+    const double heading_rad = angleDifference(headings_rad[pair.a], headings_rad[pair.b]);
+    up -= heading_rad * turn.angle() * turn.axis();
+    turned += std::abs(heading_rad) * turn.angle();
+    if (pair.b == pair.a + 1) turned_rad += turn.angle();
+    if (turn.angle() > kStraight_rad || pair.travel.isZero()) continue;
+    ahead += directions[pair.b] * pair.travel;
+    straight += 1.0;
+  }
+  const bool turns = turned_rad >= kLeastTurned_rad && up.norm() >= kAgreement * turned;
+  if (!turns || ahead.norm() < kAgreement * straight || straight == 0.0) return std::nullopt;
+  up.normalize();
+  ahead -= ahead.dot(up) * up;
+  if (ahead.norm() < kAgreement * straight) return std::nullopt;
+  Eigen::Matrix3d robot_from_camera;  // rows: the robot's axes in the camera's frame
+  robot_from_camera.row(0) = ahead.normalized();
+  robot_from_camera.row(2) = up;
+  robot_from_camera.row(1) = up.cross(ahead.normalized());
+  return Eigen::Quaterniond(robot_from_camera).normalized();
 }
 
 AveragedRotations averageRotations(const std::vector<double>& travel_yaws_rad,

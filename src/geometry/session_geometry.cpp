@@ -102,7 +102,7 @@ class PairMatcher {
 /// A session on its own.
 class SessionAdjuster {
  public:
-  SessionAdjuster(const UnadjustedSession& session, const GeometryConfig& config, const LensCorrection& lens_sigma,
+  SessionAdjuster(UnadjustedSession& session, const GeometryConfig& config, const LensCorrection& lens_sigma,
                   std::size_t threads)
       : session_(session),
         config_(config),
@@ -116,6 +116,10 @@ class SessionAdjuster {
   /// Of a single session; landmark ids begin with `first_id`.
   SessionGeometry result(std::uint32_t first_id) const {
     SessionGeometry geometry = std::move(reconstruction_.results(first_id).front());
+    if (found_mounting_) {
+      geometry.found_camera =
+          CameraPose{levelCamera(0.0) * Eigen::Quaterniond(exponential(geometry.mounting_rad)), {0.0, 0.0, 0.0}};
+    }
     const LensCorrection& lens = reconstruction_.lensCorrection(0);
     LensCorrection known = lens_sigma_;
     known[kAspect] = kStretchedAspect;
@@ -153,16 +157,27 @@ class SessionAdjuster {
     };
     matcher_.match(pairs(), view, [&](const Pair& pair) {
       const auto& [a, b, inliers] = pair.matches;
-      if (b - a <= kRotationSpan) relative.push_back({a, b, pair.view->b_from_a});
+      if (b - a <= kRotationSpan) relative.push_back({a, b, pair.view->b_from_a, pair.view->travel});
       sets.join(pair.matches);
     });
     std::vector<double> yaws_rad;
     for (const TrajectoryPoint& image : session_.images) yaws_rad.push_back(image.yaw_rad);
     const std::vector<double> directions = drivingDirections(yaws_rad, relative);
     for (std::size_t i = 0; i < yaws_rad.size(); ++i) yaws_rad[i] += directions[i] < 0.0 ? kPi : 0.0;
+    if (session_.finds_mount) findMounting(yaws_rad, directions, relative);
     // Level, whatever the altitudes say: a camera turned aside by much would explain how a robot leans across a slope.
     const AveragedRotations rotations = averageRotations(yaws_rad, relative, mountingOf(session_.mount));
     reconstruction_.add(session_, std::move(rays), rotations, directions, sets);
+  }
+
+  /// What is nearly level and ahead the adjustment finds by itself.
+  void findMounting(const std::vector<double>& headings_rad, const std::vector<double>& directions,
+                    const std::vector<RelativeRotation>& relative) {
+    constexpr double kTurned_rad = 0.17;
+    const Eigen::Quaterniond level = levelCamera(0.0);
+    const auto found = mountingByImages(headings_rad, directions, relative);
+    found_mounting_ = found && found->angularDistance(level) > kTurned_rad;
+    session_.mount.camera.rotation = found_mounting_ ? *found : level;
   }
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
@@ -187,11 +202,12 @@ class SessionAdjuster {
     reconstruction_.findBudget();
   }
 
-  const UnadjustedSession& session_;
+  UnadjustedSession& session_;
   const GeometryConfig& config_;
   const LensCorrection lens_sigma_;
   PairMatcher matcher_;
   Reconstruction reconstruction_;
+  bool found_mounting_ = false;
 };
 
 /// Sessions that were adjusted on their own, tied to each other where they overlap.
@@ -252,8 +268,8 @@ class SessionTier {
 
 }  // namespace
 
-std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>& sessions,
-                                            const GeometryConfig& config, std::size_t threads) {
+std::vector<SessionGeometry> adjustSessions(std::vector<UnadjustedSession> sessions, const GeometryConfig& config,
+                                            std::size_t threads) {
   std::vector<SessionGeometry> geometries;
   SessionTier tier(config, threads);
   std::vector<std::size_t> believed;
@@ -270,6 +286,7 @@ std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>
   for (std::size_t i = 0; tied && i < believed.size(); ++i) {
     (*tied)[i].focal_sigma = geometries[believed[i]].focal_sigma;
     (*tied)[i].delay_sigma_s = geometries[believed[i]].delay_sigma_s;
+    (*tied)[i].found_camera = geometries[believed[i]].found_camera;
     geometries[believed[i]] = std::move((*tied)[i]);
   }
   return geometries;

@@ -38,6 +38,7 @@ struct UnadjustedSession {
   std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>();    ///< of these features
   const CameraModel* camera = nullptr;
   SensorMount mount;
+  bool finds_mount = false;    ///< nobody knows how the camera is turned: `mount` is where to begin
   std::vector<MapFix> fixes;   ///< in order of time
   double clock_sigma_s = 0.1;  ///< how well their stamps are known to agree with those of the images
 };
@@ -55,8 +56,8 @@ struct SessionGeometry : SessionLandmarks {
 /// the images decide which fixes lie. Sessions that overlap are tied by what both see, each with a bias of its fixes,
 /// so that one position lies once. A session whose images contradict its calibration is not tied. Landmark ids are
 /// unique. The result does not depend on the number of threads.
-std::vector<SessionGeometry> adjustSessions(const std::vector<UnadjustedSession>& sessions,
-                                            const GeometryConfig& config, std::size_t threads);
+std::vector<SessionGeometry> adjustSessions(std::vector<UnadjustedSession> sessions, const GeometryConfig& config,
+                                            std::size_t threads);
 
 /// The focal length that the images of a session ask for: a pinhole with square pixels and its principal point in the
 /// middle, for images of `size`. Two searches come from either side; nothing unless they end at the same focal length

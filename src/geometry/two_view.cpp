@@ -230,6 +230,22 @@ Eigen::Quaterniond smallerRotation(const Motion& motion) {
   return (std::abs(one.w()) >= std::abs(other.w()) ? one : other).normalized();
 }
 
+/// From camera a to b, in the frame of b, so that most points are before both cameras.
+Eigen::Vector3d travelOf(const Eigen::Quaterniond& b_from_a, const Eigen::Vector3d& towards_a,
+                         const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
+                         const std::vector<FeatureMatch>& inliers) {
+  int votes = 0;
+  for (const FeatureMatch& match : inliers) {
+    const Eigen::Vector3d from_a = b_from_a * a[match.a].homogeneous();
+    const Eigen::Vector3d from_b = b[match.b].homogeneous();
+    const Eigen::Vector3d normal = from_b.cross(from_a);
+    const bool before_a = towards_a.cross(from_b).dot(normal) > 0.0;
+    const bool before_b = towards_a.cross(from_a).dot(normal) > 0.0;
+    if (before_a == before_b) votes += before_a ? 1 : -1;
+  }
+  return votes < 0 ? towards_a : Eigen::Vector3d(-towards_a);
+}
+
 }  // namespace
 
 std::optional<TwoView> verifyTwoViews(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b,
@@ -244,6 +260,7 @@ std::optional<TwoView> verifyTwoViews(const std::vector<Eigen::Vector2d>& a, con
   TwoView view;
   view.b_from_a = smallerRotation(*motion);
   for (const std::size_t i : estimator.inliersOf(*motion)) view.inliers.push_back(matches[i]);
+  view.travel = travelOf(view.b_from_a, motion->towards_a, a, b, view.inliers);
   const double turn_rad = view.b_from_a.angularDistance(Eigen::Quaterniond::Identity());
   if (view.inliers.size() < min_inliers || !(turn_rad <= max_rotation_rad)) return std::nullopt;
   return view;

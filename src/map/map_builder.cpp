@@ -220,6 +220,7 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
       continue;
     }
     session.fixes = budget = geometries[i]->fixes;
+    if (geometries[i]->found_camera) session.mount = SensorMount{*geometries[i]->found_camera};
     if (const CameraModel adjusted(geometries[i]->lens); adjusted != *session.camera) {
       session.published = std::exchange(session.camera, adjusted);
     }

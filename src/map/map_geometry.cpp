@@ -211,6 +211,7 @@ UnadjustedSession unadjusted(const TrainingMap& map, std::size_t begin, std::siz
   session.kind = map.header().kind;
   session.camera = of.camera ? &*of.camera : nullptr;
   session.mount = of.mount.value_or(SensorMount());
+  session.finds_mount = !of.mount;
   session.fixes = fixes;
   return session;
 }

@@ -44,6 +44,38 @@ INSTANTIATE_TEST_SUITE_P(Mountings, SessionAttitude,
                                          Eigen::Vector3d(180.0, 0.0, 0.0), Eigen::Vector3d(0.0, 10.0, 0.0),
                                          Eigen::Vector3d(-45.0, -10.0, 90.0)));
 
+class UnknownMounting : public testing::TestWithParam<Eigen::Vector3d> {};
+
+TEST_P(UnknownMounting, IsFoundByTheImages) {
+  test::StreetDrive street;
+  street.yaw_rad = toRadians(GetParam().x());
+  street.pitch_rad = toRadians(GetParam().y());
+  street.roll_rad = toRadians(GetParam().z());
+  const RecordedDrive drive = recorded(street, 61);
+  UnadjustedSession session = drive.unadjusted();
+  session.finds_mount = true;
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  EXPECT_GT(imagesIn(geometry), drive.truth.size() * 2 / 3);
+  EXPECT_LT(pathError_m(geometry, drive.truth), kTimes * kPathError_m);
+  ASSERT_TRUE(geometry.found_camera);
+  EXPECT_LT(geometry.found_camera->rotation.angularDistance(levelCamera(0.0) * test::mountingOf(street)),
+            toRadians(2.0));
+}
+
+INSTANTIATE_TEST_SUITE_P(Mountings, UnknownMounting,
+                         testing::Values(Eigen::Vector3d(0.0, 0.0, 20.0), Eigen::Vector3d(0.0, 0.0, 90.0),
+                                         Eigen::Vector3d(0.0, 0.0, 180.0), Eigen::Vector3d(90.0, 0.0, 0.0),
+                                         Eigen::Vector3d(180.0, 0.0, 0.0), Eigen::Vector3d(-45.0, -10.0, 90.0)));
+
+TEST(UnknownMountingOfALevelCamera, IsLeftToTheAdjustment) {
+  const RecordedDrive drive = recorded({}, 61);
+  UnadjustedSession session = drive.unadjusted();
+  session.finds_mount = true;
+  const SessionGeometry geometry = adjustSessions({session}, {}, 1).front();
+  EXPECT_FALSE(geometry.found_camera);
+  EXPECT_LT(pathError_m(geometry, drive.truth), kPathError_m);
+}
+
 TEST(SessionAttitude, LooksWhereItLookedWhileTheRobotReverses) {
   test::StreetDrive street;
   street.reverses = true;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -73,6 +74,8 @@ struct SessionLandmarks {
   /// How the images turn the camera against the mounting that was said: about the axes right, down and ahead of a level
   /// camera that looks where the robot does.
   Eigen::Vector3d mounting_off_rad = Eigen::Vector3d::Zero();
+  /// How the camera is turned on the robot, when nobody said and the images tell that it does not look level and ahead.
+  std::optional<CameraPose> found_camera = {};
   double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
   double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
 };
