@@ -33,7 +33,8 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.choice(
       {"estimate", "",
        "position without landmarks: that of the best particle, as in the papers (image), or on the path of the "
-       "most similar training image, by how large things look (interpolated; local features only)"},
+       "most similar training image, by how large things look; of the tracker bayes the mean of that and of its "
+       "posterior (interpolated; local features only)"},
       estimate, {"image", "interpolated"});
   visitor.choice(
       {"sift_backend", "", "extractor of SIFT features, native or OpenCV's; their maps are compatible", kAtStartOnly},
