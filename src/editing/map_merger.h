@@ -12,7 +12,7 @@
 #include <Eigen/Core>
 
 #include "base/files.h"
-#include "geometry/bundle_adjustment.h"
+#include "geometry/pose_corrections.h"
 #include "visual_localization/base/progress.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/map/training_map.h"

@@ -12,26 +12,13 @@
 #include <ceres/loss_function.h>
 #include <ceres/rotation.h>
 #include <ceres/sized_cost_function.h>
-#include <glog/logging.h>
 
 #include "geometry/bundle_adjustment.h"
+#include "geometry/bundle_problem.h"
 #include "geometry/rays.h"
 
 /// What an adjustment makes small, as Ceres takes it.
 namespace visual_localization {
-
-/// A step that cannot be solved is tried again with more damping. Ceres warns of each on stderr, but not while one of
-/// these lives.
-class QuietCeres {
- public:
-  QuietCeres() : before_(std::exchange(FLAGS_minloglevel, google::GLOG_ERROR)) {}
-  ~QuietCeres() { FLAGS_minloglevel = before_; }
-  QuietCeres(const QuietCeres&) = delete;
-  QuietCeres& operator=(const QuietCeres&) = delete;
-
- private:
-  int before_;
-};
 
 /// w, x, y, z as Ceres takes them.
 inline Eigen::Vector4d ceresQuaternion(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
@@ -137,8 +124,6 @@ struct LeanResidual {
 
 constexpr double kTiltLoss = 2.0;      ///< sigmas, of the Cauchy loss of a lean or a direction of travel
 constexpr double kAltitudeLoss = 2.0;  ///< likewise
-
-constexpr double kNearest_m = 0.05;  ///< a landmark closer to a camera's plane than this has no projection
 
 /// Camera parameters: turn[3] (camera_in_map = start * exp(turn)) and position[3]. Landmark: position[3]. Lens:
 /// LensCorrection[6].

@@ -4,7 +4,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "geometry/bundle_adjustment.h"
+#include "geometry/bundle_problem.h"
 #include "geometry/feature_tracks.h"
 
 namespace visual_localization {

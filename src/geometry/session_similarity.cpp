@@ -13,6 +13,7 @@
 
 #include "geometry/bundle_adjustment.h"
 #include "geometry/bundle_residuals.h"
+#include "geometry/quiet_ceres.h"
 
 namespace visual_localization {
 namespace {

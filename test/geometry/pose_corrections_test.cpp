@@ -1,6 +1,6 @@
-#include <gtest/gtest.h>
+#include "geometry/pose_corrections.h"
 
-#include "geometry/bundle_adjustment.h"
+#include <gtest/gtest.h>
 
 namespace visual_localization {
 namespace {
