@@ -47,6 +47,9 @@ inline Eigen::Vector3d medianOf(const std::vector<Eigen::Vector3d>& vectors) {
   return middle;
 }
 
+/// Standard deviation of the position of a small feature, of images of a map and of a live camera alike.
+constexpr double kKeypointSigma_px = 0.3;
+
 /// Where the features of an image are in the camera's frame, index by index.
 struct KeypointRays {
   std::vector<Eigen::Vector2d> normalised;  ///< x/z, y/z; NaN where the lens has no ray
@@ -66,14 +69,14 @@ inline void setCamera(const CameraModel& camera, KeypointRays& rays) {
   }
 }
 
-/// A small feature is found to `sigma_px`, a large one, whose octave has larger pixels, less exactly.
-inline KeypointRays raysOf(const LocalFeatures& features, const CameraModel& camera, double sigma_px) {
+/// A large feature, whose octave has larger pixels, is found less exactly than a small one.
+inline KeypointRays raysOf(const LocalFeatures& features, const CameraModel& camera) {
   constexpr double kSmall_px = 6.0;
   KeypointRays rays;
   for (const Keypoint& keypoint : features.keypoints()) {
     const double growth = std::hypot(1.0, keypoint.size_px / kSmall_px);
     rays.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
-    rays.sigmas_px.push_back(static_cast<float>(sigma_px * growth));
+    rays.sigmas_px.push_back(static_cast<float>(kKeypointSigma_px * growth));
   }
   setCamera(camera, rays);
   return rays;

@@ -148,7 +148,7 @@ class SessionAdjuster {
     std::vector<KeypointRays> rays;
     FeatureSets sets;
     for (std::size_t i = 0; i < session_.images.size(); ++i) {
-      rays.push_back(raysOf(*session_.features(i), *session_.camera, config_.keypoint_sigma_px));
+      rays.push_back(raysOf(*session_.features(i), *session_.camera));
       sets.addImage(rays.back().normalised.size());
     }
     std::vector<RelativeRotation> relative;
@@ -380,8 +380,6 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                epipolar_tolerance_px, 0.01, 100.0);
   visitor.integer({"geometry/min_pair_inliers", "1", "two images with fewer verified matches do not count as a pair"},
                   min_pair_inliers, 6, 10000);
-  visitor.real({"geometry/keypoint_sigma", "px", "standard deviation of the position of a small SIFT feature"},
-               keypoint_sigma_px, 0.01, 100.0);
   visitor.real({"geometry/focal_sigma", "1", "how well a calibration knows the focal length, as a share of it"},
                focal_sigma, 1e-6, 1.0);
   visitor.real({"geometry/principal_point_sigma", "1", "and the principal point, as a share of the focal length"},

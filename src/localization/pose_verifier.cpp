@@ -96,7 +96,7 @@ void PoseVerifier::startImage(std::int64_t stamp_ns, const LocalFeatures& featur
   focal_.startImage();
   moving_.add(std::exchange(moving_gain_, 0.0));
   features_ = &features;
-  rays_ = raysOf(features, camera, config_.keypoint_sigma_px);
+  rays_ = raysOf(features, camera);
   focal_px_ = camera.intrinsics().fx;
   mount_ = mount;
   compared_.clear();

@@ -12,6 +12,7 @@ const std::map<std::string, double>& formerParameters() {
       {"dpso/exclusion_radius", 15.0},
       {"dpso/mode_radius", 5.0},
       {"dpso/rival_share", 0.5},
+      {"geometry/keypoint_sigma", 0.3},
       {"metric/keypoint_sigma", 0.3},
       {"metric/match_ratio", 0.85},
       {"metric/max_focal_error", 0.01},

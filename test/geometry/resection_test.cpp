@@ -25,7 +25,7 @@ class ResectionTest : public testing::Test {
     AveragedRotations rotations;
     FeatureSets sets;
     for (std::size_t i = 0; i < drive_.truth.size(); ++i) {
-      rays.push_back(raysOf(*drive_.views[i], drive_.camera, config_.keypoint_sigma_px));
+      rays.push_back(raysOf(*drive_.views[i], drive_.camera));
       sets.addImage(rays.back().normalised.size());
       Eigen::Quaterniond rotation = drive_.truth[i].camera.rotation;
       session_.images[i].position_m = drive_.truth[i].camera.position_m.head<2>();

@@ -95,7 +95,7 @@ TEST_F(MatchedLandmarksTest, CountByHowWellTheyAreKnown) {
   const auto geometry = map_->geometry(kImage);
   std::vector<std::size_t> features;
   for (const SeenLandmark& landmark : geometry->landmarks) features.push_back(landmark.feature);
-  const KeypointRays rays = raysOf(seen, camera_, config.keypoint_sigma_px);
+  const KeypointRays rays = raysOf(seen, camera_);
   std::vector<LandmarkMatch> sights;
   for (const FeatureMatch& match : matchSymmetric(seen, map_->local(kImage)->subset(features), config.match_ratio)) {
     const SeenLandmark& landmark = geometry->landmarks[match.b];

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "geometry/rays.h"
 #include "parameters/former_parameters.h"
 #include "test/localization/wall_street.h"
 #include "test/support/swarm_config.h"
@@ -123,7 +124,8 @@ TEST(FormerParameters, HaveTheValuesThatTheLocalizerUses) {
       {"dpso/exclusion_radius", config.dpso.exclusion_radius_m},
       {"dpso/mode_radius", config.dpso.mode_radius_m},
       {"dpso/rival_share", config.dpso.rival_share},
-      {"metric/keypoint_sigma", config.metric.keypoint_sigma_px},
+      {"geometry/keypoint_sigma", kKeypointSigma_px},
+      {"metric/keypoint_sigma", kKeypointSigma_px},
       {"metric/match_ratio", config.metric.match_ratio},
       {"metric/max_focal_error", config.metric.max_focal_error},
       {"metric/max_gap", config.metric.max_gap_s},

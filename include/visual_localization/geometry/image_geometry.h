@@ -20,7 +20,6 @@ struct GeometryConfig {
   double match_ratio = 0.75;
   double epipolar_tolerance_px = 1.0;
   int min_pair_inliers = 15;
-  double keypoint_sigma_px = 0.3;
   double focal_sigma = 0.03;
   double principal_point_sigma = 0.01;
   double distortion_sigma = 0.05;

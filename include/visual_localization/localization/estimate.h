@@ -56,7 +56,6 @@ struct MetricConfig {
   int training_images = 5;         ///< whose landmarks are matched: more of them cost more and show the same
   double match_ratio = 0.85;       ///< looser than between images, since the pose tells which matches are wrong
   double tolerance_px = 3.0;       ///< of an inlier: ten sigmas of a keypoint, since landmarks err as well
-  double keypoint_sigma_px = 0.3;  ///< of a small feature; large ones are found less well
   int min_inliers = 20;
   int min_inliers_predicted = 12;  ///< where the motion leads: fewer agree there by chance than anywhere
   int min_inliers_tracking = 80;
