@@ -13,7 +13,8 @@
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/local_features.h"
 #include "visual_localization/geo/trajectory.h"
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/query_image.h"
+#include "visual_localization/localization/similarity.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {

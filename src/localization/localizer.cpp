@@ -10,6 +10,7 @@
 #include "localization/pose_verifier.h"
 #include "localization/session_choice.h"
 #include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/path_interpolation.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {

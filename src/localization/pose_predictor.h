@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/metric_pose.h"
 #include "visual_localization/localization/odometry.h"
 
 namespace visual_localization {

@@ -12,7 +12,7 @@
 #include "localization/session_choice.h"
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geometry/camera_pose.h"
-#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/metric_pose.h"
 #include "visual_localization/localization/odometry.h"
 #include "visual_localization/map/training_map.h"
 

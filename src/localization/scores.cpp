@@ -1,144 +1,12 @@
 #include "visual_localization/localization/scores.h"
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
 #include <utility>
 
 #include "base/numbers.h"
-#include "base/text.h"
-#include "base/time.h"
 #include "visual_localization/localization/particles.h"
 
 namespace visual_localization {
-
-void SimilarityConfig::declare(ParameterVisitor& visitor) {
-  visitor.real({"similarity/sift_recognised", "1",
-                "a best match below this share of the features is a bad one (journal, section 5)"},
-               sift_recognised, 0.0, 1.0);
-}
-
-LocalSimilarity::LocalSimilarity(const MatchConfig& match, const SimilarityConfig& config, int image_width_px,
-                                 std::shared_ptr<const LocalFeatureKind> kind)
-    : kind_(std::move(kind)),
-      match_(match),
-      recognised_(config.recognised(FeatureKind::kLocal, match)),
-      exponent_(match.isByVotes() ? config.votes_exponent : 1.0),
-      image_width_px_(image_width_px) {}
-
-Score LocalSimilarity::compare(const LocalFeatures& current, const LocalFeatures& training) const {
-  if (current.size() < 2 || training.size() < 2) return {};
-  static thread_local std::vector<FeatureMatch> matches;
-  kind_->match(match_, current, training, image_width_px_, matches);
-  const std::size_t possible = match_.isOneWay() ? current.size() : std::min(current.size(), training.size());
-  return scoreOf(static_cast<double>(matches.size()) / static_cast<double>(possible), matches.size(),
-                 medianScale(current, training, matches));
-}
-
-Score LocalSimilarity::scoreOf(double similarity, std::size_t matches, double scale) const {
-  return {similarity, std::pow(similarity, exponent_), matches, similarity >= recognised_, scale};
-}
-
-Score GlobalSimilarity::compare(const GlobalFeatures& current, const GlobalFeatures& training) const {
-  return scoreOf(histogramIntersection(current.wgoh, training.wgoh) *
-                 histogramIntersection(current.wgii, training.wgii));
-}
-
-Score GlobalSimilarity::scoreOf(double similarity) const {
-  return {similarity, std::pow(similarity, config_.global_exponent), 0, similarity >= config_.global_recognised};
-}
-
-void HybridConfig::declare(ParameterVisitor& visitor) {
-  visitor.real(
-      {"hybrid/sift_below", "m", "after SIFT, global features follow when the cloud's sigmas are below (d_SIFT)"},
-      sift_below_m, 0.0, 10000.0);
-  visitor.real({"hybrid/global_above", "m", "after global features, SIFT follows when a sigma is above (d_global)"},
-               global_above_m, 0.0, 10000.0);
-  visitor.flag({"hybrid/sift_in_doubt", "", "SIFT also while the images look more like another place"}, sift_in_doubt);
-  visitor.integer(
-      {"hybrid/sift_every", "1",
-       "SIFT at least once in this number of images, and until an image confirms the position; 0: no such check"},
-      sift_every, 0, 1000000);
-}
-
-FeatureChoice::FeatureChoice(const std::string& features, const HybridConfig& config)
-    : hybrid_(features == "hybrid"),
-      config_(config),
-      first_(features == "global" ? FeatureKind::kGlobal : FeatureKind::kLocal),
-      next_(first_) {}
-
-void FeatureChoice::configure(const std::string& features, const HybridConfig& config) {
-  FeatureChoice changed(features, config);
-  if (changed.hybrid_ == hybrid_ && changed.first_ == first_) {
-    changed.next_ = next_;
-    changed.since_local_ = since_local_;
-  }
-  *this = changed;
-}
-
-void FeatureChoice::reset() {
-  next_ = first_;
-  since_local_ = 0;
-}
-
-void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool confirmed, bool doubtful) {
-  if (!hybrid_) return;
-  since_local_ = next_ == FeatureKind::kLocal ? 0 : since_local_ + 1;
-  if (isLocalDue(confirmed) || (doubtful && config_.sift_in_doubt)) {
-    next_ = FeatureKind::kLocal;
-    return;
-  }
-  const double largest_m = spread_m.maxCoeff();
-  if (next_ == FeatureKind::kLocal && largest_m < config_.sift_below_m) {
-    next_ = FeatureKind::kGlobal;
-  } else if (next_ == FeatureKind::kGlobal && largest_m > config_.global_above_m) {
-    next_ = FeatureKind::kLocal;
-  }
-}
-
-bool FeatureChoice::isLocalDue(bool confirmed) const {
-  if (config_.sift_every == 0) return false;
-  return since_local_ + 1 >= config_.sift_every || (next_ == FeatureKind::kLocal && !confirmed);
-}
-
-LiveImage::LiveImage(const TrainingMap& map, const FrontEndConfig& front_end, const SimilarityConfig& similarity)
-    : map_(map),
-      name_(upperCase(map.header().kind->name())),
-      front_end_(front_end),
-      local_similarity_(front_end.match, similarity, map.header().image_size.width, map.header().kind),
-      global_similarity_(similarity) {}
-
-void LiveImage::set(std::int64_t stamp_ns, const cv::Mat& grey) {
-  front_end_.setImage(stamp_ns, grey);
-  match_ms_ = 0.0;
-}
-
-Score LiveImage::compare(FeatureKind kind, std::size_t training_image) {
-  // What the map must read from its file counts as comparing: without the comparison there would be no need.
-  if (kind == FeatureKind::kLocal) {
-    const LocalFeatures& current = front_end_.local();
-    const Stopwatch stopwatch;
-    const Score score = local_similarity_.compare(current, *map_.local(training_image));
-    match_ms_ += stopwatch.elapsed_ms();
-    return score;
-  }
-  const GlobalFeatures& current = front_end_.global();
-  const Stopwatch stopwatch;
-  const Score score = global_similarity_.compare(current, *map_.global(training_image));
-  match_ms_ += stopwatch.elapsed_ms();
-  return score;
-}
-
-ImageReport LiveImage::report() const {
-  return {front_end_.statistics(), name_,    front_end_.localExtracted(), local() == nullptr ? 0 : local()->size(),
-          front_end_.extract_ms(), match_ms_};
-}
-
-void LiveImage::configure(const FrontEndConfig& front_end, const SimilarityConfig& similarity) {
-  front_end_.configure(front_end);
-  local_similarity_ = LocalSimilarity(front_end.match, similarity, map_.header().image_size.width, map_.header().kind);
-  global_similarity_ = GlobalSimilarity(similarity);
-}
 
 Scores::Cache::Entry& Scores::Cache::at(FeatureKind kind, std::size_t training_image, const Compare& compare) {
   std::uint32_t& entry = entry_of_.at(training_image);
@@ -258,48 +126,6 @@ double MapSweep::ratio(Scores& scores, const Eigen::Vector2d& position_m, double
     if ((map_.position_m(i) - position_m).norm() <= near_m) here = std::max(here, similarity);
   }
   return anywhere > 0.0 ? here / anywhere : 1.0;
-}
-
-namespace {
-
-constexpr std::size_t kMostSteps = 10;
-constexpr double kFarthest_m = 10.0;      ///< between neighbours on a path; beyond a gap another one begins
-constexpr std::size_t kLeastMatches = 8;  ///< for a median of their ratios
-
-/// The next image of the session, ahead or behind.
-std::optional<std::size_t> neighbourOf(const TrainingMap& map, std::size_t image, bool ahead) {
-  if (ahead ? image + 1 >= map.size() : image == 0) return std::nullopt;
-  const std::size_t next = ahead ? image + 1 : image - 1;
-  if (map.pose(next).session != map.pose(image).session) return std::nullopt;
-  if ((map.position_m(next) - map.position_m(image)).norm() > kFarthest_m) return std::nullopt;
-  return next;
-}
-
-/// Positive when the image was taken ahead of the training image.
-std::optional<double> leadOf(const Score& score) {
-  if (!score.recognised || score.matches < kLeastMatches || !(score.scale > 0.0)) return std::nullopt;
-  return std::log(score.scale);
-}
-
-}  // namespace
-
-Eigen::Vector2d interpolateOnPath(const TrainingMap& map, Scores& scores, std::size_t image) {
-  std::optional<double> lead = leadOf(scores[image]);
-  const bool ahead = lead.value_or(0.0) > 0.0;
-  std::size_t nearest = image;
-  for (std::size_t step = 0; lead && *lead != 0.0 && step < kMostSteps; ++step) {
-    const auto next = neighbourOf(map, nearest, ahead);
-    const auto next_lead = next ? leadOf(scores[*next]) : std::nullopt;
-    if (!next_lead) break;
-    if ((*next_lead > 0.0) != ahead) {
-      const double share = *lead / (*lead - *next_lead);
-      return map.position_m(nearest) + share * (map.position_m(*next) - map.position_m(nearest));
-    }
-    if (std::abs(*next_lead) >= std::abs(*lead)) break;
-    nearest = *next;
-    lead = next_lead;
-  }
-  return map.position_m(nearest);
 }
 
 }  // namespace visual_localization

@@ -11,7 +11,7 @@
 
 #include "base/numbers.h"
 #include "map/map_schema.h"
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 
 namespace visual_localization {
 namespace {

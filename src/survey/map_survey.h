@@ -12,7 +12,7 @@
 
 #include "visual_localization/base/progress.h"
 #include "visual_localization/features/feature_matcher.h"
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {

@@ -11,7 +11,7 @@
 #include "test/benchmark/descriptor_sets.h"
 #include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/sift.h"
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 
 namespace visual_localization::benchmarks {
 namespace {

@@ -9,7 +9,6 @@
 #include "map/extraction_pool.h"
 #include "test/localization/wall_street.h"
 #include "visual_localization/features/sift.h"
-#include "visual_localization/localization/scores.h"
 
 namespace visual_localization {
 namespace {

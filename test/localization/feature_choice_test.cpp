@@ -1,9 +1,9 @@
+#include "visual_localization/localization/feature_choice.h"
+
 #include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
-
-#include "visual_localization/localization/scores.h"
 
 namespace visual_localization {
 namespace {

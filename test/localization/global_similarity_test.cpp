@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {

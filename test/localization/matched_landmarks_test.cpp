@@ -18,7 +18,7 @@
 #include "test/support/landmark_world.h"
 #include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/sift.h"
-#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/metric_pose.h"
 
 namespace visual_localization {
 namespace {

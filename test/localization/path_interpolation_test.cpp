@@ -1,3 +1,5 @@
+#include "visual_localization/localization/path_interpolation.h"
+
 #include <cmath>
 #include <vector>
 

@@ -9,7 +9,7 @@
 
 #include "base/numbers.h"
 #include "test/localization/pose_verifier_fixture.h"
-#include "visual_localization/localization/estimate.h"
+#include "visual_localization/localization/metric_pose.h"
 
 namespace visual_localization {
 namespace {

@@ -1,3 +1,5 @@
+#include "visual_localization/localization/similarity.h"
+
 #include <stdexcept>
 
 #include <gtest/gtest.h>

@@ -7,7 +7,7 @@
 
 #include "test/support/fake_image.h"
 #include "test/support/landmark_world.h"
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 
 namespace visual_localization::test {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/query_image.h"
 
 namespace visual_localization::test {
 

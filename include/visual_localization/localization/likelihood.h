@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "visual_localization/localization/particles.h"
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {

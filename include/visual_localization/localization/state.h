@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 #include "visual_localization/localization/tracker.h"
 #include "visual_localization/parameters/parameters.h"
 

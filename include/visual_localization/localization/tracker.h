@@ -14,7 +14,7 @@
 #include "visual_localization/localization/likelihood.h"
 #include "visual_localization/localization/motion.h"
 #include "visual_localization/localization/particles.h"
-#include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 #include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/map/training_map.h"
 
