@@ -58,7 +58,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       sessions_(std::make_unique<SessionChoice>(*map_, config_.choose_session)),
       likelihood_(std::make_unique<ImageLikelihood>(scores_, sweep_, *sessions_, config_.fitness)),
       verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric, *sessions_)) {
-  verifier_->useOdometry(odometry_, config_.odometry);
+  verifier_->predictor().useOdometry(odometry_, config_.odometry);
 }
 
 Localizer::~Localizer() = default;
@@ -106,7 +106,7 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.stamp_ns = stamp_ns;
   estimate.state = state;
   estimate.metric = metric;
-  estimate.images_since_metric = isMetric() ? verifier_->imagesSince() : 0;
+  estimate.images_since_metric = isMetric() ? verifier_->predictor().imagesSince() : 0;
   estimate.tracked = tracked;
   estimate.evidence = evidence;
   if (const auto session = sessions_->chosen()) estimate.session = map_->header().sessions[*session].name;
@@ -288,7 +288,7 @@ void Localizer::choosePose(Estimate& estimate) {
   const bool probable = estimate.evidence.probability && estimate.state == LocalizationState::kTracking;
   const bool placed = estimate.tracked.best.recognised || probable;
   estimate.source = placed ? PoseSource::kPlace : PoseSource::kNone;
-  const auto predicted = isMetric() ? verifier_->predicted() : std::nullopt;
+  const auto predicted = isMetric() ? verifier_->predictor().predicted() : std::nullopt;
   if (!predicted) return;
   const double apart_m = (predicted->position_m - estimate.pose.position_m).norm();
   const bool knows_better = predicted->by_odometry && !estimate.tracked.best.recognised;
@@ -340,7 +340,7 @@ Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool rec
 }
 
 LocalizationState Localizer::doubt() {
-  verifier_->doubtMotion();
+  verifier_->predictor().doubtMotion();
   const LocalizationState state = assessor_.doubt(tracker_->belief().recovering);
   if (last_) {
     last_->state = state;
@@ -360,7 +360,7 @@ void Localizer::configure(const LocalizerConfig& config) {
   odometry_.configure(config_.odometry);
   likelihood_->configure(config_.fitness);
   witness_->configure(config_.bayes);
-  verifier_->useOdometry(odometry_, config_.odometry);
+  verifier_->predictor().useOdometry(odometry_, config_.odometry);
   configureTracker(before.tracker);
   last_.reset();
 }

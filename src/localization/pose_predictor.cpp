@@ -62,7 +62,7 @@ bool PosePredictor::add(const MetricPose& pose) {
   Known known{stamp_ns_, pose, {}, 0.0, true};
   if (last_ && last_->velocity_holds) {
     const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
-    if (elapsed_s > 0.0 && elapsed_s <= config_.max_gap_s) {
+    if (elapsed_s > 0.0 && elapsed_s <= kMaxGap_s) {
       known.velocity_mps = (pose.base.translation() - last_->pose.base.translation()).head<2>() / elapsed_s;
       known.turned_rad = angleDifference(yawOf(last_->pose.base), yawOf(pose.base));
       if (isPredicted(pose)) speed_mps_ = known.velocity_mps->norm();  // two that agree
@@ -88,7 +88,7 @@ std::optional<PredictedPose> PosePredictor::byOdometry() const {
 std::optional<PredictedPose> PosePredictor::byVelocity() const {
   if (!last_ || !last_->velocity_holds) return std::nullopt;
   const double elapsed_s = secondsBetween(last_->stamp_ns, stamp_ns_);
-  if (!(elapsed_s >= 0.0 && elapsed_s <= config_.max_gap_s)) return std::nullopt;
+  if (!(elapsed_s >= 0.0 && elapsed_s <= kMaxGap_s)) return std::nullopt;
   const MetricPose& last = last_->pose;
   const Eigen::Vector2d way_m = last_->velocity_mps.value_or(Eigen::Vector2d::Zero()) * elapsed_s;
   const MetricPose::Covariance covariance = last.covariance + last.map_covariance;

@@ -25,6 +25,8 @@ struct PredictedPose {
 /// landmarks verify may be where the robot has driven to.
 class PosePredictor {
  public:
+  static constexpr double kMaxGap_s = 5.0;  ///< between images: after a longer one a velocity tells nothing
+
   explicit PosePredictor(const MetricConfig& config) : config_(config) {}
 
   void configure(const MetricConfig& config) { config_ = config; }

@@ -187,7 +187,7 @@ std::optional<PoseVerifier::Solution> PoseVerifier::solve(const std::vector<std:
       sights.push_back(match.sight);
     }
   }
-  const auto solved = solvePose(sights, config_.tolerance_px / focal_px_, min_inliers, moving_.sum());
+  const auto solved = solvePose(sights, kTolerance_px / focal_px_, min_inliers, moving_.sum());
   if (!solved) return std::nullopt;
   std::vector<Pair> inliers;
   for (const std::size_t i : solved->inliers) inliers.push_back(seen[i]);
@@ -226,7 +226,7 @@ void PoseVerifier::match(std::size_t training_image, const ImageGeometry& geomet
   const std::shared_ptr<const LocalFeatures> features = map_.local(training_image);
   if (!indices_.empty() && indices_.back() >= features->size()) return;  // they could not be read
   features->subset(indices_, landmarks_);
-  map_.header().kind->correspond(*features_, landmarks_, config_.match_ratio, found_);
+  map_.header().kind->correspond(*features_, landmarks_, kMatchRatio, found_);
   const int session = map_.pose(training_image).session;
   for (const FeatureMatch& pair : found_) {
     if (!rays_.normalised[pair.a].allFinite()) continue;

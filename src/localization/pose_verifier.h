@@ -13,7 +13,6 @@
 #include "visual_localization/camera/camera_model.h"
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/localization/metric_pose.h"
-#include "visual_localization/localization/odometry.h"
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization {
@@ -79,17 +78,18 @@ class MotionEvidence {
 /// predicts, or else of those that look most alike. The solved pose is judged, not the image that it came from.
 class PoseVerifier {
  public:
+  /// Largest ratio of a match: looser than between images, since the pose tells which matches are wrong.
+  static constexpr double kMatchRatio = 0.85;
+  /// Of an inlier: ten sigmas of a keypoint, since landmarks err as well.
+  static constexpr double kTolerance_px = 3.0;
+
   /// `map` and `sessions`, which is told how well its sessions match, must outlive it.
   PoseVerifier(const TrainingMap& map, const MetricConfig& config, SessionChoice& sessions)
       : map_(map), config_(config), sessions_(sessions), focal_(config.max_focal_error), predictor_(config) {}
 
   void configure(const MetricConfig& config);
-  /// As PosePredictor::useOdometry().
-  void useOdometry(const OdometryTrack& track, const OdometryConfig& config) { predictor_.useOdometry(track, config); }
   /// The robot may be anywhere: forgets the last verified pose.
   void reset();
-  /// As PosePredictor::doubtMotion().
-  void doubtMotion() { predictor_.doubtMotion(); }
   /// Another camera, or another calibration of it.
   void resetCamera() { focal_.reset(); }
   /// The next image. Its features, not pruned, must live until the one after it.
@@ -102,15 +102,13 @@ class PoseVerifier {
   /// The same near the first of `training_images` that verifies a pose; the most similar come first.
   std::optional<MetricPose> nearOneOf(const std::vector<std::size_t>& training_images);
   /// Where the motion since the last verified pose leads to.
-  std::optional<PredictedPose> predicted() const { return predictor_.predicted(); }
+  PosePredictor& predictor() { return predictor_; }
   /// Training images whose landmarks were matched with the image, each once.
   std::vector<std::size_t> compared() const;
   /// What the last verified pose rests on: of the training image that shares most inliers with it.
   const MatchedLandmarks& matched() const { return matched_; }
   /// What the last images say about the calibration. While they contradict it no pose is verified.
   const FocalCheck& focal() const { return focal_; }
-  /// Images since the last verified one; 0 when it was the last. No reset changes it.
-  std::size_t imagesSince() const { return predictor_.imagesSince(); }
 
  private:
   /// A landmark and the feature of the image that seems to show it.

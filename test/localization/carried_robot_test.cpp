@@ -19,7 +19,7 @@ using test::kSecond_ns;
 class CarriedRobot : public test::PoseVerifierTest {
  protected:
   CarriedRobot() {
-    verifier_.useOdometry(track_, config_);
+    verifier_.predictor().useOdometry(track_, config_);
     EXPECT_TRUE(verifyNear(0.0, 10));
     turnWheelsUntil(1.0, {0.0, 0.0});
     EXPECT_TRUE(confirmedAt(1.0, 10));
@@ -81,7 +81,7 @@ TEST_F(CarriedRobot, IsConfirmedByTenPosesAlongItsVelocity) {
 
 TEST_F(CarriedRobot, WasNotCarriedWhereAWrongHeadingExplainsIt) {
   config_.turn_sigma_rad_m = 0.03;
-  verifier_.useOdometry(track_, config_);
+  verifier_.predictor().useOdometry(track_, config_);
   MetricConfig config;
   config.min_inliers = 10;  // few where odometry leads aside
   config.min_inliers_predicted = 10;

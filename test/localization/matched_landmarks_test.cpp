@@ -64,9 +64,9 @@ TEST_F(MatchedLandmarksTest, AgreeWhereTheProjectionIsAndDisagreeElsewhere) {
     const Eigen::Vector2d expected_px = camera_.project(pose->camera.toCamera(landmark_m));
     const double distance_px = (expected_px - landmark.seen_px.cast<double>()).norm();
     if (landmark.inlier) {
-      EXPECT_LT(distance_px, 2.0 * MetricConfig().tolerance_px);
+      EXPECT_LT(distance_px, 2.0 * PoseVerifier::kTolerance_px);
     } else {
-      EXPECT_GT(distance_px, 0.5 * MetricConfig().tolerance_px);
+      EXPECT_GT(distance_px, 0.5 * PoseVerifier::kTolerance_px);
     }
     inliers += landmark.inlier ? 1 : 0;
   }
@@ -97,12 +97,13 @@ TEST_F(MatchedLandmarksTest, CountByHowWellTheyAreKnown) {
   for (const SeenLandmark& landmark : geometry->landmarks) features.push_back(landmark.feature);
   const KeypointRays rays = raysOf(seen, camera_);
   std::vector<LandmarkMatch> sights;
-  for (const FeatureMatch& match : matchSymmetric(seen, map_->local(kImage)->subset(features), config.match_ratio)) {
+  for (const FeatureMatch& match :
+       matchSymmetric(seen, map_->local(kImage)->subset(features), PoseVerifier::kMatchRatio)) {
     const SeenLandmark& landmark = geometry->landmarks[match.b];
     sights.push_back({match.a, 0, rays.normalised[match.a], rays.sigmas[match.a],
                       geometry->camera.position_m + landmark.offset_m.cast<double>(), covarianceOf(landmark)});
   }
-  const double tolerance = config.tolerance_px / camera_.intrinsics().fx;
+  const double tolerance = PoseVerifier::kTolerance_px / camera_.intrinsics().fx;
   const auto expected = solvePose(sights, tolerance, static_cast<std::size_t>(config.min_inliers));
   ASSERT_TRUE(expected);
   EXPECT_LT((pose->camera.position_m - expected->camera.position_m).norm(), 1e-7);
@@ -134,10 +135,10 @@ TEST_F(MatchedLandmarksTest, MayBeOneOfEachTrainingImage) {
   config.max_sigma_m = 100.0;
   std::vector<TrainingImage> images;
   for (std::size_t i = 0; i < map_->size(); ++i) images.push_back(map_->image(i));
-  const auto matchesOf = [&config](const LocalFeatures& seen, const TrainingImage& image) {
+  const auto matchesOf = [](const LocalFeatures& seen, const TrainingImage& image) {
     std::vector<std::size_t> features;
     for (const SeenLandmark& landmark : image.geometry->landmarks) features.push_back(landmark.feature);
-    return matchSymmetric(seen, image.local.subset(features), config.match_ratio);
+    return matchSymmetric(seen, image.local.subset(features), PoseVerifier::kMatchRatio);
   };
   const LocalFeatures all = test::viewOf(world_, camera_, poses_[kImage].camera, 0.3, random_).features;
   const std::vector<FeatureMatch> ahead = matchesOf(all, images[kImage + 5]);

@@ -24,9 +24,9 @@ TEST_F(PosePrediction, PredictsWithAGrowingCovariance) {
   const auto pose = verifyNear(1.0, 11);
   ASSERT_TRUE(pose);
   verify(2.0, LocalFeatures(), {});
-  const auto soon = verifier_.predicted();
+  const auto soon = verifier_.predictor().predicted();
   verify(4.0, LocalFeatures(), {});
-  const auto later = verifier_.predicted();
+  const auto later = verifier_.predictor().predicted();
   ASSERT_TRUE(soon && later);
   EXPECT_GT(soon->covariance_m2(0, 0), pose->covariance(0, 0) + pose->map_covariance(0, 0));
   EXPECT_GT(later->covariance_m2(0, 0), soon->covariance_m2(0, 0));
@@ -41,7 +41,7 @@ TEST_F(PosePrediction, TheVelocityLeadsStraightOnAndIsTheLessSureTheFarther) {
   const auto second = verifyNear(0.5, 11);
   ASSERT_TRUE(first && second);
   verify(2.0, LocalFeatures(), {});
-  const auto prediction = verifier_.predicted();
+  const auto prediction = verifier_.predictor().predicted();
   ASSERT_TRUE(prediction);
   const Eigen::Vector2d step_m = (second->base.translation() - first->base.translation()).head<2>();
   const Eigen::Vector2d way_m = 3.0 * step_m;  // in three times the time
@@ -61,7 +61,7 @@ TEST_F(PosePrediction, OdometryLeadsWhereItWentAndAWrongHeadingLeadsAside) {
   config.distance_sigma = 0.1;
   config.turn_sigma_rad_m = 0.05;
   OdometryTrack track(config);
-  verifier_.useOdometry(track, config);
+  verifier_.predictor().useOdometry(track, config);
   const auto pose = verifyNear(0.0, 10);
   ASSERT_TRUE(pose);
   // 4 m ahead in a straight line, then 3 m to the left: 7 m of way, turned to the left.
@@ -71,7 +71,7 @@ TEST_F(PosePrediction, OdometryLeadsWhereItWentAndAWrongHeadingLeadsAside) {
     track.add({i * kSecond_ns / 10, {ahead_m, left_m}, i > 10 ? 0.5 : 0.0});
   }
   verify(2.0, LocalFeatures(), {});
-  const auto prediction = verifier_.predicted();
+  const auto prediction = verifier_.predictor().predicted();
   ASSERT_TRUE(prediction);
   EXPECT_TRUE(prediction->by_odometry);
   const Eigen::Vector2d way_m = Eigen::Rotation2Dd(yawOf(pose->base)) * Eigen::Vector2d(4.0, 3.0);
@@ -90,7 +90,7 @@ TEST_F(PosePrediction, OdometryLeadsWhereItWentAndAWrongHeadingLeadsAside) {
 TEST_F(PosePrediction, OdometryThatTurnsOnLeadsToAHeadingWithinHalfATurn) {
   const OdometryConfig config;
   OdometryTrack track(config);
-  verifier_.useOdometry(track, config);
+  verifier_.predictor().useOdometry(track, config);
   const auto pose = verifyNear(0.0, 22);
   ASSERT_TRUE(pose);
   const double yaw_rad = yawOf(pose->base);
@@ -98,7 +98,7 @@ TEST_F(PosePrediction, OdometryThatTurnsOnLeadsToAHeadingWithinHalfATurn) {
   const double turn_rad = yaw_rad > 0.0 ? 2.8 : -2.8;
   for (int i = 0; i <= 10; ++i) track.add({i * kSecond_ns / 10, {0.0, 0.0}, 0.1 * i * turn_rad});
   verify(1.0, LocalFeatures(), {});
-  const auto prediction = verifier_.predicted();
+  const auto prediction = verifier_.predictor().predicted();
   ASSERT_TRUE(prediction && prediction->by_odometry);
   EXPECT_NEAR(prediction->yaw_rad, yaw_rad + turn_rad - std::copysign(2.0 * kPi, turn_rad), 1e-9);
 }
@@ -107,7 +107,7 @@ TEST_F(PosePrediction, OdometryThatTurnsOnLeadsToAHeadingWithinHalfATurn) {
 TEST_F(PosePrediction, OdometryIsBelievedAgainAfterTenPosesThatItAgreesWith) {
   const OdometryConfig config;
   OdometryTrack track(config);
-  verifier_.useOdometry(track, config);
+  verifier_.predictor().useOdometry(track, config);
   double x_m = 0.0;
   track.add({0, {x_m, 0.0}, 0.0});
   ASSERT_TRUE(verifyNear(0.0, 10));
@@ -118,7 +118,7 @@ TEST_F(PosePrediction, OdometryIsBelievedAgainAfterTenPosesThatItAgreesWith) {
     }
     const LocalFeatures nothing;
     verifier_.startImage(second * kSecond_ns, nothing, street_.camera());
-    const auto prediction = verifier_.predicted();
+    const auto prediction = verifier_.predictor().predicted();
     EXPECT_TRUE(verifyNear(static_cast<double>(second), 10)) << second;
     return prediction && prediction->by_odometry;
   };
@@ -134,7 +134,7 @@ class OdometryAgreement : public PoseVerifierTest {
  protected:
   bool stillBelieved(double moved_m, double turned_rad) {
     OdometryTrack track(config_);
-    verifier_.useOdometry(track, config_);
+    verifier_.predictor().useOdometry(track, config_);
     verifier_.reset();
     const LocalFeatures seen = street_.seenFrom(street_.trueNear(10, kBeside_m));
     begin_s_ += 1000.0;
@@ -151,7 +151,7 @@ class OdometryAgreement : public PoseVerifierTest {
     sigma_m_ = first ? largerSigma(allOf(*first).topLeftCorner<2, 2>()) : 0.0;
     EXPECT_TRUE(look(1.0));
     verifier_.startImage(at(1.2), seen, street_.camera());
-    const auto prediction = verifier_.predicted();
+    const auto prediction = verifier_.predictor().predicted();
     return prediction && prediction->by_odometry;
   }
 
@@ -183,12 +183,12 @@ TEST_F(PosePrediction, OdometryLeadsNoFartherThanIsBelieved) {
     OdometryConfig config;
     config.max_distance_m = max_distance_m;
     OdometryTrack track(config);
-    verifier_.useOdometry(track, config);
+    verifier_.predictor().useOdometry(track, config);
     verifier_.reset();
     ASSERT_TRUE(verifyNear(0.0, 10));
     for (int i = 0; i <= 10; ++i) track.add({i * kSecond_ns / 10, {0.7 * i, 0.0}, 0.0});
     verify(1.0, LocalFeatures(), {});
-    const auto prediction = verifier_.predicted();
+    const auto prediction = verifier_.predictor().predicted();
     ASSERT_TRUE(prediction) << "otherwise by the velocity";
     EXPECT_EQ(prediction->by_odometry, max_distance_m > 7.0);
   }
@@ -196,9 +196,9 @@ TEST_F(PosePrediction, OdometryLeadsNoFartherThanIsBelieved) {
 
 TEST_F(PosePrediction, NothingIsPredictedForTimesBeforeThePose) {
   ASSERT_TRUE(verifyNear(100.0, 10));
-  EXPECT_TRUE(verifier_.predicted()) << "of the same moment";
+  EXPECT_TRUE(verifier_.predictor().predicted()) << "of the same moment";
   verify(99.0, LocalFeatures(), {});
-  EXPECT_FALSE(verifier_.predicted());
+  EXPECT_FALSE(verifier_.predictor().predicted());
 }
 
 // Four metres a second predict four metres on, and that to 2 m of its own beside the metre that is allowed.

@@ -47,20 +47,20 @@ class PosePredictorTest : public testing::Test {
 TEST_F(PosePredictorTest, AVelocityHoldsForTheLongestGap) {
   add(0.0, 0.0);
   add(1.0, 1.0);
-  const auto prediction = predictedAt(1.0 + config_.max_gap_s);
+  const auto prediction = predictedAt(1.0 + PosePredictor::kMaxGap_s);
   ASSERT_TRUE(prediction);
-  EXPECT_DOUBLE_EQ(prediction->position_m.x(), 1.0 + config_.max_gap_s);
-  EXPECT_FALSE(predictedAt(1.001 + config_.max_gap_s));
+  EXPECT_DOUBLE_EQ(prediction->position_m.x(), 1.0 + PosePredictor::kMaxGap_s);
+  EXPECT_FALSE(predictedAt(1.001 + PosePredictor::kMaxGap_s));
 }
 
 TEST_F(PosePredictorTest, PosesFartherApartThanTheLongestGapTellNoVelocity) {
   add(0.0, 0.0);
-  add(config_.max_gap_s + 0.5, 4.0);
-  EXPECT_DOUBLE_EQ(predictedAt(config_.max_gap_s + 1.0)->position_m.x(), 4.0);
+  add(PosePredictor::kMaxGap_s + 0.5, 4.0);
+  EXPECT_DOUBLE_EQ(predictedAt(PosePredictor::kMaxGap_s + 1.0)->position_m.x(), 4.0);
   predictor_.reset();
   add(0.0, 0.0);
-  add(config_.max_gap_s, 4.0);
-  EXPECT_GT(predictedAt(config_.max_gap_s + 1.0)->position_m.x(), 4.0);
+  add(PosePredictor::kMaxGap_s, 4.0);
+  EXPECT_GT(predictedAt(PosePredictor::kMaxGap_s + 1.0)->position_m.x(), 4.0);
 }
 
 TEST_F(PosePredictorTest, TwoPosesAtOneTimeTellNoVelocity) {
@@ -83,7 +83,7 @@ TEST_F(PosePredictorTest, AMovedThingIsAtMostFiveMetresBesideTheWay) {
 
 TEST_F(PosePredictorTest, AfterALongGapAPoseFollowsWithinTheWayOfTheSpeed) {
   for (const double time_s : {0.0, 1.0, 2.0}) add(time_s, 0.1 * time_s);
-  const double gap_s = config_.max_gap_s + 1.0;
+  const double gap_s = PosePredictor::kMaxGap_s + 1.0;
   const double reach_m = config_.max_prediction_error_m + 1.5 * 0.1 * gap_s;
   predictor_.startImage(ns(2.0 + gap_s));
   EXPECT_TRUE(predictor_.follows(poseAt(0.2 + 0.99 * reach_m, 0.0)));
@@ -127,7 +127,7 @@ TEST_F(Contradicted, NorIsOneThatTheMotionDoesNotLeadToCounted) {
   EXPECT_TRUE(add(14.0, 91.0));
 }
 
-TEST_F(Contradicted, NobodyKnowsAfterSilenceAndALongGap) { EXPECT_TRUE(add(31.0 + config_.max_gap_s, 51.0)); }
+TEST_F(Contradicted, NobodyKnowsAfterSilenceAndALongGap) { EXPECT_TRUE(add(31.0 + PosePredictor::kMaxGap_s, 51.0)); }
 
 TEST_F(Contradicted, AResetForgetsIt) {
   predictor_.reset();

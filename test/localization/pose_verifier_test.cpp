@@ -26,7 +26,7 @@ TEST_F(PoseVerifierTest, FindsThePoseToCentimetres) {
     EXPECT_LT(pose->camera.rotation.angularDistance(expected.rotation), 0.005) << i;
     EXPECT_LT(pose->reprojection_px, 1.5) << i;
     EXPECT_GT(pose->map_covariance(0, 0), 0.0) << i;
-    EXPECT_EQ(verifier_.imagesSince(), 0U) << i;
+    EXPECT_EQ(verifier_.predictor().imagesSince(), 0U) << i;
   }
 }
 
@@ -158,7 +158,7 @@ TEST_F(PoseVerifierTest, FindsNothingWhereNothingMatches) {
   const auto view = test::viewOf(elsewhere, street_.camera(), poses[10].camera, 0.3, random);
   EXPECT_FALSE(verify(0.0, view.features, {9, 10, 11, 30}));
   EXPECT_FALSE(verify(1.0, LocalFeatures(), {9, 10, 11, 30}));
-  EXPECT_EQ(verifier_.imagesSince(), 2U);
+  EXPECT_EQ(verifier_.predictor().imagesSince(), 2U);
 }
 
 TEST_F(PoseVerifierTest, FindsNothingBeforeParticlesHaveComparedAnything) {
@@ -229,7 +229,7 @@ TEST_F(PoseVerifierTest, DoesNotBelieveAPoseAsideOfTheMotionUntilTheNextImage) {
   ASSERT_TRUE(verifyNear(10.0, 10));
   ASSERT_TRUE(verifyNear(11.0, 11));
   EXPECT_FALSE(verify(12.0, seenAside(12), {11, 12, 13}));
-  EXPECT_EQ(verifier_.imagesSince(), 1U);
+  EXPECT_EQ(verifier_.predictor().imagesSince(), 1U);
   ASSERT_TRUE(verifyNear(13.0, 13)) << "the motion before leads on";
   EXPECT_FALSE(verify(14.0, seenAside(14), {13, 14, 15}));
   const auto again = verify(15.0, seenAside(15), {14, 15, 16});

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "geometry/rays.h"
+#include "localization/pose_predictor.h"
+#include "localization/pose_verifier.h"
 #include "parameters/former_parameters.h"
 #include "test/localization/wall_street.h"
 #include "test/support/swarm_config.h"
@@ -126,14 +128,14 @@ TEST(FormerParameters, HaveTheValuesThatTheLocalizerUses) {
       {"dpso/rival_share", config.dpso.rival_share},
       {"geometry/keypoint_sigma", kKeypointSigma_px},
       {"metric/keypoint_sigma", kKeypointSigma_px},
-      {"metric/match_ratio", config.metric.match_ratio},
+      {"metric/match_ratio", PoseVerifier::kMatchRatio},
       {"metric/max_focal_error", config.metric.max_focal_error},
-      {"metric/max_gap", config.metric.max_gap_s},
+      {"metric/max_gap", PosePredictor::kMaxGap_s},
       {"metric/max_prediction_error", config.metric.max_prediction_error_m},
       {"metric/max_sigma", config.metric.max_sigma_m},
       {"metric/min_inliers_predicted", config.metric.min_inliers_predicted},
       {"metric/sigma_factor", config.metric.sigma_factor},
-      {"metric/tolerance", config.metric.tolerance_px},
+      {"metric/tolerance", PoseVerifier::kTolerance_px},
       {"metric/training_images", config.metric.training_images},
       {"odometry/max_distance", config.odometry.max_distance_m},
       {"odometry/max_gap", config.odometry.max_gap_s},

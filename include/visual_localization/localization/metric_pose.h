@@ -38,15 +38,12 @@ struct MatchedLandmarks {
 /// When a pose solved from landmarks counts. What has a comment is no parameter.
 struct MetricConfig {
   std::string pose_source = "metric";
-  int training_images = 5;    ///< whose landmarks are matched: more of them cost more and show the same
-  double match_ratio = 0.85;  ///< looser than between images, since the pose tells which matches are wrong
-  double tolerance_px = 3.0;  ///< of an inlier: ten sigmas of a keypoint, since landmarks err as well
+  int training_images = 5;  ///< whose landmarks are matched: more of them cost more and show the same
   int min_inliers = 20;
   int min_inliers_predicted = 12;  ///< where the motion leads: fewer agree there by chance than anywhere
   int min_inliers_tracking = 80;
   double sigma_factor = 1.4;            ///< of the covariance, as if one by one: landmarks of one image err alike
   double max_sigma_m = 0.3;             ///< landmarks that leave more open hardly fix the pose
-  double max_gap_s = 5.0;               ///< after a longer one a velocity tells nothing
   double max_prediction_error_m = 1.0;  ///< beside half the way since and twice the sigma of the pose
   double max_focal_error = 0.01;        ///< one image of a street tells the focal length to about 1 %
 
