@@ -108,7 +108,7 @@ class DriveRecorder {
   Drive finish() {
     if (by_both_) {
       const CpuStopwatch sift_watch;
-      pruneByBothNeighbours(drive_.images, config_.match.max_angle_ratio, config_.max_image_gap_s);
+      pruneByBothNeighbours(drive_.images, config_.match.max_angle_ratio, kMaxImageGap_s);
       drive_.sift_ms += sift_watch.elapsed_ms();
     }
     if (!for_poses_) {

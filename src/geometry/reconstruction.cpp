@@ -29,7 +29,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
   const auto begin = static_cast<std::uint32_t>(images_.size());
   for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
     fix.image += begin;
-    fix.sigma_m *= config_.fix_correlation;
+    fix.sigma_m *= kFixCorrelation;
     fixes_.push_back(fix);
   }
   budgets_.emplace_back();
@@ -54,8 +54,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
     problem_.road.push_back({directions[i], heights.slope[i]});
     ranks_.push_back(ranks_.size());
     if (!heights.measured) continue;
-    problem_.heights.push_back(
-        {begin + static_cast<std::uint32_t>(i), up_m, config_.fix_correlation * heights.sigma_m});
+    problem_.heights.push_back({begin + static_cast<std::uint32_t>(i), up_m, kFixCorrelation * heights.sigma_m});
   }
   sessions_.push_back(&session);
   sets_.append(sets);
@@ -210,7 +209,7 @@ void Reconstruction::adjustAndPrune(double tolerance, std::size_t min_views) {
   for (Landmark& landmark : problem_.landmarks) {
     auto& all = landmark.sightings;
     const auto disagrees = [&](const LandmarkSighting& sighting) {
-      return !(reprojectionError_px(problem_, landmark, sighting) <= config_.max_residual_sigmas * sighting.sigma_px);
+      return !(reprojectionError_px(problem_, landmark, sighting) <= kMaxResidual * sighting.sigma_px);
     };
     all.erase(std::remove_if(all.begin(), all.end(), disagrees), all.end());
   }

@@ -57,8 +57,16 @@ PathHeights pathHeights(const std::vector<TrajectoryPoint>& images, const std::v
 /// Images of one session or several, and what they show, while they are adjusted.
 class Reconstruction {
  public:
-  static constexpr std::size_t kMinViews = 3;        ///< of a landmark, in the end
+  /// Fixes err alike for many images: the sigma of the position of one is this multiple of a fix's, as if about ten
+  /// images (3.3 squared) shared one error.
+  static constexpr double kFixCorrelation = 3.3;
+  /// Scale of the loss of a fix, in sigmas. Believed fixes have Cauchy's; of the others, whose loss is Geman and
+  /// McClure's, one that is much farther off has no influence.
+  static constexpr double kFixLoss = 1.0;
+  static constexpr double kMaxResidual = 5.0;  ///< sigmas between a landmark and what shows it: no chance goes so far
+  static constexpr std::size_t kMinViews = 3;  ///< of a landmark, in the end
   static constexpr std::size_t kEnoughTracked = 20;  ///< features of an image, for their share to say anything
+  static constexpr std::size_t kMinLandmarks = 12;   ///< an image with fewer has a place only
   static constexpr double kBelievedFix_m = 1.0;      ///< from the cleaned path, of a fix that confirms it
 
   explicit Reconstruction(const GeometryConfig& config) : config_(config) { problem_.lenses.clear(); }

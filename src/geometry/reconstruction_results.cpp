@@ -227,8 +227,7 @@ void Reconstruction::addPath(std::vector<ImageGeometry> images, std::vector<Sess
     SessionGeometry& geometry = geometries[sessionOf(i)];
     std::optional<ImageGeometry>& image = geometry.images.emplace_back();
     if (explained[i]) ++trackable[sessionOf(i)];
-    if (images[i].landmarks.size() < static_cast<std::size_t>(config_.min_landmarks) || isAstray(i, explained[i]))
-      continue;
+    if (images[i].landmarks.size() < kMinLandmarks || isAstray(i, explained[i])) continue;
     const bool is_off = usual(off_fixes, i).value_or(0.0) > kOffFixes;
     const bool is_unexplained = usual(explained, i).value_or(1.0) < kLeastExplained;
     if (is_off) ++geometry.off_fixes;

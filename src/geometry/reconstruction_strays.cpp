@@ -120,8 +120,7 @@ void Reconstruction::resect(double gate_px, std::size_t max_views) {
     triangulateWithout(lost, gate_px, max_views);
     const std::vector<std::vector<LandmarkMatch>> matches = landmarksOf(lost);
     for (std::size_t i = 0; i < images_.size(); ++i) {
-      const auto solved =
-          solvePose(matches[i], kResected_px / focal_px(i), static_cast<std::size_t>(config_.min_landmarks));
+      const auto solved = solvePose(matches[i], kResected_px / focal_px(i), kMinLandmarks);
       if (solved) problem_.cameras[i] = solved->camera;
     }
     triangulateAll(gate_px, max_views);

@@ -34,14 +34,14 @@ constexpr double kStretchedAspect = 0.005;  ///< likewise, where the shutter of 
 /// their tracks are cut.
 constexpr std::size_t kCoarseViews = 20;
 constexpr std::size_t kAllViews = std::numeric_limits<std::size_t>::max();
-constexpr double kCoarseLoss = 5.0;  ///< the same for the loss of fixes, as a multiple: no fix is without influence yet
+constexpr double kCoarseLoss = 5.0;  ///< the same for the loss of fixes, in sigmas: no fix is without influence yet
 
 using Indices = std::pair<std::uint32_t, std::uint32_t>;
 
 LensCorrection lensSigmaOf(const GeometryConfig& config) {
   LensCorrection sigma;
-  sigma << config.focal_sigma, kAspectSigma, config.principal_point_sigma, config.principal_point_sigma,
-      config.distortion_sigma, config.distortion_sigma;
+  sigma << config.focal_sigma, kAspectSigma, kPrincipalPointSigma, kPrincipalPointSigma, kDistortionSigma,
+      kDistortionSigma;
   return sigma;
 }
 
@@ -83,13 +83,13 @@ class PairMatcher {
  private:
   void verify(const View& a, const View& b, Pair& pair) const {
     std::vector<FeatureMatch> matches;
-    a.kind->correspond(*a.features, *b.features, config_.match_ratio, matches);
+    a.kind->correspond(*a.features, *b.features, PairRule::kMatchRatio, matches);
     const std::uint32_t apart = pair.matches.b - pair.matches.a;
     const double turn_rad =
         apart <= static_cast<std::uint32_t>(config_.pair_span) ? kMaxTurn_rad * apart : kMaxRevisitTurn_rad;
-    pair.view = verifyTwoViews(a.rays->normalised, b.rays->normalised, usable(matches, *a.rays, *b.rays),
-                               config_.epipolar_tolerance_px / std::min(a.focal_px, b.focal_px),
-                               static_cast<std::size_t>(config_.min_pair_inliers), turn_rad);
+    pair.view =
+        verifyTwoViews(a.rays->normalised, b.rays->normalised, usable(matches, *a.rays, *b.rays),
+                       PairRule::kTolerance_px / std::min(a.focal_px, b.focal_px), PairRule::kMinInliers, turn_rad);
     if (pair.view) pair.matches.matches = std::move(pair.view->inliers);
   }
 
@@ -182,12 +182,12 @@ class SessionAdjuster {
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
   void adjust() {
-    reconstruction_.useFixes(Reconstruction::kBelievedFix_m, kCoarseLoss * config_.fix_loss);
+    reconstruction_.useFixes(Reconstruction::kBelievedFix_m, kCoarseLoss);
     reconstruction_.triangulateAll(20.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kRough, 2);
     reconstruction_.resect(20.0, kCoarseViews);
     reconstruction_.bringBack();
-    reconstruction_.useFixes(kAllFixes_m, config_.fix_loss);
+    reconstruction_.useFixes(kAllFixes_m, Reconstruction::kFixLoss);
     reconstruction_.freeLenses(lens_sigma_);
     reconstruction_.triangulateAll(4.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
@@ -224,7 +224,7 @@ class SessionTier {
     if (ties.empty()) return std::nullopt;
     const std::vector<double> apart_m = alignSessions(ties, together_);
     together_.tie(ties);
-    together_.useFixes(kAllFixes_m, config_.fix_loss);
+    together_.useFixes(kAllFixes_m, Reconstruction::kFixLoss);
     together_.triangulateAll(20.0, kCoarseViews);
     together_.adjustAndPrune(kRough, 2);
     together_.triangulateAll(4.0, kCoarseViews);
@@ -374,36 +374,14 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                self_calibration);
   visitor.integer({"geometry/pair_span", "1", "each image is matched with this number of the next ones"}, pair_span, 1,
                   100);
-  visitor.real({"geometry/match_ratio", "1", "largest ratio of the angles to the nearest and second nearest"},
-               match_ratio, 0.1, 1.0);
-  visitor.real({"geometry/epipolar_tolerance", "px", "farthest of a match from both epipolar lines together"},
-               epipolar_tolerance_px, 0.01, 100.0);
-  visitor.integer({"geometry/min_pair_inliers", "1", "two images with fewer verified matches do not count as a pair"},
-                  min_pair_inliers, 6, 10000);
   visitor.real({"geometry/focal_sigma", "1", "how well a calibration knows the focal length, as a share of it"},
                focal_sigma, 1e-6, 1.0);
-  visitor.real({"geometry/principal_point_sigma", "1", "and the principal point, as a share of the focal length"},
-               principal_point_sigma, 1e-6, 1.0);
-  visitor.real({"geometry/distortion_sigma", "1", "and the radial coefficients k1 and k2"}, distortion_sigma, 1e-6,
-               1.0);
-  visitor.real({"geometry/max_residual", "1", "sightings farther from their landmark, in sigmas, are dropped"},
-               max_residual_sigmas, 1.0, 1000.0);
   visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},
                fix_sigma_m, 0.001, 100.0);
-  visitor.real({"geometry/fix_correlation", "1",
-                "fixes err alike for many images: this multiple of their sigma is that of one image's position"},
-               fix_correlation, 1.0, 100.0);
-  visitor.real(
-      {"geometry/fix_loss", "1",
-       "scale of the robust loss of a fix, as a multiple of that sigma: of fixes that cleaning believes Cauchy's, of "
-       "the others Geman and McClure's, by which one that is much farther off has no influence"},
-      fix_loss, 0.01, 1000.0);
   visitor.integer(
       {"geometry/window", "1",
        "images adjusted at a time: more of them, alone or tied, one stretch after the other; limits memory"},
       window, 200, 1000000);
-  visitor.integer({"geometry/min_landmarks", "1", "an image with fewer landmarks has a place only"}, min_landmarks, 4,
-                  10000);
   visitor.real(
       {"geometry/spacing", "m",
        "of a session with landmarks keep, after all images were adjusted, only those at least this far from the "

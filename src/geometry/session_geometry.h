@@ -21,6 +21,16 @@
 
 namespace visual_localization {
 
+/// When two images of a map count as a pair.
+struct PairRule {
+  /// Of the angles to the nearest and second nearest descriptor. Stricter than for a live image: no pose tells yet
+  /// which matches are wrong.
+  static constexpr double kMatchRatio = 0.75;
+  /// Of a match from both epipolar lines together: 0.7 pixels from each, more than two sigmas of a small feature.
+  static constexpr double kTolerance_px = 1.0;
+  static constexpr std::size_t kMinInliers = 15;  ///< as COLMAP asks (min_num_inliers)
+};
+
 /// A fix in the map frame.
 struct MapFix {
   std::int64_t stamp_ns = 0;

@@ -45,8 +45,6 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);
   visitor.flag({"choose_session", "", "in a map of several sessions, compare with the one that matches best lately"},
                choose_session);
-  visitor.real({"max_image_gap", "s", "after a longer pause the image before is not used for pruning"}, max_image_gap_s,
-               0.001, 3600.0);
   visitor.real({"min_position_std", "m", "no position without landmarks claims to be more accurate than this"},
                min_position_std_m, 0.0, 1000.0);
   visitor.real({"min_yaw_std", "rad", "no heading without landmarks claims to be more accurate than this"},
@@ -79,9 +77,8 @@ FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& 
     throw ParameterError("parameter 'features' = '" + config.features + "' is not allowed with this map, whose local " +
                          "features are '" + map.kind->name() + "': must be one of " + joined(allowed));
   }
-  FrontEndConfig front_end{map.image_size,         map.kind,
-                           config.match,           config.prune,
-                           config.max_image_gap_s, {config.sift_backend, config.model}};
+  FrontEndConfig front_end{map.image_size, map.kind, config.match, config.prune};
+  front_end.extractor = {config.sift_backend, config.model};
   if (!map.sessions.empty()) front_end.mask = map.sessions.front().mask;  // until somebody gives another camera's
   return front_end;
 }

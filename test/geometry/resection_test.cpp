@@ -38,7 +38,7 @@ class ResectionTest : public testing::Test {
     for (std::uint32_t a = 0; a < drive_.truth.size(); ++a) {
       for (std::uint32_t b = a + 1; b < drive_.truth.size() && b <= a + 8; ++b) {
         ImagePair pair{a, b, {}};
-        session_.kind->correspond(*drive_.views[a], *drive_.views[b], config_.match_ratio, pair.matches);
+        session_.kind->correspond(*drive_.views[a], *drive_.views[b], PairRule::kMatchRatio, pair.matches);
         sets.join(pair);
       }
     }

@@ -4,13 +4,18 @@
 
 #include <gtest/gtest.h>
 
+#include "geometry/lens_correction.h"
 #include "geometry/rays.h"
+#include "geometry/reconstruction.h"
+#include "geometry/session_geometry.h"
 #include "localization/pose_predictor.h"
 #include "localization/pose_verifier.h"
 #include "parameters/former_parameters.h"
 #include "test/localization/wall_street.h"
 #include "test/support/swarm_config.h"
+#include "visual_localization/features/front_end.h"
 #include "visual_localization/localization/localizer.h"
+#include "visual_localization/map/map_builder.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -115,7 +120,7 @@ TEST(Sweep, AReconfigurationSweepsTheImageAnew) {
   EXPECT_LT(*drawn.rbegin(), map->size());
 }
 
-TEST(FormerParameters, HaveTheValuesThatTheLocalizerUses) {
+TEST(FormerParameters, HaveTheValuesThatAreUsed) {
   const LocalizerConfig config;
   const std::map<std::string, double> in_use{
       {"bayes/comparisons", config.bayes.comparisons},
@@ -126,7 +131,17 @@ TEST(FormerParameters, HaveTheValuesThatTheLocalizerUses) {
       {"dpso/exclusion_radius", config.dpso.exclusion_radius_m},
       {"dpso/mode_radius", config.dpso.mode_radius_m},
       {"dpso/rival_share", config.dpso.rival_share},
+      {"geometry/distortion_sigma", kDistortionSigma},
+      {"geometry/epipolar_tolerance", PairRule::kTolerance_px},
+      {"geometry/fix_correlation", Reconstruction::kFixCorrelation},
+      {"geometry/fix_loss", Reconstruction::kFixLoss},
       {"geometry/keypoint_sigma", kKeypointSigma_px},
+      {"geometry/match_ratio", PairRule::kMatchRatio},
+      {"geometry/max_residual", Reconstruction::kMaxResidual},
+      {"geometry/min_landmarks", Reconstruction::kMinLandmarks},
+      {"geometry/min_pair_inliers", PairRule::kMinInliers},
+      {"geometry/principal_point_sigma", kPrincipalPointSigma},
+      {"max_image_gap", kMaxImageGap_s},
       {"metric/keypoint_sigma", kKeypointSigma_px},
       {"metric/match_ratio", PoseVerifier::kMatchRatio},
       {"metric/max_focal_error", config.metric.max_focal_error},
@@ -157,9 +172,12 @@ TEST(FormerParameters, HaveTheValuesThatTheLocalizerUses) {
 
 TEST(FormerParameters, AreDeclaredNoMore) {
   LocalizerConfig config;
-  const ParameterValues declared =
-      parameters::values([&config](ParameterVisitor& visitor) { config.declare(visitor); });
-  for (const auto& [name, value] : formerParameters()) EXPECT_EQ(declared.count(name), 0U) << name << " = " << value;
+  MapBuilderConfig builder;
+  const auto declared = parameters::values([&config](ParameterVisitor& visitor) { config.declare(visitor); });
+  const auto of_builder = parameters::values([&builder](ParameterVisitor& visitor) { builder.declare(visitor); });
+  for (const auto& [name, value] : formerParameters()) {
+    EXPECT_EQ(declared.count(name) + of_builder.count(name), 0U) << name << " = " << value;
+  }
 }
 
 }  // namespace

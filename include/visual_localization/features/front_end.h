@@ -57,13 +57,15 @@ inline double stretchOf(cv::Size recorded, cv::Size shown) {
   return static_cast<double>(shown.width) / recorded.width * recorded.height / shown.height;
 }
 
+constexpr double kMaxImageGap_s = 10.0;  ///< a longer pause makes the image before useless for pruning
+
 /// How live images are prepared.
 struct FrontEndConfig {
   cv::Size image_size;                           ///< the map's, pixels
   std::shared_ptr<const LocalFeatureKind> kind;  ///< of the map's local features
   MatchConfig match;                             ///< for pruning
   bool prune = true;                             ///< keep only features that the image before showed as well
-  double max_image_gap_s = 10.0;                 ///< longer pauses make the image before useless for pruning
+  double max_image_gap_s = kMaxImageGap_s;
   ExtractorChoice extractor = {};
   Mask mask = {};  ///< of image_size, or empty: features under it are not used
 };

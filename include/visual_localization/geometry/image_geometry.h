@@ -17,18 +17,9 @@ struct GeometryConfig {
   bool enabled = true;
   bool self_calibration = false;
   int pair_span = 8;
-  double match_ratio = 0.75;
-  double epipolar_tolerance_px = 1.0;
-  int min_pair_inliers = 15;
   double focal_sigma = 0.03;
-  double principal_point_sigma = 0.01;
-  double distortion_sigma = 0.05;
-  double max_residual_sigmas = 5.0;
   double fix_sigma_m = 0.3;
-  double fix_correlation = 3.3;
-  double fix_loss = 1.0;
   int window = 2000;
-  int min_landmarks = 12;
   double spacing_m = 2.0;
 
   void declare(ParameterVisitor& visitor);

@@ -29,7 +29,6 @@ struct LocalizerConfig : TrackerConfig {
   int seed = 1;
   bool prune = false;
   bool choose_session = true;
-  double max_image_gap_s = 10.0;
   double min_position_std_m = 0.5;
   double min_yaw_std_rad = 0.1;
   int sweep_images = 20000;
