@@ -120,8 +120,8 @@ void printGeometry(const SessionImages& session, const GeometryConfig& config) {
     return;
   }
   std::cout << session.name << ": " << geometry.located << " of " << session.kept
-            << " images with landmarks: " << geometry.landmarks << " landmarks, " << geometry.sightings
-            << " sightings, median error " << std::setprecision(2) << geometry.median_error_px
+            << " images with landmarks: " << geometry.landmarks << " landmarks, " << geometry.observations
+            << " observations, median error " << std::setprecision(2) << geometry.median_error_px
             << " px; images moved the cleaned path by " << geometry.mean_shift_m << " m on average, "
             << geometry.largest_shift_m << " m at most; focal length by the images " << 100.0 * geometry.focal_scale
             << " %" << plusMinus(100.0 * geometry.focal_sigma) << " of the calibration's; delay of fixes "

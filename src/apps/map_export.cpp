@@ -375,12 +375,13 @@ void ColmapModel::addFeatures(std::size_t i, const LocalFeatures& sift, const Im
     const bool seen = landmark != geometry.landmarks.end() && landmark->feature == f;
     out << (f == 0 ? "" : " ") << at.x_px + kColmapPixel << ' ' << at.y_px + kColmapPixel << ' '
         << (seen ? std::to_string(landmark->id) : "-1");
-    if (seen) addSighting(i, at, geometry.camera, *landmark++);
+    if (seen) addObservation(i, at, geometry.camera, *landmark++);
   }
   out << '\n';
 }
 
-void ColmapModel::addSighting(std::size_t i, const Keypoint& at, const CameraPose& pose, const SeenLandmark& landmark) {
+void ColmapModel::addObservation(std::size_t i, const Keypoint& at, const CameraPose& pose,
+                                 const SeenLandmark& landmark) {
   Point& point = points_[landmark.id];
   if (point.track.empty()) point.position_m = pose.position_m + landmark.offset_m.cast<double>();
   const CameraModel& camera = *map_.header().sessions[static_cast<std::size_t>(map_.pose(i).session)].camera;

@@ -42,12 +42,12 @@ class ColmapModel {
   /// A landmark and what the images that show it say.
   struct Point {
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-    std::vector<double> errors_px;  ///< of the sightings that the lens model can project
-    std::string track;              ///< for each sighting the image and its feature
+    std::vector<double> errors_px;  ///< of the observations that the lens model can project
+    std::string track;              ///< for each observation the image and its feature
   };
 
   void addFeatures(std::size_t i, const LocalFeatures& sift, const ImageGeometry& geometry, std::ostream& out);
-  void addSighting(std::size_t i, const Keypoint& at, const CameraPose& pose, const SeenLandmark& landmark);
+  void addObservation(std::size_t i, const Keypoint& at, const CameraPose& pose, const SeenLandmark& landmark);
 
   const TrainingMap& map_;
   std::vector<std::string> folders_;

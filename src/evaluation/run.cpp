@@ -182,9 +182,9 @@ struct Verdict {
 };
 
 /// A method under test in one run.
-class Contestant {
+class TestedMethod {
  public:
-  virtual ~Contestant() = default;
+  virtual ~TestedMethod() = default;
   virtual Verdict process(std::int64_t stamp_ns) = 0;
   /// Mean distance between two particles, metres; 0 without particles. Not cheap.
   virtual double diversity_m() const { return 0.0; }
@@ -196,11 +196,11 @@ LocalizerConfig seeded(LocalizerConfig config, std::uint32_t seed) {
 }
 
 /// A tracker, run by the localizer that runs on the robot.
-class TrackerContestant final : public Contestant {
+class TestedTracker final : public TestedMethod {
  public:
   /// `camera`: of the drive; none: that of the map.
-  TrackerContestant(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config,
-                    std::shared_ptr<RecordedImage> image, const std::optional<CameraModel>& camera)
+  TestedTracker(std::shared_ptr<const TrainingMap> map, const LocalizerConfig& config,
+                std::shared_ptr<RecordedImage> image, const std::optional<CameraModel>& camera)
       : similarity_(config.similarity), match_(config.match), localizer_(std::move(map), config, std::move(image)) {
     if (camera) localizer_.setCamera(*camera);
   }
@@ -240,10 +240,10 @@ class TrackerContestant final : public Contestant {
   double confidence_ = 0.0;
 };
 
-class RecogniserContestant final : public Contestant {
+class TestedRecogniser final : public TestedMethod {
  public:
-  RecogniserContestant(std::shared_ptr<const TrainingMap> map, const MethodSpec& method, bool closed,
-                       std::shared_ptr<RecordedImage> image)
+  TestedRecogniser(std::shared_ptr<const TrainingMap> map, const MethodSpec& method, bool closed,
+                   std::shared_ptr<RecordedImage> image)
       : map_(std::move(map)),
         image_(std::move(image)),
         features_(method.localizer.features == "global" ? FeatureKind::kGlobal : FeatureKind::kLocal),
@@ -350,13 +350,13 @@ std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
   return (static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start)) & kLargest;
 }
 
-std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::uint32_t seed, const RunContext& context,
-                                           std::shared_ptr<RecordedImage> image) {
+std::unique_ptr<TestedMethod> makeTestedMethod(const MethodSpec& method, std::uint32_t seed, const RunContext& context,
+                                               std::shared_ptr<RecordedImage> image) {
   if (!method.isTracker()) {
-    return std::make_unique<RecogniserContestant>(context.map.map, method, context.closed, std::move(image));
+    return std::make_unique<TestedRecogniser>(context.map.map, method, context.closed, std::move(image));
   }
-  return std::make_unique<TrackerContestant>(context.map.map, seeded(method.localizer, seed), std::move(image),
-                                             context.drive.camera);
+  return std::make_unique<TestedTracker>(context.map.map, seeded(method.localizer, seed), std::move(image),
+                                         context.drive.camera);
 }
 
 }  // namespace
@@ -364,7 +364,7 @@ std::unique_ptr<Contestant> makeContestant(const MethodSpec& method, std::uint32
 RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace) {
   const auto image = std::make_shared<RecordedImage>(context.table, context.map.images, method.localizer.match,
                                                      method.localizer.similarity);
-  const auto contestant = makeContestant(method, seedOf(method, start), context, image);
+  const auto tested = makeTestedMethod(method, seedOf(method, start), context, image);
   const std::vector<std::size_t> order = imageOrder(
       context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped, context.longest});
   RunRecord record;
@@ -378,7 +378,7 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
     const DriveImage& shown = context.drive.images[order[i]];
     image->show(order[i], i >= covered_from && i < covered_until, shown.unpruned ? &*shown.unpruned : nullptr);
     const CpuStopwatch stopwatch;
-    const Verdict verdict = contestant->process(shown.stamp_ns);
+    const Verdict verdict = tested->process(shown.stamp_ns);
     record.method_ms += stopwatch.elapsed_ms();
     counter.add(*image, record);
     const TrainingMap& map = *context.map.map;
@@ -386,7 +386,7 @@ RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t s
     judge(shown, map, context.accuracy, context.map_errors.empty() ? std::nullopt : context.map_errors[order[i]],
           verdict, filter, record.steps.back());
     if (trace && verdict.estimate) {
-      record.trace.push_back(traced(order[i], shown, map, contestant->diversity_m(), *verdict.estimate));
+      record.trace.push_back(traced(order[i], shown, map, tested->diversity_m(), *verdict.estimate));
     }
   }
   const std::size_t half = method.kidnapped ? order.size() / 2 : order.size();

@@ -33,7 +33,7 @@ class Adjustment {
       : problem_(problem),
         config_(config),
         window_(window),
-        sighting_loss_(config.landmark_loss),
+        observation_loss_(config.landmark_loss),
         tilt_loss_(kTiltLoss),
         position_loss_(config.position_loss),
         doubtful_position_loss_(config.position_loss),
@@ -45,7 +45,7 @@ class Adjustment {
       starts_.push_back(camera.rotation.toRotationMatrix());
       cameras_.push_back({0.0, 0.0, 0.0, position.x(), position.y(), position.z()});
     }
-    addSightings();
+    addObservations();
     addPositions();
     addHeights();
     addPriors();
@@ -133,22 +133,23 @@ class Adjustment {
   bool isSeen(const Landmark& landmark) const {
     std::size_t known = 0;
     bool moves = false;
-    for (const LandmarkSighting& sighting : landmark.sightings) {
-      known += window_.knows(sighting.image) ? 1 : 0;
-      moves = moves || window_.moves(sighting.image);
+    for (const LandmarkObservation& observation : landmark.observations) {
+      known += window_.knows(observation.image) ? 1 : 0;
+      moves = moves || window_.moves(observation.image);
     }
     return moves && known >= 2;
   }
 
-  void addSightings() {
+  void addObservations() {
     for (Landmark& landmark : problem_.landmarks) {
       if (!isSeen(landmark)) continue;
       landmarks_.push_back(landmark.position_m.data());
-      for (const LandmarkSighting& sighting : landmark.sightings) {
-        if (!window_.knows(sighting.image)) continue;
-        BundleLens& lens = problem_.lenses[problem_.sessions[sessions_[sighting.image]].lens];
-        ceres_.AddResidualBlock(new SightingCost(starts_[sighting.image], sighting, lens.published), &sighting_loss_,
-                                cameras_[sighting.image].data(), landmark.position_m.data(), lens.correction.data());
+      for (const LandmarkObservation& observation : landmark.observations) {
+        if (!window_.knows(observation.image)) continue;
+        BundleLens& lens = problem_.lenses[problem_.sessions[sessions_[observation.image]].lens];
+        ceres_.AddResidualBlock(new ReprojectionCost(starts_[observation.image], observation, lens.published),
+                                &observation_loss_, cameras_[observation.image].data(), landmark.position_m.data(),
+                                lens.correction.data());
       }
     }
     const bool are_free = !config_.lens_sigma.isZero(0.0);
@@ -287,14 +288,14 @@ class Adjustment {
   BundleProblem& problem_;
   const BundleConfig& config_;
   const BundleWindow& window_;
-  ceres::CauchyLoss sighting_loss_;
+  ceres::CauchyLoss observation_loss_;
   ceres::CauchyLoss tilt_loss_;
   ceres::CauchyLoss position_loss_;
   GemanMcClureLoss doubtful_position_loss_;
   ceres::CauchyLoss altitude_loss_;
   std::vector<std::size_t> sessions_;  ///< of the cameras
   std::vector<Eigen::Matrix3d> starts_;
-  std::vector<std::array<double, 6>> cameras_;  ///< as in SightingCost
+  std::vector<std::array<double, 6>> cameras_;  ///< as in ReprojectionCost
   std::vector<double*> landmarks_;              ///< those that are seen
   ceres::Problem ceres_;
 };

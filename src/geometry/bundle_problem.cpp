@@ -23,22 +23,23 @@ LensProjection BundleProblem::lensOf(std::size_t camera) const {
   return {lens.published, lens.correction};
 }
 
-double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark, const LandmarkSighting& sighting) {
-  const Eigen::Vector3d point = problem.cameras[sighting.image].toCamera(landmark.position_m);
+double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark,
+                            const LandmarkObservation& observation) {
+  const Eigen::Vector3d point = problem.cameras[observation.image].toCamera(landmark.position_m);
   if (!(point.z() >= kNearest_m)) return std::numeric_limits<double>::infinity();
-  return (problem.lensOf(sighting.image).project(point.hnormalized()) - sighting.pixel).norm();
+  return (problem.lensOf(observation.image).project(point.hnormalized()) - observation.pixel).norm();
 }
 
 Eigen::Matrix3d covarianceOf(const Landmark& landmark, const BundleProblem& problem) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  for (const LandmarkSighting& sighting : landmark.sightings) {
-    const CameraPose& camera = problem.cameras[sighting.image];
+  for (const LandmarkObservation& observation : landmark.observations) {
+    const CameraPose& camera = problem.cameras[observation.image];
     const Eigen::Vector3d point = camera.toCamera(landmark.position_m);
     Eigen::Matrix<double, 2, 3> ray_by_point;
     ray_by_point << 1.0, 0.0, -point.x() / point.z(), 0.0, 1.0, -point.y() / point.z();
-    ray_by_point *= 1.0 / (point.z() * sighting.sigma_px);
+    ray_by_point *= 1.0 / (point.z() * observation.sigma_px);
     Eigen::Matrix2d by_ray;
-    problem.lensOf(sighting.image).project(point.hnormalized(), &by_ray);
+    problem.lensOf(observation.image).project(point.hnormalized(), &by_ray);
     const Eigen::Matrix<double, 2, 3> by_landmark =
         by_ray * ray_by_point * camera.rotation.conjugate().toRotationMatrix();
     information += by_landmark.transpose() * by_landmark;
@@ -46,8 +47,8 @@ Eigen::Matrix3d covarianceOf(const Landmark& landmark, const BundleProblem& prob
   return information.ldlt().solve(Eigen::Matrix3d::Identity());
 }
 
-void addSighting(const Landmark& landmark, const Eigen::Matrix3d& covariance, std::uint32_t feature, std::uint32_t id,
-                 ImageGeometry& image) {
+void addObservation(const Landmark& landmark, const Eigen::Matrix3d& covariance, std::uint32_t feature,
+                    std::uint32_t id, ImageGeometry& image) {
   const Eigen::Vector3d offset = landmark.position_m - image.camera.position_m;
   const Eigen::Vector3d ray = offset.normalized();
   const double along_m2 = ray.dot(covariance * ray);

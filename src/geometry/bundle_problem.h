@@ -16,7 +16,7 @@ namespace visual_localization {
 constexpr double kNearest_m = 0.05;  ///< a landmark closer to a camera's plane than this has no projection
 
 /// Where an image shows a landmark.
-struct LandmarkSighting {
+struct LandmarkObservation {
   std::uint32_t image = 0;
   std::uint32_t feature = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< as recorded, by the lens of the image's session
@@ -26,7 +26,7 @@ struct LandmarkSighting {
 /// A point of the world and the images that show it.
 struct Landmark {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< map frame
-  std::vector<LandmarkSighting> sightings;
+  std::vector<LandmarkObservation> observations;
 };
 
 /// What a satellite receiver says about where its antenna was when an image was taken.
@@ -87,12 +87,13 @@ struct BundleProblem {
 };
 
 /// Distance of where a landmark is seen from where it projects to, pixels; infinite behind the camera.
-double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark, const LandmarkSighting& sighting);
+double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark,
+                            const LandmarkObservation& observation);
 
 /// Of a landmark's position (m2, map frame) among cameras that stand still.
 Eigen::Matrix3d covarianceOf(const Landmark& landmark, const BundleProblem& problem);
 /// Appends the landmark to an image that shows it; not one whose covariance is none.
-void addSighting(const Landmark& landmark, const Eigen::Matrix3d& covariance, std::uint32_t feature, std::uint32_t id,
-                 ImageGeometry& image);
+void addObservation(const Landmark& landmark, const Eigen::Matrix3d& covariance, std::uint32_t feature,
+                    std::uint32_t id, ImageGeometry& image);
 
 }  // namespace visual_localization

@@ -127,13 +127,14 @@ constexpr double kAltitudeLoss = 2.0;  ///< likewise
 
 /// Camera parameters: turn[3] (camera_in_map = start * exp(turn)) and position[3]. Landmark: position[3]. Lens:
 /// LensCorrection[6].
-class SightingCost final : public ceres::SizedCostFunction<2, 6, 3, 6> {
+class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3, 6> {
  public:
   /// `published` must live longer.
-  SightingCost(const Eigen::Matrix3d& map_from_start, const LandmarkSighting& sighting, const Intrinsics& published)
+  ReprojectionCost(const Eigen::Matrix3d& map_from_start, const LandmarkObservation& observation,
+                   const Intrinsics& published)
       : start_from_map_(map_from_start.transpose()),
-        pixel_(sighting.pixel),
-        weight_(1.0 / sighting.sigma_px),
+        pixel_(observation.pixel),
+        weight_(1.0 / observation.sigma_px),
         published_(published) {}
 
   bool Evaluate(const double* const* parameters, double* residuals, double** derivatives) const override {

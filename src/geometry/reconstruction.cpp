@@ -82,7 +82,7 @@ void Reconstruction::append(const Reconstruction& other) {
     problem_.sessions.push_back(added);
   }
   for (Landmark landmark : other.problem_.landmarks) {
-    for (LandmarkSighting& sighting : landmark.sightings) sighting.image += begin;
+    for (LandmarkObservation& observation : landmark.observations) observation.image += begin;
     problem_.landmarks.push_back(std::move(landmark));
   }
   const auto add = [](const auto& from, auto& to) { to.insert(to.end(), from.begin(), from.end()); };
@@ -116,7 +116,7 @@ void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d
   const std::size_t begin = problem_.sessions[session].begin;
   for (std::size_t i = 0; i < shifts_m.size(); ++i) problem_.cameras[begin + i].position_m += shifts_m[i];
   for (Landmark& landmark : problem_.landmarks) {
-    const std::uint32_t first = landmark.sightings.front().image;
+    const std::uint32_t first = landmark.observations.front().image;
     if (images_[first].session == session) landmark.position_m += shifts_m[first - begin];
   }
 }
@@ -159,20 +159,20 @@ void Reconstruction::triangulateWithout(const std::vector<bool>& left_out, doubl
 
 void Reconstruction::addLandmark(const FeatureTrack& track, double gate_px) {
   Landmark landmark;
-  landmark.sightings.reserve(track.size());
+  landmark.observations.reserve(track.size());
   std::vector<Sight> sights;
   for (const FeatureObservation& seen : track) {
     const KeypointRays& rays = images_[seen.image].rays;
     sights.push_back({&problem_.cameras[seen.image], rays.normalised[seen.feature]});
-    landmark.sightings.push_back({seen.image, seen.feature, rays.pixels[seen.feature].cast<double>(),
-                                  static_cast<double>(rays.sigmas_px[seen.feature])});
+    landmark.observations.push_back({seen.image, seen.feature, rays.pixels[seen.feature].cast<double>(),
+                                     static_cast<double>(rays.sigmas_px[seen.feature])});
   }
   const std::optional<Eigen::Vector3d> point = triangulate(sights, kMinAngle_rad);
   if (!point) return;
   landmark.position_m = *point;
-  auto& all = landmark.sightings;
-  const auto is_off = [&](const LandmarkSighting& sighting) {
-    return !(reprojectionError_px(problem_, landmark, sighting) <= gate_px);
+  auto& all = landmark.observations;
+  const auto is_off = [&](const LandmarkObservation& observation) {
+    return !(reprojectionError_px(problem_, landmark, observation) <= gate_px);
   };
   all.erase(std::remove_if(all.begin(), all.end(), is_off), all.end());
   if (all.size() >= 2) problem_.landmarks.push_back(std::move(landmark));
@@ -207,15 +207,15 @@ void Reconstruction::adjustAndPrune(double tolerance, std::size_t min_views) {
   adjustWindows();
   if (!bundle_.lens_sigma.isZero(0.0)) applyLenses(0);
   for (Landmark& landmark : problem_.landmarks) {
-    auto& all = landmark.sightings;
-    const auto disagrees = [&](const LandmarkSighting& sighting) {
-      return !(reprojectionError_px(problem_, landmark, sighting) <= kMaxResidual * sighting.sigma_px);
+    auto& all = landmark.observations;
+    const auto disagrees = [&](const LandmarkObservation& observation) {
+      return !(reprojectionError_px(problem_, landmark, observation) <= kMaxResidual * observation.sigma_px);
     };
     all.erase(std::remove_if(all.begin(), all.end(), disagrees), all.end());
   }
   auto& all = problem_.landmarks;
   const auto lost = [&](const Landmark& landmark) {
-    return landmark.sightings.size() < min_views || !(distance_m(landmark) <= kFarthest_m);
+    return landmark.observations.size() < min_views || !(distance_m(landmark) <= kFarthest_m);
   };
   all.erase(std::remove_if(all.begin(), all.end(), lost), all.end());
 }
@@ -226,8 +226,9 @@ BundleProblem Reconstruction::problemOf(const BundleWindow& window) const {
                         problem_.lenses};
   std::copy_if(problem_.landmarks.begin(), problem_.landmarks.end(), std::back_inserter(problem.landmarks),
                [&window](const Landmark& landmark) {
-                 return std::any_of(landmark.sightings.begin(), landmark.sightings.end(),
-                                    [&](const LandmarkSighting& sighting) { return window.moves(sighting.image); });
+                 return std::any_of(
+                     landmark.observations.begin(), landmark.observations.end(),
+                     [&](const LandmarkObservation& observation) { return window.moves(observation.image); });
                });
   return problem;
 }
@@ -289,7 +290,7 @@ void Reconstruction::applyLenses(std::size_t first_session) {
 }
 
 double Reconstruction::distance_m(const Landmark& landmark) const {
-  return (landmark.position_m - problem_.cameras[landmark.sightings.front().image].position_m).norm();
+  return (landmark.position_m - problem_.cameras[landmark.observations.front().image].position_m).norm();
 }
 
 }  // namespace visual_localization

@@ -103,11 +103,11 @@ class Reconstruction {
   /// Fixes count from now on: all of them, or those that are at most `farthest_m` from the cleaned path. `loss`: scale
   /// of their robust loss, sigmas.
   void useFixes(double farthest_m, double loss);
-  /// Landmarks from tracks, anew; of tracks cut into pieces of at most `max_views`. Sightings farther than `gate_px`
+  /// Landmarks from tracks, anew; of tracks cut into pieces of at most `max_views`. Observations farther than `gate_px`
   /// from their landmark are left out.
   void triangulateAll(double gate_px, std::size_t max_views);
-  /// Adjusts everything, window by window, then drops sightings that disagree and landmarks that fewer than `min_views`
-  /// images see.
+  /// Adjusts everything, window by window, then drops observations that disagree and landmarks that fewer than
+  /// `min_views` images see.
   void adjustAndPrune(double tolerance, std::size_t min_views);
   /// See the function of that name.
   void moveAsOne();
@@ -115,7 +115,7 @@ class Reconstruction {
   /// there: fixes that are metres off let no landmark begin beside them. `gate_px`, `max_views`: see triangulateAll().
   void resect(double gate_px, std::size_t max_views);
   /// A single image may end in a minimum of its own, metres off. It starts again among its neighbours.
-  void bringBack();
+  void restartAmongNeighbours();
   /// From now on the calibrations are adjusted as well. `sigma`: what is known of each entry before.
   void freeLenses(const LensCorrection& sigma) { bundle_.lens_sigma = sigma; }
   /// What the images do not tell apart from nothing stays as it was published from now on: entries of the lenses (the

@@ -42,10 +42,10 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   }
   for (const Landmark& landmark : problem_.landmarks) {
     const Eigen::Matrix3d covariance = covarianceOf(landmark, problem_);
-    ++geometries[sessionOf(landmark.sightings.front().image)].landmarks;
-    for (const LandmarkSighting& sighting : landmark.sightings) {
-      errors_px[sessionOf(sighting.image)].push_back(reprojectionError_px(problem_, landmark, sighting));
-      addSighting(landmark, covariance, sighting.feature, first_id, images[sighting.image]);
+    ++geometries[sessionOf(landmark.observations.front().image)].landmarks;
+    for (const LandmarkObservation& observation : landmark.observations) {
+      errors_px[sessionOf(observation.image)].push_back(reprojectionError_px(problem_, landmark, observation));
+      addObservation(landmark, covariance, observation.feature, first_id, images[observation.image]);
     }
     ++first_id;
   }
@@ -55,9 +55,9 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   addPath(std::move(images), geometries);
   for (std::size_t k = 0; k < geometries.size(); ++k) {
     SessionGeometry& geometry = geometries[k];
-    geometry.sightings = errors_px[k].size();
+    geometry.observations = errors_px[k].size();
     if (tracked[k] >= kEnoughTracked * geometry.images.size()) {
-      geometry.agreeing_share = static_cast<double>(geometry.sightings) / static_cast<double>(tracked[k]);
+      geometry.agreeing_share = static_cast<double>(geometry.observations) / static_cast<double>(tracked[k]);
     }
     geometry.median_error_px = median(errors_px[k]);
     const BundleSession& session = problem_.sessions[k];
@@ -82,15 +82,15 @@ std::vector<Reconstruction::TiedSessions> Reconstruction::tiedSessions() const {
   for (std::size_t i = 0; i < images_.size(); ++i) tied[i][sessionOf(i)] = away_m[i];
   for (const Landmark& landmark : problem_.landmarks) {
     TiedSessions sessions;
-    for (const LandmarkSighting& sighting : landmark.sightings) {
-      const auto added = sessions.emplace(sessionOf(sighting.image), away_m[sighting.image]).first;
-      added->second = std::min(added->second, away_m[sighting.image]);
+    for (const LandmarkObservation& observation : landmark.observations) {
+      const auto added = sessions.emplace(sessionOf(observation.image), away_m[observation.image]).first;
+      added->second = std::min(added->second, away_m[observation.image]);
     }
     if (sessions.size() == 1) continue;
-    for (const LandmarkSighting& sighting : landmark.sightings) {
+    for (const LandmarkObservation& observation : landmark.observations) {
       for (const auto& [session, distance_m] : sessions) {
-        const auto added = tied[sighting.image].emplace(session, distance_m).first;
-        if (session != sessionOf(sighting.image)) added->second = std::min(added->second, distance_m);
+        const auto added = tied[observation.image].emplace(session, distance_m).first;
+        if (session != sessionOf(observation.image)) added->second = std::min(added->second, distance_m);
       }
     }
   }

@@ -75,14 +75,14 @@ std::vector<std::optional<double>> Reconstruction::explainedShares() const {
   for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
     for (const FeatureObservation& seen : track) ++tracked[seen.image];
   }
-  std::vector<std::size_t> sightings(images_.size());
+  std::vector<std::size_t> observations(images_.size());
   for (const Landmark& landmark : problem_.landmarks) {
-    for (const LandmarkSighting& sighting : landmark.sightings) ++sightings[sighting.image];
+    for (const LandmarkObservation& observation : landmark.observations) ++observations[observation.image];
   }
   std::vector<std::optional<double>> shares(images_.size());
   for (std::size_t i = 0; i < shares.size(); ++i) {
     if (tracked[i] < kEnoughTracked) continue;
-    shares[i] = static_cast<double>(sightings[i]) / static_cast<double>(tracked[i]);
+    shares[i] = static_cast<double>(observations[i]) / static_cast<double>(tracked[i]);
   }
   return shares;
 }
@@ -127,7 +127,7 @@ void Reconstruction::resect(double gate_px, std::size_t max_views) {
   }
 }
 
-void Reconstruction::bringBack() {
+void Reconstruction::restartAmongNeighbours() {
   std::vector<std::pair<std::size_t, CameraPose>> back;
   const std::vector<std::optional<double>> explained = explainedShares();
   for (std::size_t i = 0; i < images_.size(); ++i) {

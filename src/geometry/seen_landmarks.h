@@ -15,8 +15,8 @@ class SeenLandmarks {
   /// Points into `landmarks`, which may move.
   explicit SeenLandmarks(const std::vector<Landmark>& landmarks) {
     for (const Landmark& landmark : landmarks) {
-      for (const LandmarkSighting& sighting : landmark.sightings) {
-        landmarks_[key({sighting.image, sighting.feature})] = &landmark;
+      for (const LandmarkObservation& observation : landmark.observations) {
+        landmarks_[key({observation.image, observation.feature})] = &landmark;
       }
     }
   }

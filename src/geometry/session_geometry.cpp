@@ -22,8 +22,8 @@ constexpr std::uint32_t kRotationSpan = 3;  ///< images farther apart say little
 constexpr double kContradiction = 3.0;      ///< sigmas of a calibration, beyond which it is none of this camera
 constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 /// Relative changes of the cost at which adjustments end. The whole path turns and shifts along a flat valley of the
-/// cost: thousands of sightings hardly feel it. One that ends early leaves it metres off where the camera looks aside
-/// or the road climbs, so only those may that another one follows.
+/// cost: thousands of observations hardly feel it. One that ends early leaves it metres off where the camera looks
+/// aside or the road climbs, so only those may that another one follows.
 constexpr double kRough = 1e-3;
 constexpr double kCoarse = 1e-4;
 constexpr double kFine = 1e-6;
@@ -186,13 +186,13 @@ class SessionAdjuster {
     reconstruction_.triangulateAll(20.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kRough, 2);
     reconstruction_.resect(20.0, kCoarseViews);
-    reconstruction_.bringBack();
+    reconstruction_.restartAmongNeighbours();
     reconstruction_.useFixes(kAllFixes_m, Reconstruction::kFixLoss);
     reconstruction_.freeLenses(lens_sigma_);
     reconstruction_.triangulateAll(4.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kCoarse, 2);
     reconstruction_.resect(4.0, kCoarseViews);
-    reconstruction_.bringBack();
+    reconstruction_.restartAmongNeighbours();
     reconstruction_.moveAsOne();
     reconstruction_.triangulateAll(4.0, kAllViews);
     reconstruction_.adjustAndPrune(kRough, 2);

@@ -36,7 +36,7 @@ void adjustStreet(benchmark::State& state) {
                                                 : Eigen::Vector2d(session.images[i].position_m));
   }
   state.counters["located"] = static_cast<double>(geometry.located);
-  state.counters["sightings"] = static_cast<double>(geometry.sightings);
+  state.counters["observations"] = static_cast<double>(geometry.observations);
   state.counters["error_m"] = test::pathError_m(positions_m, drive.truth);
   state.counters["MiB"] = peakMemory_MiB() - before_MiB;
   state.counters["per_image"] = benchmark::Counter(

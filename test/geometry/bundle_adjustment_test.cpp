@@ -17,7 +17,7 @@ using test::DrivenPose;
 
 constexpr double kSigma = test::kKeypointSigma_px / 450.0;
 
-/// The truth, with sightings to `noise` (one sigma, normalised) and a position of sigma 1 m for each image.
+/// The truth, with observations to `noise` (one sigma, normalised) and a position of sigma 1 m for each image.
 BundleProblem truthOf(const std::vector<DrivenPose>& poses, double noise, std::mt19937& random) {
   BundleProblem problem;
   problem.sessions.emplace_back();
@@ -34,11 +34,11 @@ BundleProblem truthOf(const std::vector<DrivenPose>& poses, double noise, std::m
       landmark.position_m = world[view.points[k]].position_m;
       const double off = noise * error(random);
       const Eigen::Vector2d exact = poses[i].camera.toCamera(landmark.position_m).hnormalized();
-      landmark.sightings.push_back({i, k, exact + Eigen::Vector2d(off, noise * error(random)), kSigma});
+      landmark.observations.push_back({i, k, exact + Eigen::Vector2d(off, noise * error(random)), kSigma});
     }
   }
   std::copy_if(landmarks.begin(), landmarks.end(), std::back_inserter(problem.landmarks),
-               [](const Landmark& landmark) { return landmark.sightings.size() >= 3; });
+               [](const Landmark& landmark) { return landmark.observations.size() >= 3; });
   return problem;
 }
 
@@ -173,7 +173,7 @@ TEST(BundleAdjustment, GivesLandmarksBehindACameraNoSay) {
   BundleProblem problem = truthOf(poses, 0.0, random);
   Landmark behind;
   behind.position_m = poses[7].camera.position_m - 5.0 * poses[7].camera.ahead();
-  for (std::uint32_t i = 7; i < 10; ++i) behind.sightings.push_back({i, 0, Eigen::Vector2d(0.1, 0.1), kSigma});
+  for (std::uint32_t i = 7; i < 10; ++i) behind.observations.push_back({i, 0, Eigen::Vector2d(0.1, 0.1), kSigma});
   problem.landmarks.push_back(behind);
   adjust(problem, {});
   EXPECT_LT(pathError_m(problem, poses), 1e-3);
@@ -206,9 +206,10 @@ TEST(BundleAdjustment, MovesOnlyItsWindow) {
     }
   }
   for (std::size_t i = 0; i < truth.landmarks.size(); ++i) {
-    const auto& sightings = truth.landmarks[i].sightings;
-    const bool seen = std::any_of(sightings.begin(), sightings.end(),
-                                  [&](const LandmarkSighting& sighting) { return window.moves(sighting.image); });
+    const auto& observations = truth.landmarks[i].observations;
+    const bool seen =
+        std::any_of(observations.begin(), observations.end(),
+                    [&](const LandmarkObservation& observation) { return window.moves(observation.image); });
     if (seen) continue;
     EXPECT_EQ(problem.landmarks[i].position_m, before.landmarks[i].position_m) << i;
   }
@@ -229,9 +230,10 @@ TEST(ReprojectionError, IsTheDistanceFromTheProjection) {
   problem.sessions.emplace_back();
   problem.lenses = {{{{640, 480}, 100.0, 100.0, 320.0, 240.0, Distortion::kPlumbBob, {}}, LensCorrection::Zero()}};
   problem.cameras.push_back({levelCamera(0.0), {1.0, 2.0, 3.0}});
-  const LandmarkSighting sighting{0, 0, {323.0, 244.0}, 1.0};
-  EXPECT_NEAR(reprojectionError_px(problem, {{6.0, 2.0, 3.0}, {}}, sighting), 5.0, 1e-9) << "straight ahead";
-  EXPECT_EQ(reprojectionError_px(problem, {{-4.0, 2.0, 3.0}, {}}, sighting), std::numeric_limits<double>::infinity());
+  const LandmarkObservation observation{0, 0, {323.0, 244.0}, 1.0};
+  EXPECT_NEAR(reprojectionError_px(problem, {{6.0, 2.0, 3.0}, {}}, observation), 5.0, 1e-9) << "straight ahead";
+  EXPECT_EQ(reprojectionError_px(problem, {{-4.0, 2.0, 3.0}, {}}, observation),
+            std::numeric_limits<double>::infinity());
 }
 
 }  // namespace

@@ -176,17 +176,17 @@ TEST(SessionGeometry, CallsALandmarkTheSameInAllImages) {
   const RecordedDrive drive = recorded({}, 6);
   const SessionGeometry geometry = adjustSessions({drive.unadjusted()}, {}, 1).front();
   std::map<std::uint32_t, Eigen::Vector3d> positions_m;
-  std::size_t sightings = 0;
+  std::size_t observations = 0;
   for (const auto& image : geometry.images) {
     ASSERT_TRUE(image);
-    sightings += image->landmarks.size();
+    observations += image->landmarks.size();
     for (const SeenLandmark& landmark : image->landmarks) {
       const Eigen::Vector3d position_m = image->camera.position_m + landmark.offset_m.cast<double>();
       const auto [known, is_new] = positions_m.emplace(landmark.id, position_m);
       EXPECT_LT((known->second - position_m).norm(), 1e-4) << landmark.id;
     }
   }
-  EXPECT_EQ(sightings, geometry.sightings);
+  EXPECT_EQ(observations, geometry.observations);
   ASSERT_EQ(positions_m.size(), geometry.landmarks);
   EXPECT_EQ(positions_m.begin()->first, 0U);
   EXPECT_EQ(positions_m.rbegin()->first, geometry.landmarks - 1);
@@ -209,7 +209,7 @@ TEST(SessionGeometry, DoesNotDependOnTheNumberOfThreads) {
   const SessionGeometry one = adjustSessions({drive.unadjusted()}, {}, 1).front();
   const SessionGeometry two = adjustSessions({drive.unadjusted()}, {}, 2).front();
   EXPECT_EQ(one.landmarks, two.landmarks);
-  EXPECT_EQ(one.sightings, two.sightings);
+  EXPECT_EQ(one.observations, two.observations);
   for (std::size_t i = 0; i < one.images.size(); ++i) {
     EXPECT_EQ(one.images[i]->camera.position_m, two.images[i]->camera.position_m) << i;
     EXPECT_EQ(one.images[i]->camera.rotation.coeffs(), two.images[i]->camera.rotation.coeffs()) << i;

@@ -54,8 +54,8 @@ TEST(SessionWindows, JoinWithoutASeam) {
   ASSERT_EQ(imagesIn(parts), drive.truth.size());
   EXPECT_LT(pathError_m(parts, drive.truth), kPathError_m);
   EXPECT_LT(largestStepError_m(parts, drive.truth), 1.5 * largestStepError_m(whole, drive.truth));
-  EXPECT_NEAR(static_cast<double>(parts.sightings), static_cast<double>(whole.sightings),
-              0.01 * static_cast<double>(whole.sightings));
+  EXPECT_NEAR(static_cast<double>(parts.observations), static_cast<double>(whole.observations),
+              0.01 * static_cast<double>(whole.observations));
   EXPECT_NEAR(parts.median_error_px, whole.median_error_px, 0.05 * whole.median_error_px);
 }
 

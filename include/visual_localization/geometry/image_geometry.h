@@ -47,7 +47,7 @@ struct ImageGeometry {
 struct SessionLandmarks {
   std::size_t located = 0;  ///< images with a pose and landmarks
   std::size_t landmarks = 0;
-  std::size_t sightings = 0;             ///< features that show one
+  std::size_t observations = 0;          ///< features that show one
   bool contradicts_calibration = false;  ///< no lens near it explains the images: the session has places only
   /// How far from it, in sigmas of a calibration: focal length, ratio of fy to fx, principal point x and y, k1, k2.
   Eigen::Matrix<double, 6, 1> lens_sigmas = Eigen::Matrix<double, 6, 1>::Zero();
@@ -56,7 +56,7 @@ struct SessionLandmarks {
   std::size_t unexplained = 0;     ///< images without landmarks since too little around them fits together
   double focal_scale = 1.0;        ///< what the images say the focal length is, as a share of the calibration's
   double focal_sigma = 0.0;        ///< of that; 0: it stays as it is published, the images do not tell
-  double median_error_px = 0.0;    ///< distance of a sighting from its landmark's projection
+  double median_error_px = 0.0;    ///< distance of a observation from its landmark's projection
   double mean_shift_m = 0.0;       ///< of these images from the cleaned path
   double largest_shift_m = 0.0;
   double fix_delay_s = 0.0;    ///< fixes say where the antenna was this long before their stamps
