@@ -12,7 +12,7 @@
 namespace visual_localization {
 
 struct BundleConfig {
-  double landmark_loss = 2.5;  ///< scale of the Cauchy loss of a observation, sigmas
+  double landmark_loss = 2.5;  ///< scale of the Cauchy loss of an observation, sigmas
   double position_loss = 1.0;  ///< scale of the loss of a fix, sigmas: Cauchy's if believed, else Geman and McClure's
   Eigen::Vector3d tilt_sigma_rad{0.02, 0.1, 0.02};  ///< of a robot about its direction of travel: pitch, yaw, roll
   double slope_sigma = 0.1;                         ///< rise over run

@@ -83,7 +83,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   sweep_.startImage();
   const TrackerEstimate tracked = track(stamp_ns, metric);
   if (!metric) metric = poseNearProposal(tracked);
-  sessions_->sawSomething(metric || tracked.best.recognised);
+  sessions_->noteRecognition(metric || tracked.best.recognised);
   if (!metric && tracked.best.recognised) learnSession(tracked);
   const Evidence evidence = verify(tracked, metric);
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);

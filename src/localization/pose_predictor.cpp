@@ -127,7 +127,7 @@ bool PosePredictor::follows(const MetricPose& pose) const {
   return driven_m <= config_.max_prediction_error_m + (1.0 + kTurn) * way_m;
 }
 
-bool PosePredictor::isAside(const MetricPose& pose) const {
+bool PosePredictor::isBesidePrediction(const MetricPose& pose) const {
   if (images_since_ != 1 || !last_) return false;
   const std::optional<PredictedPose> expected = predicted();
   if (!expected || !(expected->by_odometry || last_->velocity_mps) || odometryAgrees(pose).value_or(false))

@@ -56,7 +56,7 @@ class PosePredictor {
   /// Whether the landmarks may be those of a thing that was moved since the day of the map, a parked car: the motion is
   /// known from the last two images, and the pose is beside where it leads. A robot that was pushed aside is there in
   /// the next image as well, and a kidnapped one is farther away.
-  bool isAside(const MetricPose& pose) const;
+  bool isBesidePrediction(const MetricPose& pose) const;
   /// The pose of the image is verified: motions lead from here from now on. Whether the motion so far allows to be sure
   /// of it: not while odometry that was believed led elsewhere a few poses ago.
   bool add(const MetricPose& pose);

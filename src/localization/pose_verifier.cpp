@@ -276,7 +276,7 @@ std::optional<MetricPose> PoseVerifier::commit(const Solution& solution, bool ac
   if (const auto& trial = solution.trial) {
     sessions_.learn(trial->training_image, trial->inliers, trial->tried_image, trial->tried_inliers);
   }
-  if (!accepted || predictor_.isAside(solution.pose)) return std::nullopt;
+  if (!accepted || predictor_.isBesidePrediction(solution.pose)) return std::nullopt;
   MetricPose pose = solution.pose;
   const bool clear = isClear(pose);
   inliers_together_ = inliersTogether(pose);

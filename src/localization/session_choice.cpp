@@ -124,8 +124,8 @@ void SessionChoice::choose(std::size_t training_image) {
   relateToChosen();
 }
 
-void SessionChoice::sawSomething(bool anything) {
-  nothing_seen_ = anything ? 0 : nothing_seen_ + 1;
+void SessionChoice::noteRecognition(bool recognised) {
+  nothing_seen_ = recognised ? 0 : nothing_seen_ + 1;
   if (!isOn() || nothing_seen_ < kPatience) return;
   if (nothing_seen_ == kPatience) chosen_before_ = chosen_;
   chosen_ = nothing_seen_ % 2 == 0 ? bestOr(chosen_before_) : nextInTurn();

@@ -53,7 +53,7 @@ class SessionChoice {
   void choose(std::size_t training_image);
   /// Whether the image showed anything known, by any session. After a few that did not, every second image is compared
   /// with the next session.
-  void sawSomething(bool anything);
+  void noteRecognition(bool recognised);
 
  private:
   std::vector<std::size_t> aroundOf(std::optional<std::size_t> session, const Eigen::Vector2d& position_m,

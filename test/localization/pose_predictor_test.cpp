@@ -73,12 +73,12 @@ TEST_F(PosePredictorTest, AMovedThingIsAtMostFiveMetresBesideTheWay) {
   add(0.0, 0.0);
   add(1.0, 1.0);
   predictor_.startImage(ns(2.0));
-  EXPECT_FALSE(predictor_.isAside(poseAt(2.0, 1.4))) << "that is the way, which a robot may leave by half";
-  EXPECT_TRUE(predictor_.isAside(poseAt(2.0, 1.6)));
-  EXPECT_TRUE(predictor_.isAside(poseAt(2.0, 4.9)));
-  EXPECT_FALSE(predictor_.isAside(poseAt(2.0, 5.1))) << "so far away a robot was carried";
+  EXPECT_FALSE(predictor_.isBesidePrediction(poseAt(2.0, 1.4))) << "that is the way, which a robot may leave by half";
+  EXPECT_TRUE(predictor_.isBesidePrediction(poseAt(2.0, 1.6)));
+  EXPECT_TRUE(predictor_.isBesidePrediction(poseAt(2.0, 4.9)));
+  EXPECT_FALSE(predictor_.isBesidePrediction(poseAt(2.0, 5.1))) << "so far away a robot was carried";
   predictor_.startImage(ns(3.0));
-  EXPECT_FALSE(predictor_.isAside(poseAt(3.0, 4.0))) << "in the next image as well";
+  EXPECT_FALSE(predictor_.isBesidePrediction(poseAt(3.0, 4.0))) << "in the next image as well";
 }
 
 TEST_F(PosePredictorTest, AfterALongGapAPoseFollowsWithinTheWayOfTheSpeed) {

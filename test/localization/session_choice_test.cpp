@@ -118,12 +118,12 @@ TEST_F(SessionChoiceTest, TriesOneSessionInAnImage) {
 
 TEST_F(SessionChoiceTest, TriesTheOthersWhenNothingIsSeen) {
   sessions_.startImage(8 * kHour_ns);
-  sessions_.sawSomething(false);
-  sessions_.sawSomething(false);
+  sessions_.noteRecognition(false);
+  sessions_.noteRecognition(false);
   EXPECT_EQ(sessions_.chosen(), 0U) << "one bad image says nothing about the light";
   std::vector<bool> asked(3);
   for (int i = 0; i < 6; ++i) {
-    sessions_.sawSomething(false);
+    sessions_.noteRecognition(false);
     asked[*sessions_.chosen()] = true;
   }
   EXPECT_EQ(asked, std::vector<bool>(3, true));
@@ -134,7 +134,7 @@ TEST_F(SessionChoiceTest, ReturnsToTheSessionOfTheHourWhileNothingIsSeen) {
   ASSERT_EQ(sessions_.chosen(), 2U);
   int of_the_hour = 0;
   for (int i = 0; i < 12; ++i) {
-    sessions_.sawSomething(false);
+    sessions_.noteRecognition(false);
     of_the_hour += sessions_.chosen() == 2U ? 1 : 0;
   }
   EXPECT_GE(of_the_hour, 6);
@@ -143,9 +143,9 @@ TEST_F(SessionChoiceTest, ReturnsToTheSessionOfTheHourWhileNothingIsSeen) {
 TEST_F(SessionChoiceTest, ImagesThatShowNothingCountInARow) {
   sessions_.startImage(18 * kHour_ns);
   for (int i = 0; i < 20; ++i) {
-    sessions_.sawSomething(false);
-    sessions_.sawSomething(false);
-    sessions_.sawSomething(true);
+    sessions_.noteRecognition(false);
+    sessions_.noteRecognition(false);
+    sessions_.noteRecognition(true);
   }
   EXPECT_EQ(sessions_.chosen(), 2U);
 }
@@ -281,7 +281,7 @@ TEST_F(SessionChoiceTest, WhileNothingIsSeenTheBestAndTheOthersTakeTurns) {
   ASSERT_EQ(sessions_.chosen(), 1U);
   std::vector<std::size_t> chosen;
   for (int i = 0; i < 8; ++i) {
-    sessions_.sawSomething(false);
+    sessions_.noteRecognition(false);
     chosen.push_back(*sessions_.chosen());
   }
   EXPECT_EQ(chosen[0], 1U);
@@ -303,7 +303,7 @@ TEST_F(SessionChoiceTest, WhatIsChosenCountsAsTheBest) {
   sessions_.learn(30, 1.0, 80, 0.0);
   sessions_.choose(80);
   ASSERT_EQ(sessions_.chosen(), 1U);
-  for (int i = 0; i < 4; ++i) sessions_.sawSomething(false);
+  for (int i = 0; i < 4; ++i) sessions_.noteRecognition(false);
   EXPECT_EQ(sessions_.chosen(), 1U) << "the fourth time the best one is asked";
 }
 
@@ -353,7 +353,7 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
       });
       sweep.startImage();
       const TrackerEstimate estimate = see(swarm, test::Seen{map, scores, image});
-      sessions.sawSomething(estimate.best.recognised);
+      sessions.noteRecognition(estimate.best.recognised);
       const auto trial = sessions.trial(map.position_m(estimate.best_image), map.yaw_rad(estimate.best_image));
       if (trial) {
         sessions.learn(estimate.best_image, estimate.best.weight, *trial, scores[*trial].weight);

@@ -79,7 +79,7 @@ TEST_F(SessionLearning, LearnsNothingWhileItIsOff) {
 }
 
 TEST_F(SessionLearning, ASessionThatWasNeverHereStandsForNothing) {
-  for (int i = 0; i < 10 && sessions_.chosen() != 2U; ++i) sessions_.sawSomething(false);
+  for (int i = 0; i < 10 && sessions_.chosen() != 2U; ++i) sessions_.noteRecognition(false);
   ASSERT_EQ(sessions_.chosen(), 2U) << "tried in its turn";
   for (const double x_m : {0.4, 7.0, 30.0}) {
     EXPECT_EQ(sessions_.nearest({x_m, 0.0}).image, map_->nearest({x_m, 0.0}).image);

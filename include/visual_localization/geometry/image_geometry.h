@@ -56,7 +56,7 @@ struct SessionLandmarks {
   std::size_t unexplained = 0;     ///< images without landmarks since too little around them fits together
   double focal_scale = 1.0;        ///< what the images say the focal length is, as a share of the calibration's
   double focal_sigma = 0.0;        ///< of that; 0: it stays as it is published, the images do not tell
-  double median_error_px = 0.0;    ///< distance of a observation from its landmark's projection
+  double median_error_px = 0.0;    ///< distance of an observation from its landmark's projection
   double mean_shift_m = 0.0;       ///< of these images from the cleaned path
   double largest_shift_m = 0.0;
   double fix_delay_s = 0.0;    ///< fixes say where the antenna was this long before their stamps
