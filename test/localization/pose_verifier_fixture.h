@@ -12,6 +12,7 @@
 #include "test/support/fake_image.h"
 #include "test/support/stamps.h"
 #include "visual_localization/features/feature_matcher.h"
+#include "visual_localization/localization/scores.h"
 
 namespace visual_localization::test {
 
