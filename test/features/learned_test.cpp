@@ -110,6 +110,17 @@ TEST_F(LearnedTest, RefusesWhatIsNoModel) {
   }
 }
 
+TEST_F(LearnedTest, RefusesAModelWhoseScoresAreNotFinite) {
+  std::string bytes = readFile(kModel);
+  const std::string offset("\x00\x00\x80\xC0", 4);  // -4, of the scores
+  const std::size_t at = bytes.find(offset);
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 4, std::string("\x00\x00\xC0\x7F", 4));
+  const std::string path = folder_ / "nan.onnx";
+  std::ofstream(path, std::ios::binary) << bytes;
+  EXPECT_THAT(refusal(path), AllOf(HasSubstr(path), HasSubstr("'scores' is not finite")));
+}
+
 TEST_F(LearnedTest, RefusesAnotherModelThanTheMaps) {
   LearnedConfig config;
   config.checksum = "00000001";

@@ -45,6 +45,8 @@ std::string crc32Of(const std::string& bytes) {
   return hexadecimal(::crc32(0, data, static_cast<uInt>(bytes.size())));
 }
 
+std::string inWords(const cv::Exception& error) { return "OpenCV " CV_VERSION " cannot run it: " + oneLine(error.err); }
+
 std::string levelName(std::size_t level) { return "descriptors_" + std::to_string(level); }
 
 /// scores, descriptors_0, descriptors_1, ..., head.
@@ -81,13 +83,20 @@ FeatureModel::FeatureModel(const std::string& path) {
       forward(ramp);
     }
   } catch (const cv::Exception& error) {
-    throw ParameterError("model '" + oneLine(path) + "': OpenCV " CV_VERSION " cannot run it: " + oneLine(error.err));
+    throw ParameterError("model '" + oneLine(path) + "': " + inWords(error));
   } catch (const std::exception& error) {
     throw ParameterError("model '" + oneLine(path) + "': " + oneLine(error.what()));
   }
 }
 
-void FeatureModel::setImage(const cv::Mat& grey) { forward(grey); }
+void FeatureModel::setImage(const cv::Mat& grey) {
+  const Silence silence;
+  try {
+    forward(grey);
+  } catch (const cv::Exception& error) {
+    throw std::runtime_error("the model of learned features: " + inWords(error));
+  }
+}
 
 void FeatureModel::forward(const cv::Mat& grey) {
   const auto padding = [](int side_px) { return (kStride_px - side_px % kStride_px) % kStride_px; };
@@ -100,6 +109,7 @@ void FeatureModel::forward(const cv::Mat& grey) {
   }
   scores_ = cv::Mat(padded_.rows, padded_.cols, CV_32F,
                     const_cast<float*>(scores.ptr<float>()))(cv::Rect(0, 0, grey.cols, grey.rows));
+  if (!cv::checkRange(scores_)) throw std::runtime_error("its output 'scores' is not finite");
   levels_.clear();
   Eigen::Index channels = 0;
   for (std::size_t i = 1; i + 1 < outputs_.size(); ++i) {
