@@ -2,17 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "base/numbers.h"
+#include "base/time.h"
 #include "map/feature_store.h"
 #include "map/map_geometry.h"
 #include "map/position_index.h"
 
 namespace visual_localization {
 namespace {
+
+/// 2^32 s, as far as a stamp of ROS reaches; so the difference of two fits into 64 bits.
+constexpr std::int64_t kFarthestStamp_ns = 4'294'967'296'000'000'000;
 
 [[noreturn]] void refuse(std::size_t image, const std::string& reason) {
   throw std::invalid_argument("training map: image " + std::to_string(image) + ": " + reason);
@@ -53,6 +58,9 @@ TrainingPoses checked(const MapHeader& header, TrainingPoses poses) {
                     " m from the datum");
     }
     if (!std::isfinite(poses.yaws_rad[i])) refuse(i, "heading is not finite");
+    if (poses.stamps_ns[i] < -kFarthestStamp_ns || poses.stamps_ns[i] > kFarthestStamp_ns) {
+      refuse(i, "stamp " + secondsText(poses.stamps_ns[i]) + " s is more than 4294967296 s from zero");
+    }
     if (session < 0 || static_cast<std::size_t>(session) >= header.sessions.size()) {
       refuse(i, "session " + std::to_string(session) + " is not one of " + std::to_string(header.sessions.size()));
     }

@@ -151,6 +151,19 @@ TEST(TrainingMap, RefusesWhatIsNoMap) {
   EXPECT_THROW(TrainingMap(header, test::exampleImages(2)), std::invalid_argument);
 }
 
+TEST(TrainingMap, RefusesStampsWhoseDifferenceIsNoTime) {
+  constexpr std::int64_t kFarthest_ns = 4'294'967'296'000'000'000;
+  auto images = test::exampleImages(2);
+  images[0].stamp_ns = -kFarthest_ns;
+  images[1].stamp_ns = kFarthest_ns;
+  EXPECT_NO_THROW(TrainingMap(test::exampleHeader(), images));
+  for (const std::int64_t stamp_ns : {kFarthest_ns + 1, -kFarthest_ns - 1, std::numeric_limits<std::int64_t>::max(),
+                                      std::numeric_limits<std::int64_t>::min()}) {
+    images[1].stamp_ns = stamp_ns;
+    EXPECT_THROW(TrainingMap(test::exampleHeader(), images), std::invalid_argument) << stamp_ns;
+  }
+}
+
 TEST(TrainingMap, NowhereHasNoNearestImage) {
   const TrainingMap map = mapAt({{0.0, 0.0}});
   const Eigen::Vector2d nowhere(std::numeric_limits<double>::infinity(), 0.0);

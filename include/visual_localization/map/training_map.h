@@ -98,10 +98,10 @@ struct Neighbour {
 class TrainingMap {
  public:
   /// A map that is all in memory. Throws std::invalid_argument, in one line, when there is no image, the image size is
-  /// not positive, a position or heading is not finite, a session index is out of range, a camera or mask is not for
-  /// images of the map's size, or a geometry cannot be: numbers that are not finite, a rotation that is not of unit
-  /// length, a covariance that is not symmetric and positive semi-definite, a landmark more than 100 km away, features
-  /// that the image does not have or that are not in order.
+  /// not positive, a position or heading is not finite, a stamp is farther than 2^32 s from zero, a session index is
+  /// out of range, a camera or mask is not for images of the map's size, or a geometry cannot be: numbers that are not
+  /// finite, a rotation that is not of unit length, a covariance that is not symmetric and positive semi-definite, a
+  /// landmark more than 100 km away, features that the image does not have or that are not in order.
   TrainingMap(MapHeader header, std::vector<TrainingImage> images);
   /// A map whose images' looks are in `store`, which answers for their geometry. Throws like the other one.
   TrainingMap(MapHeader header, TrainingPoses poses, std::unique_ptr<const FeatureStore> store);
