@@ -78,6 +78,32 @@ std::string programOfPackage(const std::string& name) {
   return programBeside(name);
 }
 
+std::string howCopyEnds(const std::function<void()>& run, unsigned longest_s) {
+  const pid_t copy = ::fork();
+  if (copy < 0) throw std::runtime_error(std::string("no process for it: ") + std::strerror(errno));
+  if (copy == 0) {
+    for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) ::signal(number, SIG_DFL);
+    const rlimit no_core{0, 0};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    ::dup2(nowhere, STDERR_FILENO);
+    ::alarm(longest_s);
+    try {
+      run();
+    } catch (...) {  // which the caller gets when it does the same
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  while (::waitpid(copy, &status, 0) != copy) {
+    if (errno != EINTR) throw std::runtime_error(std::string("nobody knows how it ended: ") + std::strerror(errno));
+  }
+  if (status == 0) return {};
+  if (!WIFSIGNALED(status)) return "with exit code " + std::to_string(WEXITSTATUS(status));
+  if (WTERMSIG(status) == SIGALRM) return "after " + std::to_string(longest_s) + " s without a result";
+  return "by signal " + std::to_string(WTERMSIG(status)) + " (" + ::strsignal(WTERMSIG(status)) + ")";
+}
+
 std::string ChildProcess::run(const std::string& program, const std::vector<std::string>& arguments) {
   std::vector<std::string> command{program};
   command.insert(command.end(), arguments.begin(), arguments.end());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -14,6 +15,11 @@ std::string programBeside(const std::string& name);
 /// The same for a nodelet in another package's program, too: there it is where the library that this is in was
 /// installed with it.
 std::string programOfPackage(const std::string& name);
+
+/// Runs something in a copy of this process, for libraries that a broken file ends instead of an exception. Empty when
+/// it came to its end or threw; otherwise how the copy ended: "by signal 11 (Segmentation fault)". After `longest_s` it
+/// is ended.
+std::string howCopyEnds(const std::function<void()>& run, unsigned longest_s);
 
 /// A program that runs as a process of its own.
 class ChildProcess {

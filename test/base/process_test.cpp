@@ -1,10 +1,13 @@
 #include "base/process.h"
 
 #include <chrono>
+#include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <future>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -60,6 +63,20 @@ TEST(ChildProcess, EndsWhenItIsTerminated) {
   child.terminate();
   EXPECT_EQ(refusal.get(), "/bin/sh: failed: begun");
   EXPECT_THROW(child.run("/bin/true", {}), std::runtime_error) << "nor does another one start";
+}
+
+TEST(HowCopyEnds, IsEmptyWhereItComesToItsEndOrThrows) {
+  int here = 1;
+  EXPECT_EQ(howCopyEnds([&here] { here = 2; }, 10), "");
+  EXPECT_EQ(here, 1) << "what it does must not be done here";
+  EXPECT_EQ(howCopyEnds([] { throw std::runtime_error("refused"); }, 10), "");
+}
+
+TEST(HowCopyEnds, NamesWhatEndedIt) {
+  EXPECT_EQ(howCopyEnds([] { std::raise(SIGFPE); }, 10), "by signal 8 (Floating point exception)");
+  EXPECT_EQ(howCopyEnds([] { std::abort(); }, 10), "by signal 6 (Aborted)");
+  EXPECT_EQ(howCopyEnds([] { std::_Exit(3); }, 10), "with exit code 3");
+  EXPECT_EQ(howCopyEnds([] { std::this_thread::sleep_for(std::chrono::hours(1)); }, 1), "after 1 s without a result");
 }
 
 TEST(ProgramOfPackage, FindsProgramsBesideTheLibrary) {

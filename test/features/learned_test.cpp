@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -119,6 +120,32 @@ TEST_F(LearnedTest, RefusesAModelWhoseScoresAreNotFinite) {
   const std::string path = folder_ / "nan.onnx";
   std::ofstream(path, std::ios::binary) << bytes;
   EXPECT_THAT(refusal(path), AllOf(HasSubstr(path), HasSubstr("'scores' is not finite")));
+}
+
+// OpenCV 4.6 is ended by three of them.
+TEST_F(LearnedTest, SurvivesDamagedModels) {
+  const std::string whole = readFile(TEST_DATA_DIR "/../fuzz/corpus/model/accepted/small.onnx");
+  const std::string path = folder_ / "damaged.onnx";
+  std::mt19937 random(1);
+  for (int i = 0; i < 60; ++i) {
+    std::string damaged = whole;
+    damaged[random() % damaged.size()] ^= static_cast<char>(1U << random() % 8U);
+    std::ofstream(path, std::ios::binary) << damaged;
+    const std::string text = refusal(path);
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+  }
+}
+
+TEST_F(LearnedTest, OpenCvSeesNoOtherModelThanTheMaps) {
+  const std::string path = folder_ / "other.onnx";
+  std::ofstream(path) << "no model at all";
+  try {
+    kind_.adopt(choice_);
+    kind_.makeExtractor({"native", path});
+    FAIL() << "was taken for the same";
+  } catch (const ParameterError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr(path), HasSubstr("is not that of the model")));
+  }
 }
 
 TEST_F(LearnedTest, RefusesAnotherModelThanTheMaps) {

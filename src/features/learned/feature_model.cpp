@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "base/files.h"
+#include "base/process.h"
 #include "base/text.h"
 #include "visual_localization/parameters/parameters.h"
 
@@ -69,12 +70,25 @@ bool isPlane(const cv::Mat& output) { return output.dims == 4 && output.size[0] 
 
 }  // namespace
 
-FeatureModel::FeatureModel(const std::string& path) {
+void requireHarmlessModel(const std::string& path) {
+  constexpr unsigned kLongest_s = 60;
+  const std::string end =
+      howCopyEnds([&path] { FeatureModel(path).setImage(cv::Mat::zeros(480, 640, CV_8U)); }, kLongest_s);
+  if (end.empty()) return;
+  throw ParameterError("model '" + oneLine(path) + "': is damaged: OpenCV " CV_VERSION " ends " + end);
+}
+
+FeatureModel::FeatureModel(const std::string& path, const std::optional<std::string>& checksum) {
   const Silence silence;
   try {
     if (path.empty()) throw std::runtime_error("learned features need the ONNX file of their network (--model)");
     const std::string bytes = readFile(path, kLargestFile_bytes);
     checksum_ = crc32Of(bytes);
+    if (checksum && *checksum != checksum_) {
+      throw std::runtime_error("its CRC-32 " + checksum_ +
+                               " is not that of the model that the map's features were made with, " +
+                               oneLine(*checksum, 20));
+    }
     net_ = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
     names_ = outputsOf(net_);
     for (const int width_px : {2 * kStride_px, 3 * kStride_px}) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,12 +11,16 @@
 
 namespace visual_localization {
 
+/// Throws ParameterError when OpenCV does not survive the file: it refuses many damaged models, and is ended by others.
+void requireHarmlessModel(const std::string& path);
+
 /// A network that finds and describes local features, from an ONNX file; what it must be like stands in
 /// doc/programs.md. Not thread-safe.
 class FeatureModel {
  public:
-  /// Reads the file and tries it on two small images. Throws ParameterError, naming file and fault.
-  explicit FeatureModel(const std::string& path);
+  /// Reads the file and tries it on two small images. Throws ParameterError, naming file and fault; when the file has
+  /// another checksum than the one given, before OpenCV sees it.
+  explicit FeatureModel(const std::string& path, const std::optional<std::string>& checksum = std::nullopt);
 
   /// Of a descriptor.
   std::size_t dimension() const { return static_cast<std::size_t>(head_.rows()); }

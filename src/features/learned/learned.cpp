@@ -7,7 +7,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "base/text.h"
 #include "features/learned/feature_model.h"
 
 namespace visual_localization {
@@ -115,18 +114,14 @@ void Learned::declareStored(ParameterVisitor& visitor) {
 }
 
 void Learned::adopt(const ExtractorChoice& choice) {
+  requireHarmlessModel(choice.model);
   const FeatureModel model(choice.model);
   config_.dimension = static_cast<int>(model.dimension());
   config_.checksum = model.checksum();
 }
 
 std::unique_ptr<LocalExtractor> Learned::makeExtractor(const ExtractorChoice& choice) const {
-  FeatureModel model(choice.model);
-  if (model.checksum() != config_.checksum) {
-    throw ParameterError("model '" + oneLine(choice.model) + "' (CRC-32 " + model.checksum() +
-                         ") is not the one that the map's features were made with (" + oneLine(config_.checksum, 20) +
-                         ")");
-  }
+  FeatureModel model(choice.model, config_.checksum);
   return std::make_unique<LearnedExtractor>(config_, std::move(model));
 }
 
