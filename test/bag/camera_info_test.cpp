@@ -72,6 +72,26 @@ TEST(CameraInfo, OfZerosMeansNotCalibrated) {
   EXPECT_FALSE(toCamera(sensor_msgs::CameraInfo(), true));
 }
 
+// A driver of stereo cameras fills P alone (luxonis/depthai-ros#598).
+TEST(CameraInfo, OfPAloneCalibratesRectifiedImagesAlone) {
+  sensor_msgs::CameraInfo info = example();
+  info.K.fill(0.0);
+  info.distortion_model = "rational_polynomial";
+  info.D.assign(8, 0.0);
+  EXPECT_FALSE(toCamera(info));
+  EXPECT_EQ(toCamera(info, true).value().intrinsics().fx, 480.0);
+}
+
+// As camera_calibration writes them with too few views (ros-perception/image_pipeline#598), and a rectification of
+// zeros (stereolabs/zed-ros-wrapper#126).
+TEST(CameraInfo, ZerosForDistortionAndRectificationMeanNone) {
+  sensor_msgs::CameraInfo info = example();
+  info.distortion_model = "rational_polynomial";
+  info.D.assign(8, 0.0);
+  info.R.fill(0.0);
+  EXPECT_TRUE(toCamera(info).value().isPinhole());
+}
+
 TEST(CameraInfo, RectifiedImagesHaveNoDistortion) {
   const CameraModel camera = toCamera(example(), true).value();
   EXPECT_TRUE(camera.isPinhole());

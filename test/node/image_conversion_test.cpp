@@ -278,6 +278,35 @@ TEST(ImageConversion, WhatStandsBehindTheEndOfAnImageDoesNotMatter) {
   }
 }
 
+// As of a Logitech C270 (opencv/opencv#9477): "extraneous bytes before marker".
+TEST(ImageConversion, StrayBytesBeforeMarkersDoNotMatter) {
+  const cv::Mat pixels = toGrey(compressed(".png"));
+  sensor_msgs::CompressedImage whole;
+  cv::imencode(".jpg", pixels, whole.data, {cv::IMWRITE_JPEG_RST_INTERVAL, 1});
+  std::size_t stray = 0;
+  sensor_msgs::CompressedImage message;
+  for (std::size_t i = 0; i < whole.data.size(); ++i) {
+    const bool marker = whole.data[i] == 0xFF && i + 1 < whole.data.size() && whole.data[i + 1] >= 0xD0 &&
+                        whole.data[i + 1] <= 0xD9 && whole.data[i + 1] != 0xD8;
+    if (marker) insert(message.data, message.data.size(), std::vector<std::uint8_t>(1 + stray++ % 7, 0x5A));
+    message.data.push_back(whole.data[i]);
+  }
+  ASSERT_GT(stray, 2U);
+  EXPECT_EQ(cv::norm(toGrey(message), toGrey(whole), cv::NORM_INF), 0.0);
+}
+
+// Drivers write "jpeg", "jpg", "bgra8; jpeg compressed bgr8" or nothing (microsoft/Azure_Kinect_ROS_Driver#146).
+TEST(ImageConversion, TheNameOfACompressedFormatDoesNotMatter) {
+  for (const char* extension : {".jpg", ".png"}) {
+    const cv::Mat expected = toGrey(compressed(extension));
+    for (const char* format : {"", "jpeg", "png", "bgra8; jpeg compressed bgr8", "mono8; png compressed ", "h264"}) {
+      sensor_msgs::CompressedImage message = compressed(extension);
+      message.format = format;
+      EXPECT_EQ(cv::norm(toGrey(message), expected, cv::NORM_INF), 0.0) << extension << " " << format;
+    }
+  }
+}
+
 TEST(ImageConversion, EveryKindOfJpegIsDecodedAsByOpenCv) {
   cv::Mat colour(61, 83, CV_8UC3);
   cv::randu(colour, 0, 256);
