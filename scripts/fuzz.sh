@@ -3,7 +3,7 @@
 set -euo pipefail
 repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo build=$repo/build/fuzz
-readonly targets=(map bag config camera reconfigure edits unit_result services sensors records images)
+readonly targets=(map model bag config camera reconfigure edits unit_result services sensors records images)
 
 usage() {
   cat <<USAGE

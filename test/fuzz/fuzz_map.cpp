@@ -1,4 +1,5 @@
 /// A map file that may come from anyone: read as a whole, image by image, and checked.
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -9,6 +10,7 @@
 #include <sqlite3.h>
 #include <unistd.h>
 
+#include "base/time.h"
 #include "editing/map_selection.h"
 #include "map/map_schema.h"
 #include "test/fuzz/fuzz_support.h"
@@ -83,6 +85,7 @@ void use(const TrainingMap& map) {
     const TrainingImage image = map.image(i);
     if (map.nearest(image.position_m).image >= map.size()) fuzz::fail("an image that there is not");
     if (image.local.keypoints().size() != image.local.size()) fuzz::fail("features do not fit together");
+    if (i > 0 && !std::isfinite(secondsBetween(map.pose(i - 1).stamp_ns, image.stamp_ns))) fuzz::fail("no time");
     if (image.geometry) requireFitting(*image.geometry, image.local.size());
   }
   for (const Session& session : map.header().sessions) {

@@ -1,4 +1,5 @@
-/// What sensors send beside images and calibrations: odometry, fixes and static transforms. The first byte chooses.
+/// What sensors send beside images and calibrations: odometry, fixes, static transforms, and stamps. The first byte
+/// chooses.
 #include <cmath>
 #include <cstdint>
 #include <stdexcept>
@@ -9,7 +10,9 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "bag/bag_messages.h"
+#include "node/image_worker.h"
 #include "node/robot_transforms.h"
+#include "node/stamps.h"
 #include "ros/message_readers.h"
 #include "ros/static_transforms.h"
 #include "test/fuzz/fuzz_support.h"
@@ -64,6 +67,41 @@ void readTransforms(const tf2_msgs::TFMessage& message) {
   readRobotTransforms(message);
 }
 
+/// What is passed on must not end a tf2 listener, which adds its time of waiting to it. Half a minute is more than any.
+void readStamp(const ros::Time& stamp, double tolerance_s) {
+  const std::string trouble = stampTrouble(stamp);
+  if (!trouble.empty()) return fuzz::requireOneLine(trouble);
+  fuzz::mustNotThrow([&] {
+    const ros::Time passed_on = later(stamp, tolerance_s);
+    if (passed_on < stamp) fuzz::fail("a stamp before the image");
+    if (passed_on.nsec >= 1'000'000'000) fuzz::fail("a stamp with more nanoseconds than a second has");
+    passed_on + ros::Duration(30.0);
+  });
+  fuzz::countRead();
+}
+
+/// In the order of the bytes.
+void readStamps(fuzz::Input input) {
+  constexpr double kLongestTolerance_s = 60.0;
+  ros::Time::init();
+  const double tolerance_s = kLongestTolerance_s * input.number<std::uint8_t>() / 255.0;
+  StampMonitor monitor;
+  auto before = StampMonitor::Verdict::kInOrder;
+  while (!input.isEmpty()) {
+    ros::Time stamp;
+    stamp.sec = input.number<std::uint32_t>();
+    stamp.nsec = input.number<std::uint32_t>();
+    readStamp(stamp, tolerance_s);
+    const StampMonitor::Verdict verdict = monitor.judge(static_cast<std::int64_t>(stamp.toNSec()));
+    if (!(monitor.lag_s() >= 0.0)) fuzz::fail("an image ahead of itself");
+    if ((verdict == StampMonitor::Verdict::kInOrder) != (monitor.lag_s() == 0.0)) fuzz::fail("late without a lag");
+    if (verdict == StampMonitor::Verdict::kWentBack && before != StampMonitor::Verdict::kLate) {
+      fuzz::fail("one image moves the time");
+    }
+    before = verdict;
+  }
+}
+
 }  // namespace
 }  // namespace visual_localization
 
@@ -72,15 +110,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const std::string bytes = fuzz::Input(data + 1, size - 1).rest();
   fuzz::expect<ImageError>([&] {
-    switch (data[0] % 3) {
+    switch (data[0] % 4) {
       case 0:
         readOdometry(*deserialize<nav_msgs::Odometry>(bytes));
         break;
       case 1:
         readFix(*deserialize<sensor_msgs::NavSatFix>(bytes));
         break;
-      default:
+      case 2:
         readTransforms(*deserialize<tf2_msgs::TFMessage>(bytes));
+        break;
+      default:
+        readStamps({data + 1, size - 1});
     }
   });
   return 0;

@@ -1,4 +1,5 @@
-/// Mostly changes bytes in place: the records of a bag point at each other, and one byte more is the end of all of it.
+/// Mostly changes bytes in place: the records of a bag point at each other, the parts of a model have their lengths in
+/// front, and one byte more is the end of all of it.
 #include <cstdint>
 #include <random>
 

@@ -194,7 +194,7 @@ Sql anySql(Random& random) {
                                                     "landmarks.crc32",
                                                     "masks.session",
                                                     "masks.bits"};
-  static const std::array<const char*, 21> kValues{"0",
+  static const std::array<const char*, 25> kValues{"0",
                                                    "1",
                                                    "-1",
                                                    "9223372036854775807",
@@ -214,8 +214,12 @@ Sql anySql(Random& random) {
                                                    "zeroblob(512)",
                                                    "zeroblob(100000)",
                                                    "randomblob(128)",
-                                                   "1e5"};
-  static const std::array<const char*, 20> kOthers{
+                                                   "1e5",
+                                                   "'learned'",
+                                                   "'sift'",
+                                                   "4294967296000000001",
+                                                   "-4294967296000000001"};
+  static const std::array<const char*, 23> kOthers{
       "CREATE VIEW v AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) SELECT i FROM n",
       "CREATE TRIGGER t AFTER INSERT ON images BEGIN DELETE FROM meta; END",
       "CREATE INDEX i ON images(abs(session))",
@@ -232,6 +236,9 @@ Sql anySql(Random& random) {
       "DELETE FROM landmarks",
       "INSERT OR REPLACE INTO landmarks SELECT image + 1, pose, points, 0 FROM landmarks",
       "UPDATE landmarks SET pose = CAST(substr(pose, 1, 56) || randomblob(84) AS BLOB)",
+      "UPDATE meta SET value = 'learned' WHERE key = 'features/kind'",
+      "UPDATE meta SET value = value - 1 WHERE key LIKE '%/dimension'",
+      "UPDATE images SET stamp_ns = stamp_ns * (1 - 2 * (id % 2)) * 3",
       "UPDATE landmarks SET points = CAST(points || points AS BLOB)",
       "PRAGMA page_size = 1024; VACUUM",
       "PRAGMA auto_vacuum = FULL; VACUUM",
