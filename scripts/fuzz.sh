@@ -29,7 +29,7 @@ fuzz() {
   # An allocation that is refused is std::bad_alloc, as without the sanitizer, and so the reader's own business. The
   # other options keep the sanitizer's own bookkeeping small.
   local -x UBSAN_OPTIONS=print_stacktrace=1
-  local -x ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1:malloc_context_size=2:quarantine_size_mb=16:max_malloc_fill_size=0
+  local -x ASAN_OPTIONS=detect_leaks=0:allocator_may_return_null=1:max_allocation_size_mb=4000:malloc_context_size=2:quarantine_size_mb=16:max_malloc_fill_size=0
   { time "$build/fuzz/fuzz_$target" -max_total_time="$seconds" -timeout=60 -rss_limit_mb=4096 -max_len="$length" \
     -entropic=0 -print_final_stats=1 -verbosity=1 -artifact_prefix="$findings/" "${options[@]}" "$corpus" \
     "$repo/test/fuzz/corpus/$target" 2>&1 | tee "$build/log/$target.txt"; } 2>"$build/log/$target.seconds"
