@@ -313,6 +313,7 @@ class Merger {
         if (alignment.covariances[i]) image.geometry->covariance = *alignment.covariances[i];
         number(*image.geometry, first_id);
       }
+      image.vlad = header_.vocabulary ? header_.vocabulary->describe(image.local) : VladDescriptor();
       writer_.append(image);
     }
   }
@@ -357,6 +358,18 @@ class Merger {
   std::uint64_t next_id_ = 0;
 };
 
+/// Of the images of all maps.
+std::shared_ptr<const VladVocabulary> commonVocabulary(const std::vector<NamedMap>& maps) {
+  std::vector<std::size_t> ends;
+  for (const NamedMap& of : maps) ends.push_back((ends.empty() ? 0 : ends.back()) + of.map->size());
+  const auto features = [&](std::size_t i) {
+    const auto map = std::upper_bound(ends.begin(), ends.end(), i) - ends.begin();
+    const TrainingMap& of = *maps[static_cast<std::size_t>(map)].map;
+    return of.local(i + of.size() - ends[static_cast<std::size_t>(map)]);
+  };
+  return VladVocabulary::learn(ends.back(), features, maps.front().map->header().image_size);
+}
+
 template <class Target>
 std::vector<MergedMap> mergeTo(const Target& target, const std::vector<NamedMap>& maps, const std::string& edit,
                                std::size_t threads, const Progress& progress) {
@@ -366,7 +379,9 @@ std::vector<MergedMap> mergeTo(const Target& target, const std::vector<NamedMap>
     known.add(map);
   }
   const LocalFrame frame = maps.front().map->frame();
-  Merger merger(target, maps.front().map->header());
+  MapHeader header = maps.front().map->header();
+  header.vocabulary = commonVocabulary(maps);
+  Merger merger(target, std::move(header));
   std::vector<PlacedMap> placed;
   std::vector<MergedMap> merged;
   for (const NamedMap& of : maps) {

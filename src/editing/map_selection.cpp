@@ -184,12 +184,20 @@ void writeSelection(const TrainingMap& map, const std::vector<bool>& keep, const
   if (std::find(keep.begin(), keep.end(), true) == keep.end()) throw MapEditError("no image would be left");
   auto [header, numbers] = remaining(map, keep);
   if (!edit.empty()) header.history.push_back(edit);
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    if (keep[i]) kept.push_back(i);
+  }
+  // Words of other images find less: half as much in the map of another place.
+  header.vocabulary = VladVocabulary::learn(
+      kept.size(), [&](std::size_t i) { return map.local(kept[i]); }, header.image_size);
   MapWriter writer(path, header.kind);
   for (std::size_t i = 0; i < map.size(); ++i) {
     if (keep[i]) {
       TrainingImage image = map.image(i);
       image.session = numbers[static_cast<std::size_t>(image.session)];
       if (change) change(image);
+      image.vlad = header.vocabulary ? header.vocabulary->describe(image.local) : VladDescriptor();
       writer.append(image);
     }
     if (progress) progress(i + 1, map.size());

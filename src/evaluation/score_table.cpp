@@ -139,6 +139,10 @@ RowTimes fillRow(const DriveImage& image, const TrainingMap& map, const LocalSim
   const CpuStopwatch global_watch;
   for (std::size_t i = 0; i < map.size(); ++i) row[i].global = global.compare(image.global, *map.global(i)).similarity;
   times.global_ms = global_watch.elapsed_ms();
+  if (map.header().vocabulary) {
+    const VladDescriptor vlad = map.header().vocabulary->describe(image.local);
+    for (std::size_t i = 0; i < map.size(); ++i) row[i].vlad = static_cast<float>(vladSimilarity(vlad, *map.vlad(i)));
+  }
   return times;
 }
 
@@ -223,6 +227,10 @@ Score RecordedImage::compare(FeatureKind kind, std::size_t training_image) {
   if (kind == FeatureKind::kLocal) {
     ++sift_comparisons_;
     return sift_.scoreOf(known.sift, known.matches, static_cast<double>(known.scale));
+  }
+  if (kind == FeatureKind::kVlad) {  // costs next to nothing, once the local features are there
+    const auto similarity = static_cast<double>(known.vlad);
+    return {similarity, similarity};
   }
   ++global_comparisons_;
   return global_.scoreOf(known.global);

@@ -70,6 +70,7 @@ class ScoreTable {
     double global = 0.0;
     std::uint32_t matches = 0;
     float scale = 1.0F;  ///< of these matches
+    float vlad = 0.0F;   ///< similarity by VLAD; 0 without a vocabulary
   };
 
   ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads);

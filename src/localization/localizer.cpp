@@ -49,7 +49,7 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       mount_(map_->header().sessions.front().mount.value_or(SensorMount())),
       image_(std::move(image)),
       scores_(map_->size()),
-      sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept()),
+      sweep_(*map_, static_cast<std::size_t>(config_.sweep_images), map_->globalsKept(), config_.proposals == "vlad"),
       tracker_(makeTracker(*map_, config_, static_cast<std::uint32_t>(config_.seed))),
       witness_(std::make_unique<PlaceFilter>(*map_, config_.bayes)),
       choice_(config_.features, config_.hybrid),
@@ -352,7 +352,9 @@ LocalizationState Localizer::doubt() {
 void Localizer::configure(const LocalizerConfig& config) {
   const LocalizerConfig before = std::exchange(config_, LocalizerConfig(requireValid(config)));
   image_->configure(frontEndConfig(), config_.similarity);
-  if (config_.sweep_images != before.sweep_images) sweep_.configure(static_cast<std::size_t>(config_.sweep_images));
+  if (config_.sweep_images != before.sweep_images || config_.proposals != before.proposals) {
+    sweep_.configure(static_cast<std::size_t>(config_.sweep_images), config_.proposals == "vlad");
+  }
   choice_.configure(config_.features, config_.hybrid);
   sessions_->configure(config_.choose_session);
   assessor_.configure(config_.state);

@@ -53,6 +53,11 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
       {"sweep_images", "1",
        "of a larger map, guided recovery, place check and proposals for poses compare about this number per image"},
       sweep_images, 1, std::numeric_limits<int>::max());
+  visitor.choice(
+      {"proposals", "",
+       "which images of the map may look like this one: by VLAD of the local features, where the map has it, "
+       "or by global features"},
+      proposals, {"vlad", "global"});
   visitor.renamed("max_proposal_images", "sweep_images");
   visitor.renamed("state/place_check_images", "sweep_images");
   match.declare(visitor);

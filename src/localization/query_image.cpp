@@ -14,6 +14,7 @@ LiveImage::LiveImage(const TrainingMap& map, const FrontEndConfig& front_end, co
 
 void LiveImage::set(std::int64_t stamp_ns, const cv::Mat& grey) {
   front_end_.setImage(stamp_ns, grey);
+  vlad_.reset();
   match_ms_ = 0.0;
 }
 
@@ -25,6 +26,11 @@ Score LiveImage::compare(FeatureKind kind, std::size_t training_image) {
     const Score score = local_similarity_.compare(current, *map_.local(training_image));
     match_ms_ += stopwatch.elapsed_ms();
     return score;
+  }
+  if (kind == FeatureKind::kVlad) {
+    if (!vlad_) vlad_ = map_.header().vocabulary->describe(front_end_.local());
+    const double similarity = vladSimilarity(*vlad_, *map_.vlad(training_image));
+    return {similarity, similarity};
   }
   const GlobalFeatures& current = front_end_.global();
   const Stopwatch stopwatch;

@@ -22,6 +22,7 @@ void Scores::startImage(FeatureKind kind, Compare compare) {
   compare_ = std::move(compare);
   local_.clear();
   global_.clear();
+  vlad_.clear();
   comparisons_ = 0;
   counted_ = 0;
 }
@@ -37,6 +38,8 @@ Score Scores::operator[](std::size_t training_image) {
 Score Scores::global(std::size_t training_image) {
   return global_.at(FeatureKind::kGlobal, training_image, compare_).score;
 }
+
+Score Scores::vlad(std::size_t training_image) { return vlad_.at(FeatureKind::kVlad, training_image, compare_).score; }
 
 std::vector<Scores::Compared> Scores::compared() const {
   std::vector<Compared> compared;
@@ -65,24 +68,38 @@ void Scores::count(const std::vector<std::size_t>& training_images) {
   }
 }
 
-std::size_t Scores::swept() const { return global_.size() - (kind_ == FeatureKind::kGlobal ? comparisons_ : 0); }
-
-MapSweep::MapSweep(const TrainingMap& map, std::size_t max_images, std::size_t max_kept)
-    : map_(map), max_kept_(max_kept) {
-  configure(max_images);
+std::size_t Scores::swept() const {
+  return global_.size() - (kind_ == FeatureKind::kGlobal ? comparisons_ : 0) + vlad_.size();
 }
 
-void MapSweep::configure(std::size_t max_images) {
+MapSweep::MapSweep(const TrainingMap& map, std::size_t max_images, std::size_t max_kept, bool by_vlad)
+    : map_(map), max_kept_(max_kept) {
+  configure(max_images, by_vlad);
+}
+
+void MapSweep::configure(std::size_t max_images, bool by_vlad) {
+  by_vlad_ = by_vlad && map_.header().vocabulary != nullptr;
   stride_ = strideFor(map_.size(), max_images);
   const std::size_t swept = (map_.size() + stride_ - 1) / stride_;
   offsets_ = std::clamp<std::size_t>(max_kept_ / swept, 1, stride_);
   startImage();
 }
 
-void MapSweep::sweep(Scores& scores) {
-  if (!cumulated_.empty()) return;
+void MapSweep::startImage() {
+  cumulated_.clear();
+  has_begun_ = false;
+}
+
+/// With other images than for the image before.
+void MapSweep::begin() {
+  if (std::exchange(has_begun_, true)) return;
   offset_ = (offset_ + 1) % offsets_;
   first_ = offset_ * stride_ / offsets_;
+}
+
+void MapSweep::sweep(Scores& scores) {
+  if (!cumulated_.empty()) return;
+  begin();
   double total = 0.0;
   for (std::size_t i = first_; i < map_.size(); i += stride_) {
     total += scores.global(i).weight;
@@ -100,9 +117,12 @@ std::size_t MapSweep::draw(Scores& scores, Random& random) {
 }
 
 std::vector<std::size_t> MapSweep::mostSimilar(Scores& scores, std::size_t count) {
-  sweep(scores);
+  begin();
+  const bool by_vlad = by_vlad_ && scores.kind() == FeatureKind::kLocal;
   std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t i = first_; i < map_.size(); i += stride_) order.emplace_back(-scores.global(i).similarity, i);
+  for (std::size_t i = first_; i < map_.size(); i += stride_) {
+    order.emplace_back(-(by_vlad ? scores.vlad(i) : scores.global(i)).similarity, i);
+  }
   const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(count, order.size()));
   std::partial_sort(order.begin(), end, order.end());
   std::vector<std::size_t> images;

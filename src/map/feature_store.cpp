@@ -15,12 +15,14 @@ std::size_t bytesOf(const LocalFeatures& features) { return features.memory_byte
 
 std::size_t bytesOf(const GlobalFeatures&) { return sizeof(GlobalFeatures); }
 
+std::size_t bytesOf(const VladDescriptor& vlad) { return sizeof(vlad) + vlad.capacity(); }
+
 std::size_t bytesOf(const std::optional<ImageGeometry>& geometry) {
   return sizeof(geometry) + (geometry ? geometry->landmarks.capacity() * sizeof(SeenLandmark) : 0);
 }
 
 /// What is kept of an image, by the number of its key.
-enum Kind : std::uint64_t { kLocal, kGlobal, kGeometry, kKinds };
+enum Kind : std::uint64_t { kLocal, kGlobal, kGeometry, kVlad, kKinds };
 
 std::uint64_t keyOf(std::size_t image, Kind kind) { return kKinds * image + kind; }
 
@@ -29,11 +31,13 @@ std::uint64_t keyOf(std::size_t image, Kind kind) { return kKinds * image + kind
 MemoryFeatureStore::MemoryFeatureStore(std::vector<TrainingImage>&& images) {
   local_.reserve(images.size());
   global_.reserve(images.size());
+  vlads_.reserve(images.size());
   previews_.reserve(images.size());
   geometry_.resize(images.size());
   for (TrainingImage& image : images) {
     local_.push_back(std::move(image.local));
     global_.push_back(image.global);
+    vlads_.push_back(std::move(image.vlad));
     previews_.push_back(std::move(image.preview_jpeg));
     if (!image.geometry) continue;
     geometry_[previews_.size() - 1] = std::make_unique<const ImageGeometry>(std::move(*image.geometry));
@@ -55,6 +59,7 @@ FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, 
   // A map of an older version has no such table.
   if (stored_.geometry_count > 0)
     geometry_rows_.emplace(database_, std::string(map_rows::kSelectGeometry) + kOfOneImage);
+  if (stored_.vlad_bytes > 0) vlad_rows_.emplace(database_, std::string(map_rows::kSelectVlad) + kOfOneImage);
 }
 
 std::shared_ptr<const LocalFeatures> FileFeatureStore::local(std::size_t image) const {
@@ -69,6 +74,15 @@ std::shared_ptr<const GlobalFeatures> FileFeatureStore::global(std::size_t image
   return get<GlobalFeatures>(keyOf(image, kGlobal), [&] {
     return read(image, global_rows_, "global features",
                 [&](const sqlite::Statement& row) { return map_rows::globalOf(row, stored_.seeds[image]); });
+  });
+}
+
+std::shared_ptr<const VladDescriptor> FileFeatureStore::vlad(std::size_t image) const {
+  return get<VladDescriptor>(keyOf(image, kVlad), [&] {
+    if (!vlad_rows_) return VladDescriptor();
+    return read(image, *vlad_rows_, "VLAD", [&](const sqlite::Statement& row) {
+      return map_rows::vladOf(row, stored_.seeds[image], stored_.vlad_bytes);
+    });
   });
 }
 

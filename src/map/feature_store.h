@@ -18,6 +18,7 @@
 #include "visual_localization/features/local_feature_kind.h"
 #include "visual_localization/features/local_features.h"
 #include "visual_localization/features/sift.h"
+#include "visual_localization/features/vlad.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/training_map.h"
 
@@ -32,6 +33,8 @@ class FeatureStore {
   virtual std::shared_ptr<const LocalFeatures> local(std::size_t image) const = 0;
   /// Global features of a training image; never null.
   virtual std::shared_ptr<const GlobalFeatures> global(std::size_t image) const = 0;
+  /// VLAD of a training image; never null, empty in a map without a vocabulary.
+  virtual std::shared_ptr<const VladDescriptor> vlad(std::size_t image) const = 0;
   /// Small grey JPEG for people; may be empty.
   virtual std::vector<std::uint8_t> preview(std::size_t image) const = 0;
   /// Camera's pose and landmarks; null when there are none.
@@ -51,6 +54,7 @@ class MemoryFeatureStore final : public FeatureStore {
 
   std::shared_ptr<const LocalFeatures> local(std::size_t image) const override { return unowned(local_[image]); }
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override { return unowned(global_[image]); }
+  std::shared_ptr<const VladDescriptor> vlad(std::size_t image) const override { return unowned(vlads_[image]); }
   std::vector<std::uint8_t> preview(std::size_t image) const override { return previews_[image]; }
   std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override {
     return geometry_[image] ? unowned(*geometry_[image]) : nullptr;
@@ -67,6 +71,7 @@ class MemoryFeatureStore final : public FeatureStore {
 
   std::vector<LocalFeatures> local_;
   std::vector<GlobalFeatures> global_;
+  std::vector<VladDescriptor> vlads_;
   std::vector<std::vector<std::uint8_t>> previews_;
   std::vector<std::unique_ptr<const ImageGeometry>> geometry_;  ///< null where there is none
   std::size_t geometry_count_ = 0;
@@ -126,6 +131,7 @@ struct StoredRows {
   std::vector<std::uint32_t> seeds;                                         ///< of its checksums: map_schema::rowSeed()
   std::size_t geometry_count = 0;                                           ///< images that have one
   std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>();  ///< of the local features
+  std::size_t vlad_bytes = 0;                                               ///< of each image; 0: no vocabulary
 };
 
 /// Reads what an image looked like from the map's file when it is first needed, verifies it, and keeps what was used
@@ -142,6 +148,7 @@ class FileFeatureStore final : public FeatureStore {
 
   std::shared_ptr<const LocalFeatures> local(std::size_t image) const override;
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override;
+  std::shared_ptr<const VladDescriptor> vlad(std::size_t image) const override;
   std::vector<std::uint8_t> preview(std::size_t image) const override;
   std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override;
   std::size_t geometryCount() const override { return stored_.geometry_count; }
@@ -167,6 +174,7 @@ class FileFeatureStore final : public FeatureStore {
   mutable sqlite::Statement global_rows_;
   mutable sqlite::Statement preview_rows_;
   mutable std::optional<sqlite::Statement> geometry_rows_;  ///< none where there is nothing to read
+  mutable std::optional<sqlite::Statement> vlad_rows_;      ///< likewise
   mutable bool warned_ = false;
 
   mutable std::mutex keeping_;  ///< held while the cache is touched, never while the file is read

@@ -226,10 +226,12 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
     }
   }
   const PruningNeighbours neighbours(*unpruned);
+  learnVocabulary(*unpruned, neighbours);
   report_.features_kept = 0;
   const auto pruned = [&](std::size_t i, TrainingImage& image) {
     prune(i, *unpruned, neighbours, image);
     report_.features_kept += image.local.size();
+    if (header_.vocabulary) image.vlad = header_.vocabulary->describe(image.local);
     if (progress) progress(i + 1, unpruned->size());
   };
   report_.images_thinned += writeThinned(*unpruned, header_.sessions, std::move(geometries), config_, pruned, sink);
@@ -264,6 +266,17 @@ void MapBuilder::prune(std::size_t i, const TrainingMap& unpruned, const Pruning
   const auto neighbours = neighboursOf(i, neighbours_of, unpruned);
   if (neighbours.empty()) return;
   keepFeatures(seenIn(image.local, pointersTo(neighbours), config_.match.max_angle_ratio), image);
+}
+
+void MapBuilder::learnVocabulary(const TrainingMap& unpruned, const PruningNeighbours& neighbours) {
+  const auto features = [&](std::size_t i) {
+    if (!config_.prune) return unpruned.local(i);
+    TrainingImage image;
+    image.local = *unpruned.local(i);
+    prune(i, unpruned, neighbours, image);
+    return std::shared_ptr<const LocalFeatures>(std::make_shared<LocalFeatures>(std::move(image.local)));
+  };
+  header_.vocabulary = VladVocabulary::learn(unpruned.size(), features, header_.image_size);
 }
 
 std::shared_ptr<const TrainingMap> MapBuilder::build(const Progress& progress) {

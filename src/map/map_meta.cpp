@@ -22,6 +22,7 @@ constexpr const char* kKind = "features/kind";
 constexpr const char* kDimension = "features/dimension";  ///< of a descriptor
 constexpr double kLargestBudget = 1e9;                    ///< metres or seconds
 constexpr const char* kGeometryCount = "geometry/images";
+constexpr const char* kVocabulary = "vocabulary";
 constexpr const char* kHistory = "history/";  ///< before the number of the edit
 
 /// Removes `key` from `meta` and returns its value.
@@ -241,6 +242,19 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
   return sessions;
 }
 
+std::shared_ptr<const VladVocabulary> takeVocabulary(ParameterValues& meta, const MapHeader& header,
+                                                     const std::vector<std::uint8_t>& stored) {
+  if ((meta.count(kVocabulary) == 0) != stored.empty()) {
+    throw std::runtime_error("the vocabulary is missing or unexpected");
+  }
+  if (stored.empty()) return nullptr;
+  const sqlite::Bytes bytes{stored.data(), stored.size()};
+  if (take<std::int64_t>(meta, kVocabulary) != crc32Of(bytes)) {
+    throw std::runtime_error("the vocabulary does not agree with its checksum");
+  }
+  return unpackVocabulary(bytes, header.kind->form().dimension, header.image_size);
+}
+
 std::vector<std::string> takeHistory(ParameterValues& meta) {
   std::vector<std::string> history;
   for (std::string key = kHistory + std::string("0"); meta.count(key) != 0;
@@ -275,6 +289,10 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
   meta["image/height_px"] = std::int64_t{header.image_size.height};
   meta["package_version"] = std::string(VISUAL_LOCALIZATION_VERSION);
   meta[kGeometryCount] = static_cast<std::int64_t>(geometry_count);
+  if (header.vocabulary) {
+    const std::vector<std::uint8_t> learnt = packVocabulary(*header.vocabulary);
+    meta[kVocabulary] = crc32Of({learnt.data(), learnt.size()});
+  }
   for (std::size_t i = 0; i < header.history.size(); ++i) meta[kHistory + std::to_string(i)] = header.history[i];
   requireSessions(header.sessions.size());
   std::set<std::vector<std::uint8_t>> masks;
@@ -307,7 +325,8 @@ std::size_t takeGeometryCount(ParameterValues& meta, int version) {
                            " is not in [0, " + std::to_string(kMaxImages) + "]");
 }
 
-MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
+MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks,
+                   const std::vector<std::uint8_t>& vocabulary) {
   MapHeader header;
   header.datum.latitude_deg = take<double>(meta, "datum/latitude_deg");
   header.datum.longitude_deg = take<double>(meta, "datum/longitude_deg");
@@ -316,6 +335,7 @@ MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks) {
   take<std::string>(meta, "package_version");
   header.kind = takeKind(meta, version);
   header.sessions = takeSessions(meta, version, header.image_size, masks);
+  if (version >= kSinceVlad) header.vocabulary = takeVocabulary(meta, header, vocabulary);
   if (version >= kSinceHistory) header.history = takeHistory(meta);
   if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");
   return header;

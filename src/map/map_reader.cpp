@@ -138,6 +138,18 @@ map_schema::MaskBits readMasks(const map_rows::MapDatabase& map, map_rows::Budge
   return masks;
 }
 
+/// As it is stored; empty: there is none.
+std::vector<std::uint8_t> readVocabulary(const map_rows::MapDatabase& map, map_rows::Budget& budget) {
+  if (map.version < map_schema::kSinceVlad) return {};
+  Statement row(map.database, "SELECT id, learnt FROM vocabulary");
+  if (!row.step()) return {};
+  const sqlite::Bytes learnt = row.blob(1);
+  budget.spend(learnt.size);
+  std::vector<std::uint8_t> bytes(learnt.data, learnt.data + learnt.size);
+  if (row.integer(0) != 0 || bytes.empty() || row.step()) throw Refusal("is damaged: its vocabulary is not one");
+  return bytes;
+}
+
 Opened readPosesAndHeader(const map_rows::MapDatabase& map, std::int64_t file_size) {
   map_rows::Budget budget(file_size);
   ParameterValues meta = readMeta(map.database, budget);
@@ -145,8 +157,9 @@ Opened readPosesAndHeader(const map_rows::MapDatabase& map, std::int64_t file_si
   map_schema::Checksum checksum;
   ParameterValues of_header = meta;
   const std::size_t geometry_count = map_schema::takeGeometryCount(of_header, map.version);
-  Opened opened{
-      map_schema::toHeader(std::move(of_header), map.version, readMasks(map, budget)), {}, {}, geometry_count, budget};
+  MapHeader header =
+      map_schema::toHeader(std::move(of_header), map.version, readMasks(map, budget), readVocabulary(map, budget));
+  Opened opened{std::move(header), {}, {}, geometry_count, budget};
   opened.poses = readPoses(map.database, file_size, opened.header.sessions.size(), checksum);
   opened.row_seeds = map_schema::rowSeeds(opened.poses, map.version);
   checksum.add(meta);
@@ -199,8 +212,33 @@ std::uint64_t storedBytes(const TrainingImage& image, const LocalFeatureKind& ki
   const std::size_t of_geometry =
       image.geometry ? map_schema::kPoseBytes + image.geometry->landmarks.size() * landmark_bytes : 0;
   return of_geometry + image.local.size() * (map_schema::kKeypointBytes + kind.stored_bytes()) +
-         2 * map_schema::kHistogramBytes + image.preview_jpeg.size();
+         2 * map_schema::kHistogramBytes + image.preview_jpeg.size() + image.vlad.size();
 }
+
+/// The rows of VLAD, while the images pass by in their order.
+class VladRows {
+ public:
+  /// `bytes`: of each row; 0: there are none.
+  VladRows(const map_rows::MapDatabase& map, std::size_t bytes) : bytes_(bytes) {
+    if (map.version < map_schema::kSinceVlad) return;
+    row_.emplace(map.database, map_rows::kSelectVlad + std::string(" ORDER BY image"));
+  }
+
+  VladDescriptor of(std::size_t image, std::int64_t seed) {
+    if (bytes_ == 0) return {};
+    stepTo(image, *row_, "bytes of the VLAD");
+    return map_rows::vladOf(*row_, seed, bytes_);
+  }
+
+  /// After the last image.
+  void requireEnd() {
+    if (row_ && row_->step()) throw Refusal("is damaged: it has VLAD without an image or a vocabulary");
+  }
+
+ private:
+  std::size_t bytes_;
+  std::optional<Statement> row_;
+};
 
 /// Reads and verifies what all images looked like, one after the other.
 void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
@@ -212,6 +250,7 @@ void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::f
   Statement global(database, map_rows::kSelectGlobal + in_order);
   Statement preview(database, map_rows::kSelectPreview + in_order);
   GeometryRows geometry(map);
+  VladRows vlads(map, opened.header.vocabulary ? opened.header.vocabulary->bytes() : 0);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     stepTo(i, local, "features");
     stepTo(i, global, "global features");
@@ -221,7 +260,8 @@ void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::f
                         map_rows::localOf(local, seed, poses.feature_counts[i], kind),
                         map_rows::globalOf(global, seed),
                         map_rows::previewOf(preview, seed),
-                        geometry.of(i, seed, poses.feature_counts[i])};
+                        geometry.of(i, seed, poses.feature_counts[i]),
+                        vlads.of(i, seed)};
     opened.budget.spend(storedBytes(image, kind));
     use(std::move(image));
   }
@@ -229,6 +269,7 @@ void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::f
     throw Refusal("is damaged: it has features or previews without an image");
   }
   geometry.requireEnd(opened.geometry_count);
+  vlads.requireEnd();
 }
 
 std::shared_ptr<const TrainingMap> readWhole(const map_rows::MapDatabase& map, Opened opened) {
@@ -267,8 +308,8 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
   return withMapFile(path, [&](map_rows::MapDatabase&& map, std::int64_t size) {
     Opened opened = readPosesAndHeader(map, size);
     if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(map, std::move(opened));
-    StoredRows rows{opened.poses.feature_counts, std::move(opened.row_seeds), opened.geometry_count,
-                    opened.header.kind};
+    StoredRows rows{opened.poses.feature_counts, std::move(opened.row_seeds), opened.geometry_count, opened.header.kind,
+                    opened.header.vocabulary ? opened.header.vocabulary->bytes() : 0};
     auto store = std::make_unique<FileFeatureStore>(std::move(map.database), path, std::move(rows), loading.cache_bytes,
                                                     loading.warn);
     return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.poses), std::move(store));

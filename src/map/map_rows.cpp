@@ -151,6 +151,18 @@ GlobalFeatures globalOf(const Statement& row, std::int64_t seed) {
   return features;
 }
 
+VladDescriptor vladOf(const Statement& row, std::int64_t seed, std::size_t bytes) {
+  const Bytes descriptor = row.blob(1);
+  requireChecksum(map_schema::rowChecksum(seed, {descriptor}), row, 2, "bytes of the VLAD");
+  if (descriptor.size != bytes) {
+    throw Refusal("is damaged: the VLAD of " + imageName(row.integer(0)) + " has " + std::to_string(descriptor.size) +
+                  " bytes instead of " + std::to_string(bytes));
+  }
+  VladDescriptor vlad(bytes);
+  std::memcpy(vlad.data(), descriptor.data, bytes);
+  return vlad;
+}
+
 std::vector<std::uint8_t> previewOf(const Statement& row, std::int64_t seed) {
   const Bytes jpeg = row.blob(1);
   requireChecksum(map_schema::rowChecksum(seed, {jpeg}), row, 2, "bytes of the preview");

@@ -11,6 +11,7 @@
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/local_feature_kind.h"
 #include "visual_localization/features/local_features.h"
+#include "visual_localization/features/vlad.h"
 #include "visual_localization/geometry/image_geometry.h"
 
 /// The parts of reading a map file that the whole map and a single image share.
@@ -53,6 +54,8 @@ class Budget {
 constexpr const char* kSelectLocal = "SELECT image, keypoints, descriptors, crc32 FROM features";
 constexpr const char* kSelectGlobal = "SELECT image, wgoh, wgii, crc32 FROM globals";
 constexpr const char* kSelectPreview = "SELECT image, jpeg, crc32 FROM previews";
+/// Since kSinceVlad; without a vocabulary there is no row.
+constexpr const char* kSelectVlad = "SELECT image, descriptor, crc32 FROM vlads";
 /// Since kSinceLandmarks; an image without geometry has no row.
 constexpr const char* kSelectGeometry = "SELECT image, pose, points, crc32 FROM landmarks";
 
@@ -61,6 +64,8 @@ constexpr const char* kSelectGeometry = "SELECT image, pose, points, crc32 FROM 
 /// Throws Refusal, too, when they are not `count`: what the table of images says, and others rely on.
 LocalFeatures localOf(const sqlite::Statement& row, std::int64_t seed, std::size_t count, const LocalFeatureKind& kind);
 GlobalFeatures globalOf(const sqlite::Statement& row, std::int64_t seed);
+/// `bytes`: of each one, by the vocabulary.
+VladDescriptor vladOf(const sqlite::Statement& row, std::int64_t seed, std::size_t bytes);
 std::vector<std::uint8_t> previewOf(const sqlite::Statement& row, std::int64_t seed);
 /// `feature_count`: SIFT features of the image.
 ImageGeometry geometryOf(const sqlite::Statement& row, std::int64_t seed, std::size_t feature_count);

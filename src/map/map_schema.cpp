@@ -20,7 +20,7 @@ namespace {
 static_assert(kPoseBytes + kMaxFeaturesPerImage * landmarkBytes(kMaxFeaturesPerImage) <= kMaxRowBytes);
 
 /// Of every version, in order of name.
-constexpr std::array<Table, 7> kTables{{
+constexpr std::array<Table, 9> kTables{{
     {"features",
      "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL, "
      "crc32 INTEGER NOT NULL)"},
@@ -36,6 +36,9 @@ constexpr std::array<Table, 7> kTables{{
     {"masks", "CREATE TABLE masks(session INTEGER PRIMARY KEY, bits BLOB NOT NULL)", kSinceCameras},
     {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
     {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
+    {"vlads", "CREATE TABLE vlads(image INTEGER PRIMARY KEY, descriptor BLOB NOT NULL, crc32 INTEGER NOT NULL)",
+     kSinceVlad},
+    {"vocabulary", "CREATE TABLE vocabulary(id INTEGER PRIMARY KEY, learnt BLOB NOT NULL)", kSinceVlad},
 }};
 
 std::uint64_t bitsOf(double value) {
@@ -210,6 +213,69 @@ GlobalFeatures::Histogram unpackHistogram(sqlite::Bytes bytes) {
     }
   }
   return histogram;
+}
+
+namespace {
+
+constexpr std::size_t kVocabularyHead = 4;  ///< bytes: numbers of components and axes
+
+template <class Table>
+void packFloats(const Table& table, std::vector<std::uint8_t>& bytes) {
+  const std::size_t begin = bytes.size();
+  bytes.resize(begin + static_cast<std::size_t>(table.size()) * sizeof(float));
+  for (Eigen::Index i = 0; i < table.size(); ++i) {
+    putReal<float>(table.data()[i], &bytes[begin + static_cast<std::size_t>(i) * sizeof(float)]);
+  }
+}
+
+template <class Table>
+const std::uint8_t* unpackFloats(const std::uint8_t* from, Table& table) {
+  for (Eigen::Index i = 0; i < table.size(); ++i) table.data()[i] = getReal<float>(from + sizeof(float) * i);
+  return from + sizeof(float) * table.size();
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> packVocabulary(const VladVocabulary& vocabulary) {
+  const VladVocabulary::Tables& tables = vocabulary.tables();
+  std::vector<std::uint8_t> bytes(kVocabularyHead);
+  putLittleEndian(static_cast<std::uint16_t>(tables.components.cols()), bytes.data());
+  putLittleEndian(static_cast<std::uint16_t>(tables.axes.cols()), bytes.data() + 2);
+  packFloats(tables.words, bytes);
+  packFloats(tables.components, bytes);
+  packFloats(tables.mean, bytes);
+  packFloats(tables.scales, bytes);
+  const auto* axes = reinterpret_cast<const std::uint8_t*>(tables.axes.data());
+  bytes.insert(bytes.end(), axes, axes + tables.axes.size());
+  return bytes;
+}
+
+std::shared_ptr<const VladVocabulary> unpackVocabulary(sqlite::Bytes bytes, std::size_t dimension,
+                                                       cv::Size image_size) {
+  if (bytes.size < kVocabularyHead) throw std::runtime_error("the vocabulary is incomplete");
+  const Eigen::Index components = getLittleEndian<std::uint16_t>(bytes.data);
+  const Eigen::Index axes = getLittleEndian<std::uint16_t>(bytes.data + 2);
+  const auto rows = static_cast<Eigen::Index>(dimension);
+  const Eigen::Index sums = VladVocabulary::kBlocks * components;
+  const Eigen::Index floats = rows * (VladVocabulary::kWords + components) + sums + axes;
+  const auto expected =
+      kVocabularyHead + sizeof(float) * static_cast<std::size_t>(floats) + static_cast<std::size_t>(sums * axes);
+  if (bytes.size != expected) {
+    throw std::runtime_error("the vocabulary has " + std::to_string(bytes.size) + " bytes instead of " +
+                             std::to_string(expected));
+  }
+  VladVocabulary::Tables tables;
+  tables.words.resize(rows, VladVocabulary::kWords);
+  tables.components.resize(rows, components);
+  tables.mean.resize(sums);
+  tables.scales.resize(axes);
+  tables.axes.resize(sums, axes);
+  const std::uint8_t* from = unpackFloats(bytes.data + kVocabularyHead, tables.words);
+  from = unpackFloats(from, tables.components);
+  from = unpackFloats(from, tables.mean);
+  from = unpackFloats(from, tables.scales);
+  std::memcpy(tables.axes.data(), from, static_cast<std::size_t>(tables.axes.size()));
+  return std::make_shared<const VladVocabulary>(std::move(tables), image_size);
 }
 
 namespace {

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <initializer_list>
 #include <map>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "map/sqlite.h"
 #include "visual_localization/features/global_features.h"
 #include "visual_localization/features/local_features.h"
+#include "visual_localization/features/vlad.h"
 #include "visual_localization/geometry/image_geometry.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/map/training_map.h"
@@ -49,6 +51,8 @@ constexpr int kSinceUpright = 7;
 constexpr int kSinceKinds = 8;
 /// From this version on a session says how far off its positions may be.
 constexpr int kSinceFixes = 8;
+/// From this version on a map may have a vocabulary, and its images a VLAD.
+constexpr int kSinceVlad = 9;
 /// From this version on a session's camera may differ from the calibration that was published for it.
 constexpr int kSincePublished = 7;
 
@@ -120,6 +124,13 @@ std::vector<std::uint8_t> packHistogram(const GlobalFeatures::Histogram& histogr
 /// Inverse of packHistogram(). Throws std::runtime_error when the size is wrong or a value is not finite or negative.
 GlobalFeatures::Histogram unpackHistogram(sqlite::Bytes bytes);
 
+/// What a vocabulary has learnt: its numbers of components and axes (16 bits each), words, components, mean and scales
+/// (32-bit floats) and axes (bytes), all little-endian and column by column.
+std::vector<std::uint8_t> packVocabulary(const VladVocabulary& vocabulary);
+/// Inverse of packVocabulary() for local features of this dimension. Throws std::runtime_error or
+/// std::invalid_argument when a size is wrong or a number not finite.
+std::shared_ptr<const VladVocabulary> unpackVocabulary(sqlite::Bytes bytes, std::size_t dimension, cv::Size image_size);
+
 /// The header as rows of the table `meta`, without the checksum. Of a mask they hold the checksum of its bits, of the
 /// table of landmarks the number of its rows: to count them all of it would have to be read.
 ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count);
@@ -129,9 +140,10 @@ std::size_t takeGeometryCount(ParameterValues& meta, int version);
 /// Masks as they are stored, by the number of their session.
 using MaskBits = std::map<std::int64_t, std::vector<std::uint8_t>>;
 /// Inverse of toMeta() for a map of this version, but for what takeGeometryCount() takes. Throws std::runtime_error
-/// when a value or a mask is missing, unknown, of the wrong type or out of range, and when a mask does not agree with
-/// its checksum.
-MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks);
+/// when a value, a mask or the vocabulary is missing, unknown, of the wrong type or out of range, and when a mask or
+/// the vocabulary does not agree with its checksum. `vocabulary`: as it is stored, empty without one.
+MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks,
+                   const std::vector<std::uint8_t>& vocabulary);
 
 // Geometry as bytes, in one order on every machine.
 

@@ -66,6 +66,8 @@ class MapWriter::Tables {
     requireStorable(image);
     poses_.add(image, image.local.size());
     looks_->write(map_schema::rowOf(poses_, poses_.size() - 1), image, *kind_);
+    if (poses_.size() == 1) vlad_bytes_ = image.vlad.size();
+    if (image.vlad.size() != vlad_bytes_) throw sqlite::Error("its images have VLAD of different vocabularies");
     if (image.geometry) ++geometry_count_;
   }
 
@@ -74,10 +76,14 @@ class MapWriter::Tables {
     if (header.kind->name() != kind_->name())
       throw sqlite::Error("its local features are not '" + header.kind->name() + "'");
     if (const auto reason = whyTooLarge(header.image_size)) throw sqlite::Error("its images are too large: " + *reason);
+    if (vlad_bytes_ != (header.vocabulary ? header.vocabulary->bytes() : 0)) {
+      throw sqlite::Error("the VLAD of its images is not of its vocabulary");
+    }
     // Behind each other in the file, because they are read together when the map is opened.
     for (std::size_t i = 0; i < poses_.size(); ++i) writePose(i);
     writeMeta(metaOf(header));
     writeMasks(header.sessions);
+    if (header.vocabulary) writeVocabulary(*header.vocabulary);
     looks_.reset();
     pose_row_.reset();
     database_.execute("COMMIT");
@@ -92,7 +98,8 @@ class MapWriter::Tables {
         : features_(database, "INSERT INTO features VALUES(?,?,?,?)"),
           globals_(database, "INSERT INTO globals VALUES(?,?,?,?)"),
           previews_(database, "INSERT INTO previews VALUES(?,?,?)"),
-          landmarks_(database, "INSERT INTO landmarks VALUES(?,?,?,?)") {}
+          landmarks_(database, "INSERT INTO landmarks VALUES(?,?,?,?)"),
+          vlads_(database, "INSERT INTO vlads VALUES(?,?,?)") {}
 
     void write(const ImageRow& row, const TrainingImage& image, const LocalFeatureKind& kind) {
       const std::optional<map_schema::PackedGeometry> geometry = packedGeometry(row.id, image);
@@ -103,6 +110,9 @@ class MapWriter::Tables {
       writeRow(features_, row, {bytesOf(keypoints), bytesOf(descriptors)});
       writeRow(globals_, row, {bytesOf(wgoh), bytesOf(wgii)});
       writeRow(previews_, row, {bytesOf(image.preview_jpeg)});
+      if (!image.vlad.empty()) {
+        writeRow(vlads_, row, {{reinterpret_cast<const std::uint8_t*>(image.vlad.data()), image.vlad.size()}});
+      }
       if (geometry) writeRow(landmarks_, row, {bytesOf(geometry->pose), bytesOf(geometry->points)});
     }
 
@@ -119,6 +129,7 @@ class MapWriter::Tables {
     Statement globals_;
     Statement previews_;
     Statement landmarks_;
+    Statement vlads_;
   };
 
   void requireStorable(const TrainingImage& image) const {
@@ -174,12 +185,20 @@ class MapWriter::Tables {
     }
   }
 
+  void writeVocabulary(const VladVocabulary& vocabulary) {
+    const std::vector<std::uint8_t> learnt = map_schema::packVocabulary(vocabulary);
+    Statement row(database_, "INSERT INTO vocabulary VALUES(0,?)");
+    row.bind(0, bytesOf(learnt));
+    row.run();
+  }
+
   Kind kind_;
   sqlite::Database database_;
   std::unique_ptr<Looks> looks_;
   std::unique_ptr<Statement> pose_row_;
   TrainingPoses poses_;
   std::size_t geometry_count_ = 0;
+  std::size_t vlad_bytes_ = 0;  ///< of each image
   map_schema::Checksum checksum_;
 };
 

@@ -68,8 +68,13 @@ TrainingPoses checked(const MapHeader& header, TrainingPoses poses) {
   return poses;
 }
 
-const std::vector<TrainingImage>& checked(const std::vector<TrainingImage>& images) {
+const std::vector<TrainingImage>& checked(const MapHeader& header, const std::vector<TrainingImage>& images) {
+  const std::size_t vlad_bytes = header.vocabulary ? header.vocabulary->bytes() : 0;
   for (std::size_t i = 0; i < images.size(); ++i) {
+    if (images[i].vlad.size() != vlad_bytes) {
+      refuse(i, "its VLAD has " + std::to_string(images[i].vlad.size()) + " bytes instead of " +
+                    std::to_string(vlad_bytes));
+    }
     if (!images[i].geometry) continue;
     try {
       requireUsable(*images[i].geometry, images[i].local.size());
@@ -117,7 +122,7 @@ TrainingPoses posesOf(const std::vector<TrainingImage>& images) {
 TrainingMap::TrainingMap(MapHeader header, std::vector<TrainingImage> images)
     : header_(std::move(header)),
       frame_(header_.datum),
-      poses_(checked(header_, posesOf(checked(images)))),
+      poses_(checked(header_, posesOf(checked(header_, images)))),
       store_(std::make_unique<MemoryFeatureStore>(std::move(images))),
       area_(boundingBox(poses_.positions_m)),
       index_(std::make_unique<const PositionIndex>(poses_.positions_m)) {}
@@ -136,6 +141,8 @@ std::shared_ptr<const LocalFeatures> TrainingMap::local(std::size_t i) const { r
 
 std::shared_ptr<const GlobalFeatures> TrainingMap::global(std::size_t i) const { return store_->global(i); }
 
+std::shared_ptr<const VladDescriptor> TrainingMap::vlad(std::size_t i) const { return store_->vlad(i); }
+
 std::vector<std::uint8_t> TrainingMap::preview(std::size_t i) const { return store_->preview(i); }
 
 std::shared_ptr<const ImageGeometry> TrainingMap::geometry(std::size_t i) const { return store_->geometry(i); }
@@ -152,6 +159,7 @@ TrainingImage TrainingMap::image(std::size_t i) const {
   const TrainingPose taken_at = pose(i);  // GCC 9 and 10 crash at an unnamed one
   TrainingImage image{taken_at, *store_->local(i), *store_->global(i), store_->preview(i)};
   const std::shared_ptr<const ImageGeometry> geometry = store_->geometry(i);
+  image.vlad = *store_->vlad(i);
   // Features that cannot be read count as none, and landmarks belong to features.
   if (geometry && image.local.size() == featureCount(i)) image.geometry = *geometry;
   return image;

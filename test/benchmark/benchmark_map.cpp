@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,8 +59,14 @@ class StreetImage final : public test::FakeImage {
   void show(std::size_t at) {
     sift_ = streets_.view(at, 1);
     global_ = streets_.global(at);
+    vlad_.reset();
   }
   Score compare(FeatureKind kind, std::size_t i) override {
+    if (kind == FeatureKind::kVlad) {
+      if (!vlad_) vlad_ = map_.header().vocabulary->describe(sift_);
+      const double similarity = vladSimilarity(*vlad_, *map_.vlad(i));
+      return {similarity, similarity};
+    }
     return kind == FeatureKind::kLocal ? by_sift_.compare(sift_, *map_.local(i))
                                        : by_global_.compare(global_, *map_.global(i));
   }
@@ -70,6 +77,7 @@ class StreetImage final : public test::FakeImage {
   const TrainingMap& map_;
   LocalFeatures sift_;
   GlobalFeatures global_;
+  std::optional<VladDescriptor> vlad_;
   LocalSimilarity by_sift_{MatchConfig(), SimilarityConfig()};
   GlobalSimilarity by_global_{SimilarityConfig()};
 };

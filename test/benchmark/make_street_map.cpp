@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -41,12 +42,17 @@ int main(int argc, char** argv) {
     const benchmark::StreetMap streets(images, features, seed, landmarks);
     const std::size_t begin = images * part / parts;
     const std::size_t end = part + 1 >= parts ? images : std::min(images, images * (part + 1) / parts + kOverlap);
+    MapHeader header = landmarks ? benchmark::StreetMap::locatedHeader("streets_" + std::to_string(part))
+                                 : benchmark::StreetMap::header();
+    const auto view = [&](std::size_t i) { return std::make_shared<LocalFeatures>(streets.view(begin + i, 0)); };
+    header.vocabulary = VladVocabulary::learn(end - begin, view, header.image_size);
     MapWriter writer(output);
     for (std::size_t i = begin; i < end; ++i) {
-      writer.append(landmarks ? streets.locatedImage(i, part + 1) : streets.image(i));
+      TrainingImage image = landmarks ? streets.locatedImage(i, part + 1) : streets.image(i);
+      if (header.vocabulary) image.vlad = header.vocabulary->describe(image.local);
+      writer.append(image);
     }
-    writer.finish(landmarks ? benchmark::StreetMap::locatedHeader("streets_" + std::to_string(part))
-                            : benchmark::StreetMap::header());
+    writer.finish(header);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const auto written = static_cast<double>(end - begin);
     std::printf("%.0f images in %.1f s: %.0f images/s\n", written, seconds, written / seconds);

@@ -67,6 +67,8 @@ TEST_F(MapMerger, TheFirstMapStaysAndTheOthersLieBesideIt) {
     EXPECT_EQ(map->pose(beside).session, 1);
     EXPECT_EQ(map->pose(beside).stamp_ns, second->pose(i).stamp_ns);
     EXPECT_EQ(map->local(beside)->bytes(), second->local(i)->bytes());
+    EXPECT_EQ(*map->vlad(i), map->header().vocabulary->describe(*first->local(i)));
+    EXPECT_EQ(*map->vlad(beside), map->header().vocabulary->describe(*second->local(i)));
     EXPECT_NEAR((map->position_m(beside) - map->position_m(i)).norm(), 0.2, 0.15) << "driven 0.2 m beside";
     EXPECT_EQ(map->position_m(beside), map->geometry(beside)->camera.position_m.head<2>());
   }

@@ -36,6 +36,8 @@ TEST_F(MapSelection, KeepsWhatIsChosenToTheLastBit) {
     EXPECT_EQ(some->pose(k).session, map_.pose(i).session);
     EXPECT_EQ(some->position_m(k), map_.position_m(i));
     EXPECT_EQ(some->local(k)->bytes(), map_.local(i)->bytes());
+    ASSERT_TRUE(some->header().vocabulary);
+    EXPECT_EQ(*some->vlad(k), some->header().vocabulary->describe(*map_.local(i)));
     EXPECT_TRUE(test::same(some->image(k).geometry, map_.image(i).geometry));
     ++k;
   }

@@ -275,6 +275,12 @@ TEST_F(LocalizerTest, ALiveImageComparesByTheKindThatIsAskedFor) {
   EXPECT_GT(by_sift.matches, 50U);
   EXPECT_GT(by_sift.matches, 10 * image.compare(FeatureKind::kLocal, 50).matches);
   EXPECT_GT(image.report().match_ms, global_ms);
+
+  const Score by_vlad = image.compare(FeatureKind::kVlad, 20);
+  EXPECT_GT(by_vlad.similarity, 0.9);
+  EXPECT_LT(image.compare(FeatureKind::kVlad, 50).similarity, 0.5 * by_vlad.similarity);
+  image.set(1, viewAt(30.0));
+  EXPECT_LT(image.compare(FeatureKind::kVlad, 20).similarity, 0.5 * by_vlad.similarity) << "of the image before";
 }
 
 TEST_F(LocalizerTest, TheCameraIsTheMapsUntilAnotherOneIsGiven) {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "test/support/example_map.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/scores.h"
@@ -110,6 +111,36 @@ TEST(MapSweep, ComparesOnceAnImageAndOnlyWhenAsked) {
   sweep.startImage(weigh);
   sweep.drawMany(50, 5);
   EXPECT_EQ(sweep.compared.size(), 10U);
+}
+
+/// The kinds of features that mostSimilar() compares by.
+std::set<FeatureKind> askedBy(const TrainingMap& map, bool by_vlad, FeatureKind particles) {
+  std::set<FeatureKind> kinds;
+  Scores scores(map.size());
+  scores.startImage(particles, [&kinds](FeatureKind kind, std::size_t image) {
+    kinds.insert(kind);
+    const double similarity = kind == FeatureKind::kVlad && image == 7 ? 0.9 : 0.1;
+    return Score{similarity, similarity};
+  });
+  MapSweep sweep(map, 100, kAll, by_vlad);
+  sweep.startImage();
+  const std::vector<std::size_t> most = sweep.mostSimilar(scores, 3);
+  EXPECT_EQ(most.size(), 3U);
+  EXPECT_EQ(scores.swept(), map.size());
+  EXPECT_EQ(scores.comparisons(), 0U);
+  if (kinds.count(FeatureKind::kVlad) > 0) EXPECT_EQ(most.front(), 7U);
+  return kinds;
+}
+
+TEST(MapSweep, ProposesByVladWhereTheMapHasIt) {
+  const TrainingMap described = test::describedMap();
+  const TrainingMap plain(test::exampleHeader(), test::exampleImages(24));
+  const std::set<FeatureKind> vlad{FeatureKind::kVlad};
+  const std::set<FeatureKind> global{FeatureKind::kGlobal};
+  EXPECT_EQ(askedBy(described, true, FeatureKind::kLocal), vlad);
+  EXPECT_EQ(askedBy(described, false, FeatureKind::kLocal), global) << "nobody wants it";
+  EXPECT_EQ(askedBy(plain, true, FeatureKind::kLocal), global) << "the map has none";
+  EXPECT_EQ(askedBy(described, true, FeatureKind::kGlobal), global) << "it would need local features";
 }
 
 TEST(MapSweep, SeesAllOfAMapInMemoryWithTime) {

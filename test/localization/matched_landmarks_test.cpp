@@ -178,6 +178,7 @@ class HalfReadStore final : public FeatureStore {
     return std::make_shared<const LocalFeatures>(map_.local(image)->subset(first));
   }
   std::shared_ptr<const GlobalFeatures> global(std::size_t image) const override { return map_.global(image); }
+  std::shared_ptr<const VladDescriptor> vlad(std::size_t image) const override { return map_.vlad(image); }
   std::vector<std::uint8_t> preview(std::size_t image) const override { return map_.preview(image); }
   std::shared_ptr<const ImageGeometry> geometry(std::size_t image) const override { return map_.geometry(image); }
   std::size_t geometryCount() const override { return map_.geometryCount(); }

@@ -22,8 +22,8 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 }
 
 TEST_F(MapStore, NamesBothVersions) {
-  tamper("PRAGMA user_version = 9");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 9"), HasSubstr("versions 3 to 8")));
+  tamper("PRAGMA user_version = 10");
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 10"), HasSubstr("versions 3 to 9")));
 }
 
 TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
@@ -32,6 +32,10 @@ TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {
   tamper("DROP TABLE landmarks");
   EXPECT_THAT(refusal(path_), HasSubstr("unexpected table 'masks'"));
   tamper("DROP TABLE masks");
+  EXPECT_THAT(refusal(path_), HasSubstr("unexpected table 'vocabulary'"));
+  tamper("DROP TABLE vocabulary");
+  EXPECT_THAT(refusal(path_), HasSubstr("unexpected table 'vlads'"));
+  tamper("DROP TABLE vlads");
   tamper("DELETE FROM meta WHERE key LIKE 'features/%'");
   EXPECT_THAT(refusal(path_), HasSubstr("'geometry/images' is unknown"));
   tamper("DELETE FROM meta WHERE key = 'geometry/images'");

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "map/map_schema.h"
@@ -124,6 +126,16 @@ inline std::vector<TrainingImage> exampleImages(std::size_t count, std::size_t f
     if (i % 3 != 0) images[i].geometry = exampleGeometry(features, seed + static_cast<unsigned>(i));
   }
   return images;
+}
+
+/// Its images are random, and each is described by words of all.
+inline TrainingMap describedMap(std::size_t count = 24) {
+  MapHeader header = exampleHeader();
+  std::vector<TrainingImage> images = exampleImages(count, 30);
+  const auto features = [&](std::size_t i) { return std::make_shared<LocalFeatures>(images[i].local); };
+  header.vocabulary = VladVocabulary::learn(images.size(), features, header.image_size);
+  for (TrainingImage& image : images) image.vlad = header.vocabulary->describe(image.local);
+  return {std::move(header), std::move(images)};
 }
 
 }  // namespace visual_localization::test

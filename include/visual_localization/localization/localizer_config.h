@@ -32,6 +32,7 @@ struct LocalizerConfig : TrackerConfig {
   double min_position_std_m = 0.5;
   double min_yaw_std_rad = 0.1;
   int sweep_images = 20000;
+  std::string proposals = "vlad";
   MatchConfig match{MatchConfig().max_angle_ratio, "votes"};
   SimilarityConfig similarity;
   HybridConfig hybrid;

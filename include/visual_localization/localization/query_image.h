@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include <opencv2/core.hpp>
 
 #include "visual_localization/features/front_end.h"
 #include "visual_localization/features/local_features.h"
+#include "visual_localization/features/vlad.h"
 #include "visual_localization/localization/similarity.h"
 #include "visual_localization/map/training_map.h"
 
@@ -67,7 +69,8 @@ class LiveImage final : public QueryImage {
   FrontEnd front_end_;
   LocalSimilarity local_similarity_;
   GlobalSimilarity global_similarity_;
-  double match_ms_ = 0.0;  ///< without the extraction that comparisons bring about
+  std::optional<VladDescriptor> vlad_;  ///< of the image, once it was asked for
+  double match_ms_ = 0.0;               ///< without the extraction that comparisons bring about
 };
 
 }  // namespace visual_localization

@@ -20,7 +20,8 @@ class Scores {
  public:
   using Compare = std::function<Score(FeatureKind kind, std::size_t training_image)>;
 
-  explicit Scores(std::size_t training_images) : local_(training_images), global_(training_images) {}
+  explicit Scores(std::size_t training_images)
+      : local_(training_images), global_(training_images), vlad_(training_images) {}
 
   /// Forgets everything and takes scores from `compare` from now on. `kind`: what particles are compared by.
   void startImage(FeatureKind kind, Compare compare);
@@ -29,6 +30,8 @@ class Scores {
   Score operator[](std::size_t training_image);
   /// The score by global features, whatever particles are compared by.
   Score global(std::size_t training_image);
+  /// The score by VLAD, of a map with a vocabulary.
+  Score vlad(std::size_t training_image);
 
   /// A training image and how it compares.
   struct Compared {
@@ -43,7 +46,7 @@ class Scores {
   void count(const std::vector<std::size_t>& training_images);
   /// Distinct training images that particles were compared with, and those counted: the papers' measure of cost.
   std::size_t comparisons() const { return comparisons_ + counted_; }
-  /// Distinct training images compared beside these, by global features: see MapSweep.
+  /// Distinct training images compared beside these, by global features or VLAD: see MapSweep.
   std::size_t swept() const;
 
  private:
@@ -68,6 +71,7 @@ class Scores {
 
   Cache local_;
   Cache global_;
+  Cache vlad_;
   FeatureKind kind_ = FeatureKind::kLocal;
   Compare compare_;
   std::size_t comparisons_ = 0;
@@ -81,15 +85,17 @@ class Scores {
 class MapSweep {
  public:
   /// `map` must outlive it; `max_images` is positive. `max_kept`: see TrainingMap::globalsKept.
-  MapSweep(const TrainingMap& map, std::size_t max_images, std::size_t max_kept);
+  /// `by_vlad`: what proposals are made by, where the map has a vocabulary.
+  MapSweep(const TrainingMap& map, std::size_t max_images, std::size_t max_kept, bool by_vlad = false);
 
   /// Another number of images at most.
-  void configure(std::size_t max_images);
+  void configure(std::size_t max_images, bool by_vlad);
   /// Forgets what is known of the image before.
-  void startImage() { cumulated_.clear(); }
+  void startImage();
   /// Where a lost robot may be: a training image, in proportion to its score's weight; any when nothing has weight.
   std::size_t draw(Scores& scores, Random& random);
-  /// The `count` training images that look most alike, the best first.
+  /// The `count` training images that look most alike, the best first; by VLAD, or by global features where there is no
+  /// vocabulary or particles are compared by them.
   std::vector<std::size_t> mostSimilar(Scores& scores, std::size_t count);
   /// Best global similarity within `near_m` of `position_m`, as a share of the best in the whole map, in [0, 1]. One
   /// when nothing looks alike anywhere. A swarm that has settled at the wrong position compares only what is there,
@@ -97,15 +103,18 @@ class MapSweep {
   double ratio(Scores& scores, const Eigen::Vector2d& position_m, double near_m);
 
  private:
+  void begin();
   void sweep(Scores& scores);
   std::size_t imageAt(std::size_t i) const { return first_ + stride_ * i; }
 
   const TrainingMap& map_;
   std::size_t max_kept_;
+  bool by_vlad_ = false;
   std::size_t stride_ = 1;
   std::size_t offsets_ = 1;  ///< after this many images it begins with the same training image again
   std::size_t offset_ = 0;
   std::size_t first_ = 0;              ///< of the training images that are swept
+  bool has_begun_ = false;             ///< with the current image
   std::vector<double> cumulated_;      ///< weights up to and including each swept image; empty until needed
   std::vector<Neighbour> neighbours_;  ///< of the last position
 };

@@ -13,8 +13,8 @@
 
 namespace visual_localization {
 
-/// Which features images are compared by.
-enum class FeatureKind : std::uint8_t { kLocal = 0, kGlobal = 1 };
+/// Which features images are compared by. VLAD only proposes: see MapSweep::mostSimilar.
+enum class FeatureKind : std::uint8_t { kLocal = 0, kGlobal = 1, kVlad = 2 };
 
 /// How alike two images are, and on how much evidence.
 struct Score {

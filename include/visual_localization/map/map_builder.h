@@ -155,6 +155,7 @@ class MapBuilder {
   void calibrate(const TrainingMap& unpruned);
   void finish(const Sink& sink, const Progress& progress);
   void write(MapWriter& writer, const Progress& progress);
+  void learnVocabulary(const TrainingMap& unpruned, const PruningNeighbours& neighbours);
   void prune(std::size_t i, const TrainingMap& unpruned, const PruningNeighbours& neighbours_of,
              TrainingImage& image) const;
   bool hasCalibratedSession() const;

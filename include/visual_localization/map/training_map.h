@@ -16,6 +16,7 @@
 #include "visual_localization/features/local_feature_kind.h"
 #include "visual_localization/features/local_features.h"
 #include "visual_localization/features/sift.h"
+#include "visual_localization/features/vlad.h"
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/geometry/fix_budget.h"
@@ -41,6 +42,7 @@ struct TrainingImage : TrainingPose {
   GlobalFeatures global;                       ///< of the whole image
   std::vector<std::uint8_t> preview_jpeg;      ///< small grey JPEG for people; may be empty
   std::optional<ImageGeometry> geometry = {};  ///< none: the camera is not calibrated, or the adjustment left it out
+  VladDescriptor vlad = {};                    ///< by the map's vocabulary; empty without one
 };
 
 /// Where the images of a map were taken, image by image: 40 bytes each, all that is always in memory of a large map.
@@ -78,6 +80,8 @@ struct MapHeader {
   std::shared_ptr<const LocalFeatureKind> kind = std::make_shared<Sift>();  ///< of the local features
   std::vector<Session> sessions;                                            ///< its recordings
   std::vector<std::string> history = {};  ///< what became of it after it was built: a line for each edit, oldest first
+  /// By which its images are described for proposals; null: a map of an older version, or too small to learn one.
+  std::shared_ptr<const VladVocabulary> vocabulary = {};
 };
 
 /// Axis-aligned rectangle in the map frame, metres. A range may be zero (a single straight street).
@@ -101,7 +105,8 @@ class TrainingMap {
   /// not positive, a position or heading is not finite, a stamp is farther than 2^32 s from zero, a session index is
   /// out of range, a camera or mask is not for images of the map's size, or a geometry cannot be: numbers that are not
   /// finite, a rotation that is not of unit length, a covariance that is not symmetric and positive semi-definite, a
-  /// landmark more than 100 km away, features that the image does not have or that are not in order.
+  /// landmark more than 100 km away, features that the image does not have or that are not in order; or when its VLAD
+  /// is not of the vocabulary.
   TrainingMap(MapHeader header, std::vector<TrainingImage> images);
   /// A map whose images' looks are in `store`, which answers for their geometry. Throws like the other one.
   TrainingMap(MapHeader header, TrainingPoses poses, std::unique_ptr<const FeatureStore> store);
@@ -126,6 +131,8 @@ class TrainingMap {
   // is not in memory: what cannot be read there, or does not agree with its checksum, counts as without features.
   std::shared_ptr<const LocalFeatures> local(std::size_t i) const;
   std::shared_ptr<const GlobalFeatures> global(std::size_t i) const;
+  /// Empty in a map without a vocabulary.
+  std::shared_ptr<const VladDescriptor> vlad(std::size_t i) const;
   std::vector<std::uint8_t> preview(std::size_t i) const;
   /// Its camera's pose and landmarks; null when it has none. The features of the landmarks are below featureCount(i);
   /// compare with the size of sift(i), which has none when its own row is damaged.
