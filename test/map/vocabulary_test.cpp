@@ -75,8 +75,8 @@ TEST_F(VocabularyStore, AMissingOrSurplusVladIsRefused) {
 }
 
 TEST_F(VocabularyStore, AChangedVocabularyIsRefused) {
-  tamper("UPDATE vocabulary SET learnt = learnt || x'00'");
-  EXPECT_THAT(refusal(path_), HasSubstr("vocabulary"));
+  tamper("UPDATE vocabulary SET learnt = CAST(learnt || x'00' AS BLOB)");
+  EXPECT_THAT(refusal(path_), HasSubstr("vocabulary does not agree with its checksum"));
   saveMap(map_, path_);
   tamper("DELETE FROM vocabulary");
   EXPECT_THAT(refusal(path_), HasSubstr("vocabulary is missing"));
