@@ -113,7 +113,7 @@ TEST(Sweep, AReconfigurationSweepsTheImageAnew) {
   MapSweep sweep(*map, 100, 100);
   Random random(1);
   sweep.draw(scores, random);
-  sweep.configure(5);
+  sweep.configure(5, false);
   std::set<std::size_t> drawn;
   for (int i = 0; i < 200; ++i) drawn.insert(sweep.draw(scores, random));
   EXPECT_EQ(drawn.size(), 5U);

@@ -260,7 +260,8 @@ TEST_F(HostileMap, ASchemaWithoutEndIsRefused) {
       std::string{39, 9, 6, 23, 59, 21, 1, 0} + "index" + name + "meta" + static_cast<char>(rootOf("meta"));
   Pages pages(path_);
   std::string tables = pages.page(1);
-  tables.replace(0, 8 + 2 * 7, tables.substr(100, 8 + 2 * 7));  // of another page, the header stands at its beginning
+  const std::size_t header = 8 + 2 * static_cast<unsigned char>(tables[104]);  // it ends with a pointer for each cell
+  tables.replace(0, header, tables.substr(100, header));  // of another page, the header stands at its beginning
   const std::size_t first = pages.append(tables);
   std::string leaf(kPage, '\0');
   leaf[0] = 13;
