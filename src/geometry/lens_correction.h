@@ -13,9 +13,6 @@ using LensCorrection = Eigen::Matrix<double, 6, 1>;
 /// Order of the entries of a LensCorrection.
 enum LensEntry { kFocalLength, kAspect, kPrincipalX, kPrincipalY, kRadial1, kRadial2 };
 
-constexpr double kPrincipalPointSigma = 0.01;  ///< of a calibration, as a share of the focal length: some pixels
-constexpr double kDistortionSigma = 0.05;      ///< of its k1 and k2
-
 /// The calibration with its correction.
 Intrinsics corrected(const Intrinsics& published, const LensCorrection& correction);
 

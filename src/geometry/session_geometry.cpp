@@ -40,8 +40,8 @@ using Indices = std::pair<std::uint32_t, std::uint32_t>;
 
 LensCorrection lensSigmaOf(const GeometryConfig& config) {
   LensCorrection sigma;
-  sigma << config.focal_sigma, kAspectSigma, kPrincipalPointSigma, kPrincipalPointSigma, kDistortionSigma,
-      kDistortionSigma;
+  sigma << config.focal_sigma, kAspectSigma, config.principal_point_sigma, config.principal_point_sigma,
+      config.distortion_sigma, config.distortion_sigma;
   return sigma;
 }
 
@@ -376,6 +376,10 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                   100);
   visitor.real({"geometry/focal_sigma", "1", "how well a calibration knows the focal length, as a share of it"},
                focal_sigma, 1e-6, 1.0);
+  visitor.real({"geometry/principal_point_sigma", "1", "and the principal point, as a share of the focal length"},
+               principal_point_sigma, 1e-6, 1.0);
+  visitor.real({"geometry/distortion_sigma", "1", "and the radial coefficients k1 and k2"}, distortion_sigma, 1e-6,
+               1.0);
   visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},
                fix_sigma_m, 0.001, 100.0);
   visitor.integer(

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "geometry/lens_correction.h"
 #include "geometry/rays.h"
 #include "geometry/reconstruction.h"
 #include "geometry/session_geometry.h"
@@ -131,7 +130,6 @@ TEST(FormerParameters, HaveTheValuesThatAreUsed) {
       {"dpso/exclusion_radius", config.dpso.exclusion_radius_m},
       {"dpso/mode_radius", config.dpso.mode_radius_m},
       {"dpso/rival_share", config.dpso.rival_share},
-      {"geometry/distortion_sigma", kDistortionSigma},
       {"geometry/epipolar_tolerance", PairRule::kTolerance_px},
       {"geometry/fix_correlation", Reconstruction::kFixCorrelation},
       {"geometry/fix_loss", Reconstruction::kFixLoss},
@@ -140,7 +138,6 @@ TEST(FormerParameters, HaveTheValuesThatAreUsed) {
       {"geometry/max_residual", Reconstruction::kMaxResidual},
       {"geometry/min_landmarks", Reconstruction::kMinLandmarks},
       {"geometry/min_pair_inliers", PairRule::kMinInliers},
-      {"geometry/principal_point_sigma", kPrincipalPointSigma},
       {"max_image_gap", kMaxImageGap_s},
       {"metric/keypoint_sigma", kKeypointSigma_px},
       {"metric/match_ratio", PoseVerifier::kMatchRatio},
