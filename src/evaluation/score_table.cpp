@@ -176,7 +176,7 @@ void pruneByBothNeighbours(std::vector<DriveImage>& images, double max_angle_rat
 ScoreTable::ScoreTable(const Drive& drive, const TrainingMap& map, const MatchConfig& match, std::size_t threads)
     : training_images_(map.size()), entries_(drive.images.size() * map.size()) {
   const SimilarityConfig config;  // what a similarity means is each method's own; the similarity itself is not
-  const LocalSimilarity sift(match, config, map.header().image_size.width);
+  const LocalSimilarity sift(match, config, map.header().image_size.width, map.header().kind);
   const GlobalSimilarity global(config);
   for (const DriveImage& image : drive.images) local_features_.push_back(image.local.size());
   std::vector<RowTimes> times(drive.images.size());
