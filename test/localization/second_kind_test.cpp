@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "evaluation/score_table.h"
 #include "test/localization/wall_street.h"
 #include "test/support/patch_features.h"
 #include "test/support/temporary_folder.h"
@@ -79,6 +80,21 @@ TEST_F(SecondKind, IsComparedByEverySimilarity) {
               3.0 * similarity.compare(*map->local(10), *map->local(40)).similarity)
         << mode;
   }
+}
+
+TEST_F(SecondKind, IsComparedTheSameInAnEvaluation) {
+  const auto map = builtMap();
+  Drive drive;
+  drive.image_size = map->header().image_size;
+  drive.images.resize(1);
+  drive.images.front().local = *map->local(11);
+  const MatchConfig match;
+  const ScoreTable table(drive, *map, match, 1);
+  const LocalSimilarity similarity(match, SimilarityConfig(), 320, map->header().kind);
+  for (const std::size_t i : {10, 40}) {
+    EXPECT_DOUBLE_EQ(table.at(0, i).sift, similarity.compare(*map->local(11), *map->local(i)).similarity) << i;
+  }
+  EXPECT_GT(table.at(0, 10).sift, 0.1);
 }
 
 TEST_F(SecondKind, IsRefusedByALocalizerOfAnother) {
