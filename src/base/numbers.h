@@ -21,6 +21,11 @@ inline bool faceAlike(double yaw_rad, double other_yaw_rad) {
   return std::abs(angleDifference(yaw_rad, other_yaw_rad)) <= kSameView_rad;
 }
 
+/// Of a normal distribution, its largest value 1.
+inline double gaussian(double deviation, double sigma) {
+  return std::exp(-0.5 * deviation * deviation / (sigma * sigma));
+}
+
 /// The middle value; of an even number the mean of the two in the middle; 0 of none.
 inline double median(std::vector<double> values) {
   if (values.empty()) return 0.0;

@@ -253,11 +253,9 @@ void Localizer::witness(const Motion& motion, const std::optional<MetricPose>& m
 
 /// Around the estimate; by global features thresholds decide, as by choice.
 std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) const {
-  constexpr double kPlaces = 3.0;  // where training images are far apart
   if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kLocal) return std::nullopt;
   const PlaceFilter& filter = tracker_->posterior() != nullptr ? *tracker_->posterior() : *witness_;
-  const double around_m = std::max(config_.state.max_distance_m, kPlaces * filter.spacing_m());
-  return (1.0 - filter.offMap()) * filter.within(tracked.position_m, around_m);
+  return (1.0 - filter.offMap()) * filter.within(tracked.position_m, filter.around_m(config_.state.max_distance_m));
 }
 
 /// Without landmarks the most similar training image is compared with one of another session beside it.
@@ -330,8 +328,8 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
   return pose;
 }
 
-/// Sizes are exact in the same light and beside the path poor; of the posterior it is the other way round. Their errors
-/// have different causes: the mean of both is at least as good as either (doc/experiments/real).
+/// Sizes are exact in the same light and poor beside the path; of the posterior it is the other way round. Their errors
+/// have different causes: the mean of both is better than the worse one everywhere, and often than either.
 Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool recognised) {
   const bool by_size = config_.estimate == "interpolated" && scores_.kind() == FeatureKind::kLocal;
   if (!recognised || !by_size) return tracked.position_m;

@@ -77,8 +77,8 @@ class PlaceFilter {
   double speed_mps(std::size_t training_image) const;
   /// Usual distance of successive training images.
   double spacing_m() const { return spacing_m_; }
-  /// Training images this near are one place: 5 m, or three of them where they are farther apart.
-  double around_m() const { return std::max(5.0, 3.0 * spacing_m_); }
+  /// Training images this near are one place: `least_m`, or three of them where they are farther apart.
+  double around_m(double least_m = 5.0) const { return std::max(least_m, 3.0 * spacing_m_); }
 
   /// Speeds as shares of the session's.
   static constexpr std::array<double, 11> kSpeeds{-1.0, 0.0, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
@@ -92,8 +92,18 @@ class PlaceFilter {
     double by_odometry = 0.0;
   };
 
+  /// How far along the direction that a training image looks, backwards negative.
+  struct Way {
+    double distance_m = 0.0;
+    double sigma_m = 0.0;
+  };
+
   void learnPace();
+  void forgetMotion();
   double secondsOf(const Motion& motion) const;
+  /// From a training image, at a share of the session's speed; and by odometry.
+  Way wayAt(double speed, std::size_t image, const Motion& motion) const;
+  Way wayBy(const Motion& motion) const;
   void moveFrom(std::size_t image, const Motion& motion);
   Arrival& arrivalAt(std::size_t image);
   double expectedSpeed() const;

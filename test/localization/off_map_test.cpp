@@ -136,6 +136,24 @@ TEST(OffMap, APoseByLandmarksRulesItOut) {
   EXPECT_LE(drive.offMap(), OffMapBelief::kHardly);
 }
 
+TEST(OffMap, ATrainingImageThatIsAskedTwiceCountsOnce) {
+  const auto offMapAfter = [](bool twice) {
+    StreetDrive drive(longStreet());
+    drive.goTo(10, 40, 60);
+    PlaceFilter& filter = drive.filter();
+    filter.reset({{40.0, 0.0}});
+    PlaceLikelihood likelihood;
+    Score score;
+    score.matches = 5;
+    likelihood.compared.push_back(filter.comparedWith(40, score));
+    likelihood.asked_in_turn = 1;
+    likelihood.compared.push_back(filter.comparedWith(twice ? 40 : 90, score));
+    filter.update(likelihood);
+    return filter.offMap();
+  };
+  EXPECT_NEAR(offMapAfter(true), offMapAfter(false), 1e-6);
+}
+
 TEST(OffMap, GlobalFeaturesSayNothing) {
   StreetDrive drive(longStreet());
   const double before = drive.offMap();
