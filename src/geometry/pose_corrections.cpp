@@ -139,12 +139,7 @@ class Corrector {
   }
 
   std::vector<PoseCorrection> solve() {
-    ceres::Solver::Options options;
-    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-    options.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    const QuietCeres quiet;
-    ceres::Solve(options, &ceres_, &summary);
+    solveQuietly(ceres::SPARSE_NORMAL_CHOLESKY, ceres_);
     std::vector<PoseCorrection> corrections(cameras_.size());
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
       const Eigen::Map<const Vector6> solved(parameters_[i].data());

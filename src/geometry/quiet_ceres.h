@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include <ceres/problem.h>
+#include <ceres/solver.h>
 #include <glog/logging.h>
 
 namespace visual_localization {
@@ -18,5 +20,16 @@ class QuietCeres {
  private:
   int before_;
 };
+
+/// Without a word, and with no other options than Ceres' own.
+inline ceres::Solver::Summary solveQuietly(ceres::LinearSolverType linear_solver, ceres::Problem& problem) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = linear_solver;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  const QuietCeres quiet;
+  ceres::Solve(options, &problem, &summary);
+  return summary;
+}
 
 }  // namespace visual_localization

@@ -150,13 +150,7 @@ void moveAsOne(BundleProblem& problem, const BundleConfig& config) {
   ceres.AddResidualBlock(automatic<PriorResidual<7>, 7, 7>({Similarity::Constant(kAnything)}), nullptr,
                          similarity.data());
   ceres.SetParameterBlockConstant(&none_m);
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  const QuietCeres quiet;
-  ceres::Solve(options, &ceres, &summary);
-  if (!summary.IsSolutionUsable()) return;
+  if (!solveQuietly(ceres::DENSE_QR, ceres).IsSolutionUsable()) return;
 
   const Eigen::Quaterniond turn(exponential(similarity.head<3>()));
   const double scale = std::exp(similarity[3]);

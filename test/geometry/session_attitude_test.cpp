@@ -23,13 +23,19 @@ SessionGeometry mounted(const test::StreetDrive& street, const RecordedDrive& dr
   return adjustSessions({session}, {}, 1).front();
 }
 
+/// The camera turned by `attitude_deg`: yaw, pitch and roll.
+test::StreetDrive streetWith(const Eigen::Vector3d& attitude_deg) {
+  test::StreetDrive street;
+  street.yaw_rad = toRadians(attitude_deg.x());
+  street.pitch_rad = toRadians(attitude_deg.y());
+  street.roll_rad = toRadians(attitude_deg.z());
+  return street;
+}
+
 class SessionAttitude : public testing::TestWithParam<Eigen::Vector3d> {};  // yaw, pitch, roll, degrees
 
 TEST_P(SessionAttitude, StartsFromTheMounting) {
-  test::StreetDrive street;
-  street.yaw_rad = toRadians(GetParam().x());
-  street.pitch_rad = toRadians(GetParam().y());
-  street.roll_rad = toRadians(GetParam().z());
+  const test::StreetDrive street = streetWith(GetParam());
   const RecordedDrive drive = recorded(street, 61);
   const SessionGeometry geometry = mounted(street, drive);
   EXPECT_GT(imagesIn(geometry), drive.truth.size() * 2 / 3) << "who looks aside or back sees no things at first";
@@ -47,10 +53,7 @@ INSTANTIATE_TEST_SUITE_P(Mountings, SessionAttitude,
 class UnknownMounting : public testing::TestWithParam<Eigen::Vector3d> {};
 
 TEST_P(UnknownMounting, IsFoundByTheImages) {
-  test::StreetDrive street;
-  street.yaw_rad = toRadians(GetParam().x());
-  street.pitch_rad = toRadians(GetParam().y());
-  street.roll_rad = toRadians(GetParam().z());
+  const test::StreetDrive street = streetWith(GetParam());
   const RecordedDrive drive = recorded(street, 61);
   UnadjustedSession session = drive.unadjusted();
   session.finds_mount = true;

@@ -66,26 +66,19 @@ TEST_F(VocabularyStore, ADamagedVladIsRefusedOrLeftOut) {
   EXPECT_THAT(warnings_.front(), HasSubstr("VLAD of image 4"));
 }
 
-TEST_F(VocabularyStore, AMissingOrSurplusVladIsRefused) {
-  tamper("DELETE FROM vlads WHERE image = 7");
-  EXPECT_THAT(refusal(path_), HasSubstr("VLAD of image 7 are missing"));
-  saveMap(map_, path_);
-  tamper("INSERT INTO vlads VALUES(24, x'00', 0)");
-  EXPECT_THAT(refusal(path_), HasSubstr("VLAD without an image"));
-}
-
-TEST_F(VocabularyStore, AChangedVocabularyIsRefused) {
-  tamper("UPDATE vocabulary SET learnt = CAST(learnt || x'00' AS BLOB)");
-  EXPECT_THAT(refusal(path_), HasSubstr("vocabulary does not agree with its checksum"));
-  saveMap(map_, path_);
-  tamper("DELETE FROM vocabulary");
-  EXPECT_THAT(refusal(path_), HasSubstr("vocabulary is missing"));
-  saveMap(map_, path_);
-  tamper("INSERT INTO vocabulary SELECT 1, learnt FROM vocabulary");
-  EXPECT_THAT(refusal(path_), HasSubstr("its vocabulary is not one"));
-  saveMap(map_, path_);
-  tamper("DELETE FROM meta WHERE key = 'vocabulary'");
-  EXPECT_THAT(refusal(path_), HasSubstr("vocabulary is missing or unexpected"));
+TEST_F(VocabularyStore, WhatIsMissingSurplusOrChangedIsRefused) {
+  const std::vector<std::pair<const char*, const char*>> changes{
+      {"DELETE FROM vlads WHERE image = 7", "VLAD of image 7 are missing"},
+      {"INSERT INTO vlads VALUES(24, x'00', 0)", "VLAD without an image"},
+      {"UPDATE vocabulary SET learnt = CAST(learnt || x'00' AS BLOB)", "vocabulary does not agree with its checksum"},
+      {"DELETE FROM vocabulary", "vocabulary is missing"},
+      {"INSERT INTO vocabulary SELECT 1, learnt FROM vocabulary", "its vocabulary is not one"},
+      {"DELETE FROM meta WHERE key = 'vocabulary'", "vocabulary is missing or unexpected"}};
+  for (const auto& [change, expected] : changes) {
+    saveMap(map_, path_);
+    tamper(change);
+    EXPECT_THAT(refusal(path_), HasSubstr(expected)) << change;
+  }
 }
 
 TEST_F(VocabularyStore, TablesOfAnotherSizeAreRefused) {
