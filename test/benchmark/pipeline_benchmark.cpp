@@ -27,7 +27,7 @@ const Scene& scene() {
   static const Scene recorded = [] {
     cv::setNumThreads(1);
     const std::string folder = TEST_DATA_DIR "/rounds/";
-    const RoundSpec round{"map", "", "", kTopic, "/gps/fix", "/ground_truth/fix"};
+    const RoundSpec round{"map", "", "", kTopic, "/gps/fix", "/ground_truth/fix", "", ""};
     Scene made;
     made.map = recordMap(folder + "campus_sunny_1.bag", round, MapBuilderConfig());
     const BagReader bag(folder + "campus_cloudy_1.bag");
