@@ -65,8 +65,10 @@ void findDisplacements(const LocalFeatures& a, const LocalFeatures& b, double st
 
 void keepLargestVote(const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
                      std::vector<FeatureMatch>& matches) {
-  static thread_local std::vector<Displacement> displacements;
-  static thread_local Column column;
+  static thread_local std::vector<Displacement> kept_displacements;
+  static thread_local Column kept_column;
+  std::vector<Displacement>& displacements = kept_displacements;
+  Column& column = kept_column;
   const auto width_px = static_cast<float>(kVoteBoxWidth * image_width_px);
   findDisplacements(a, b, kVoteBoxHeight * image_width_px / kSteps, matches, displacements);
   matches.clear();

@@ -1,6 +1,7 @@
 #include "visual_localization/features/feature_matcher.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
@@ -108,20 +109,22 @@ void matchSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_a
   forEachSymmetric(a, b, max_angle_ratio, [&matches](const FeatureMatch& match) { matches.push_back(match); });
 }
 
-void matchMutual(const LocalFeatures& a, const LocalFeatures& b, std::vector<FeatureMatch>& matches) {
+void matchMutual(const LocalFeatures& a, const LocalFeatures& b, double max_dy_px, std::vector<FeatureMatch>& matches) {
   matches.clear();
   if (a.size() < 2 || b.size() < 2) return;
-  const NearestDescriptors& nearest = neighboursOf(a, b);
+  static thread_local NearestDescriptors kept;
+  NearestDescriptors& nearest = kept;
+  findNearestWithin(a, b, static_cast<float>(max_dy_px), nearest);
   for (std::uint32_t i = 0; i < a.size(); ++i) {
     const std::uint32_t partner = nearest.of_a[i].index;
-    if (nearest.of_b[partner].index == i) matches.push_back({i, partner});
+    if (nearest.of_a[i].best >= 0.0F && nearest.of_b[partner].index == i) matches.push_back({i, partner});
   }
 }
 
 void matchBy(const MatchConfig& config, const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
              std::vector<FeatureMatch>& matches) {
   if (config.isByVotes()) {
-    matchMutual(a, b, matches);
+    matchMutual(a, b, kVoteRows * image_width_px, matches);
     keepLargestVote(a, b, image_width_px, matches);
   } else if (config.isOneWay()) {
     matchOneWay(a, b, config.max_angle_ratio, matches);
@@ -187,6 +190,39 @@ void findNearestPlain(const LocalFeatures& a, const LocalFeatures& b, NearestDes
   }
 }
 
+void findNearestWithinPlain(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px,
+                            NearestDescriptors& nearest) {
+  requireAlike(a, b);
+  nearest.of_a.assign(a.size(), TwoNearest());
+  nearest.of_b.assign(b.size(), TwoNearest());
+  std::vector<std::uint32_t> order_a;
+  std::vector<std::uint32_t> order_b;
+  orderByRow(a, order_a);
+  orderByRow(b, order_b);
+  for (const std::uint32_t i : order_a) {
+    for (const std::uint32_t j : order_b) {
+      if (!(std::abs(a.keypoints().y_px()[i] - b.keypoints().y_px()[j]) <= max_dy_px)) continue;
+      const float cosine = product(a, i, b, j) * a.inverseNorm(i) * b.inverseNorm(j);
+      if (cosine > nearest.of_a[i].best) nearest.of_a[i] = {cosine, -1.0F, j};
+      if (cosine > nearest.of_b[j].best) nearest.of_b[j] = {cosine, -1.0F, i};
+    }
+  }
+}
+
+void orderByRow(const LocalFeatures& features, std::vector<std::uint32_t>& order) {
+  constexpr std::size_t kStrips = 256;
+  constexpr float kStrip_px = 8.0F;  // a map may claim any row: what lies outside is in the first or the last strip
+  const std::vector<float>& y_px = features.keypoints().y_px();
+  const auto strip = [](float y) {
+    return y > 0.0F ? static_cast<std::size_t>(std::min(y / kStrip_px, kStrips - 1.0F)) : 0;
+  };
+  std::array<std::uint32_t, kStrips + 1> begins{};
+  for (const float y : y_px) ++begins[strip(y) + 1];
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  order.resize(y_px.size());
+  for (std::uint32_t i = 0; i < y_px.size(); ++i) order[begins[strip(y_px[i])]++] = i;
+}
+
 AngleRatioTest::AngleRatioTest(double max_angle_ratio) : max_angle_ratio_(max_angle_ratio) {
   for (std::size_t i = 0; i <= kCells; ++i) {
     bounds_[i] = std::cos(max_angle_ratio * std::acos(static_cast<double>(i) / kCells));
@@ -202,6 +238,10 @@ bool AngleRatioTest::exactly(float best, float second) const {
 #ifndef VISUAL_LOCALIZATION_HIGHWAY
 void findNearest(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
   findNearestPlain(a, b, nearest);
+}
+
+void findNearestWithin(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px, NearestDescriptors& nearest) {
+  findNearestWithinPlain(a, b, max_dy_px, nearest);
 }
 #endif
 

@@ -6,6 +6,9 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <numeric>
+#include <vector>
 
 #include "features/highway.h"
 
@@ -20,6 +23,10 @@ namespace {
 #if HWY_TARGET == HWY_SCALAR
 void findNearestImpl(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
   findNearestPlain(a, b, nearest);
+}
+void findNearestWithinImpl(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px,
+                           NearestDescriptors& nearest) {
+  findNearestWithinPlain(a, b, max_dy_px, nearest);
 }
 #else
 
@@ -49,16 +56,18 @@ HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
 constexpr std::size_t kGroup = 2;
 using Packed = std::int16_t;
 HWY_INLINE void packGroup(const std::uint8_t* bins, Packed* to) {
-  for (std::size_t i = 0; i < kGroup; ++i) to[i] = bins[i];
+  const std::uint32_t group = bins[0] | static_cast<std::uint32_t>(bins[1]) << 16;
+  std::memcpy(to, &group, sizeof(group));
 }
 #endif
 constexpr std::size_t kGroups = kBins / kGroup;
 
-/// `padded`: the number of features, filled up to whole tiles with zeros.
-void pack(const LocalFeatures& features, std::size_t lanes, std::size_t padded, Packed* to) {
+/// In `order`. `padded`: the number of features, filled up to whole tiles with zeros.
+void pack(const LocalFeatures& features, const std::vector<std::uint32_t>& order, std::size_t lanes, std::size_t padded,
+          Packed* to) {
   static constexpr std::uint8_t kNone[kBins] = {};
   for (std::size_t i = 0; i < padded; ++i) {
-    const std::uint8_t* from = i < features.size() ? features.bytes(i) : kNone;
+    const std::uint8_t* from = i < features.size() ? features.bytes(order[i]) : kNone;
     Packed* tile = to + i / lanes * lanes * kBins + i % lanes * kGroup;
     for (std::size_t group = 0; group < kGroups; ++group) {
       packGroup(from + group * kGroup, tile + group * lanes * kGroup);
@@ -147,13 +156,23 @@ HWY_INLINE void multiply(const Row* rows, const Packed* tiles, std::size_t /*dim
   products[6] = toFloats(total(t2, p2)), products[7] = toFloats(total(t3, p3));
 }
 
+template <bool kWhole>
+void orderBy(const LocalFeatures& features, std::vector<std::uint32_t>& order) {
+  if (!kWhole) return orderByRow(features, order);
+  order.resize(features.size());
+  std::iota(order.begin(), order.end(), 0U);
+}
+
 /// Descriptors of floats side by side: for each tile of as many as there are lanes, for each element, that of all of
 /// them.
-void pack(const LocalFeatures& features, std::size_t lanes, std::size_t padded, float* to) {
+void pack(const LocalFeatures& features, const std::vector<std::uint32_t>& order, std::size_t lanes, std::size_t padded,
+          float* to) {
   const std::size_t dimension = features.form().dimension;
   for (std::size_t i = 0; i < padded; ++i) {
     float* tile = to + i / lanes * lanes * dimension + i % lanes;
-    for (std::size_t k = 0; k < dimension; ++k) tile[k * lanes] = i < features.size() ? features.floats(i)[k] : 0.0F;
+    for (std::size_t k = 0; k < dimension; ++k) {
+      tile[k * lanes] = i < features.size() ? features.floats(order[i])[k] : 0.0F;
+    }
   }
 }
 
@@ -191,7 +210,8 @@ HWY_INLINE const float* elementsOf(const LocalFeatures& features, std::size_t i,
   return features.floats(i);
 }
 
-/// The two nearest of each lane.
+/// The two nearest of each lane; or the nearest alone.
+template <bool kTwo>
 struct Lanes {
   hn::Vec<Floats> best;
   hn::Vec<Floats> second;
@@ -199,34 +219,57 @@ struct Lanes {
 
   HWY_INLINE void offer(hn::Vec<Floats> cosine, hn::Vec<Ints> candidate) {
     const auto better = hn::Gt(cosine, best);
-    second = hn::IfThenElse(better, best, hn::Max(second, cosine));
+    if (kTwo) second = hn::IfThenElse(better, best, hn::Max(second, cosine));
     best = hn::IfThenElse(better, cosine, best);
     index = hn::IfThenElse(hn::RebindMask(Ints(), better), candidate, index);
   }
 };
 
-HWY_INLINE Lanes noLanes() { return {hn::Set(Floats(), -1.0F), hn::Set(Floats(), -1.0F), hn::Zero(Ints())}; }
+template <bool kTwo>
+HWY_INLINE Lanes<kTwo> noLanes() {
+  return {hn::Set(Floats(), -1.0F), hn::Set(Floats(), -1.0F), hn::Zero(Ints())};
+}
 
 /// The two nearest over all lanes; of equals the lane with the lowest index.
-HWY_INLINE TwoNearest reduce(const Lanes& lanes) {
+template <bool kTwo>
+HWY_INLINE TwoNearest reduce(const Lanes<kTwo>& lanes) {
   const Floats floats;
   const Ints ints;
   const auto best = hn::MaxOfLanes(floats, lanes.best);
   const auto is_best = hn::RebindMask(ints, hn::Eq(lanes.best, best));
   const auto index = hn::MinOfLanes(ints, hn::IfThenElse(is_best, lanes.index, hn::Set(ints, INT32_MAX)));
+  if (!kTwo) return {hn::GetLane(best), -1.0F, static_cast<std::uint32_t>(hn::GetLane(index))};
   const auto winner = hn::RebindMask(floats, hn::And(is_best, hn::Eq(lanes.index, index)));
   const auto second = hn::MaxOfLanes(floats, hn::IfThenElse(winner, lanes.second, lanes.best));
   return {hn::GetLane(best), hn::GetLane(second), static_cast<std::uint32_t>(hn::GetLane(index))};
 }
 
-/// Memory that is kept from call to call.
+/// Rows of the image: from that of the highest of some features to that of the lowest.
+struct Rows {
+  float first_px = std::numeric_limits<float>::infinity();
+  float last_px = -std::numeric_limits<float>::infinity();
+
+  HWY_INLINE void add(const Rows& more) {
+    first_px = HWY_MIN(more.first_px, first_px);
+    last_px = HWY_MAX(more.last_px, last_px);
+  }
+  HWY_INLINE bool isWithin(float max_dy_px, const Rows& other) const {
+    return first_px - other.last_px <= max_dy_px && other.first_px - last_px <= max_dy_px;
+  }
+};
+
+/// Memory that is kept from call to call: for each descriptor of A, filled up to whole tiles, ...
 template <class Element>
 struct Workspace {
   hwy::AlignedFreeUniquePtr<Element[]> packed;
+  hwy::AlignedFreeUniquePtr<float[]> y_px;
   hwy::AlignedFreeUniquePtr<float[]> inverse_norms;
   hwy::AlignedFreeUniquePtr<float[]> best;
   hwy::AlignedFreeUniquePtr<float[]> second;
   hwy::AlignedFreeUniquePtr<std::int32_t[]> index;
+  std::vector<Rows> rows;              ///< ... each tile,
+  std::vector<std::uint32_t> order_a;  ///< and each image
+  std::vector<std::uint32_t> order_b;
   std::size_t capacity = 0;
   std::size_t elements = 0;
 
@@ -237,6 +280,7 @@ struct Workspace {
     }
     if (count <= capacity) return;
     capacity = 2 * count;
+    y_px = hwy::AllocateAligned<float>(capacity);
     inverse_norms = hwy::AllocateAligned<float>(capacity);
     best = hwy::AllocateAligned<float>(capacity);
     second = hwy::AllocateAligned<float>(capacity);
@@ -244,71 +288,113 @@ struct Workspace {
   }
 };
 
-template <class RowOf, class Element>
-void findNearestOf(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
+/// Of the whole image, or of rows no farther than `max_dy_px` and then the nearest alone: tiles that lie farther are
+/// passed over.
+template <bool kWhole, class RowOf, class Element>
+void findNearestOf(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px, NearestDescriptors& nearest) {
   const Floats floats;
   const Ints ints;
   const std::size_t lanes = hn::Lanes(ints);
   const std::size_t padded = (a.size() + lanes - 1) / lanes * lanes;
   const std::size_t dimension = a.form().dimension;
-  static thread_local Workspace<Element> work;
+  static thread_local Workspace<Element> kept;
+  Workspace<Element>& work = kept;
   work.reserve(padded, dimension);
-  pack(a, lanes, padded, work.packed.get());
+  orderBy<kWhole>(a, work.order_a);
+  orderBy<kWhole>(b, work.order_b);
+  pack(a, work.order_a, lanes, padded, work.packed.get());
+  work.rows.assign(padded / lanes, Rows());
   for (std::size_t i = 0; i < padded; ++i) {
-    work.inverse_norms[i] = i < a.size() ? a.inverseNorm(i) : 0.0F;
+    const bool is_filled = i < a.size();
+    work.y_px[i] = is_filled ? a.keypoints().y_px()[work.order_a[i]] : std::numeric_limits<float>::quiet_NaN();
+    work.inverse_norms[i] = is_filled ? a.inverseNorm(work.order_a[i]) : 0.0F;
+    if (is_filled) work.rows[i / lanes].add({work.y_px[i], work.y_px[i]});
     work.best[i] = work.second[i] = -1.0F;
     work.index[i] = 0;
   }
-  nearest.of_a.resize(a.size());
-  nearest.of_b.resize(b.size());
+  nearest.of_a.assign(a.size(), TwoNearest());
+  nearest.of_b.assign(b.size(), TwoNearest());
   RowOf rows[kRows];
-  for (std::size_t first = 0; first < b.size(); first += kRows) {
+  float y_px[kRows] = {};
+  float inverse_norms[kRows] = {};
+  for (std::size_t first = 0; first < b.size() && padded > 0; first += kRows) {
     const std::size_t count = HWY_MIN(kRows, b.size() - first);
-    for (std::size_t r = 0; r < count; ++r) rows[r].set(elementsOf(b, first + r, rows));
+    Rows of_rows;
+    for (std::size_t r = 0; r < count; ++r) {
+      const std::uint32_t of_b = work.order_b[first + r];
+      rows[r].set(elementsOf(b, of_b, rows));
+      y_px[r] = b.keypoints().y_px()[of_b];
+      inverse_norms[r] = b.inverseNorm(of_b);
+      of_rows.add({y_px[r], y_px[r]});
+    }
     for (std::size_t r = count; r < kRows; ++r) rows[r] = rows[0];
-    Lanes of_row[kRows] = {noLanes(), noLanes(), noLanes(), noLanes()};
+    Lanes<kWhole> of_row[kRows] = {noLanes<kWhole>(), noLanes<kWhole>(), noLanes<kWhole>(), noLanes<kWhole>()};
     const auto offerTile = [&](std::size_t i, const hn::Vec<Floats>* products) HWY_ATTR {
-      const auto inverse_norms = hn::Load(floats, work.inverse_norms.get() + i);
-      Lanes of_tile{hn::Load(floats, work.best.get() + i), hn::Load(floats, work.second.get() + i),
-                    hn::Load(ints, work.index.get() + i)};
-      const auto used = hn::FirstN(floats, a.size() - i);  // the last tile is filled up
+      const auto tile_inverse_norms = hn::Load(floats, work.inverse_norms.get() + i);
+      const auto tile_y_px = hn::Load(floats, work.y_px.get() + i);
+      Lanes<kWhole> of_tile = noLanes<kWhole>();
+      of_tile.best = hn::Load(floats, work.best.get() + i);
+      if (kWhole) of_tile.second = hn::Load(floats, work.second.get() + i);
+      of_tile.index = hn::Load(ints, work.index.get() + i);
+      const auto filled = hn::FirstN(floats, a.size() - i);
       const auto indices = hn::Iota(ints, static_cast<std::int32_t>(i));
       for (std::size_t r = 0; r < count; ++r) {
-        const auto product = hn::Mul(hn::Mul(products[r], inverse_norms), hn::Set(floats, b.inverseNorm(first + r)));
+        const auto product = hn::Mul(hn::Mul(products[r], tile_inverse_norms), hn::Set(floats, inverse_norms[r]));
+        const auto dy_px = hn::Abs(hn::Sub(tile_y_px, hn::Set(floats, y_px[r])));
+        const auto used = kWhole ? filled : hn::Le(dy_px, hn::Set(floats, max_dy_px));
         const auto cosine = hn::IfThenElse(used, product, hn::Set(floats, -1.0F));
         of_row[r].offer(cosine, indices);
         of_tile.offer(cosine, hn::Set(ints, static_cast<std::int32_t>(first + r)));
       }
       hn::Store(of_tile.best, floats, work.best.get() + i);
-      hn::Store(of_tile.second, floats, work.second.get() + i);
+      if (kWhole) hn::Store(of_tile.second, floats, work.second.get() + i);
       hn::Store(of_tile.index, ints, work.index.get() + i);
     };
     hn::Vec<Floats> products[2 * kRows];
-    std::size_t i = 0;
-    for (; i + lanes < padded; i += 2 * lanes) {
-      multiply<2>(rows, work.packed.get() + i * dimension, dimension, products);
-      offerTile(i, products);
-      offerTile(i + lanes, products + kRows);
+    for (std::size_t i = 0; i < padded; i += 2 * lanes) {
+      const bool has_next = i + lanes < padded;
+      Rows of_tiles = work.rows[i / lanes];
+      if (has_next) of_tiles.add(work.rows[i / lanes + 1]);
+      if (!kWhole && !of_tiles.isWithin(max_dy_px, of_rows)) continue;
+      if (has_next) {
+        multiply<2>(rows, work.packed.get() + i * dimension, dimension, products);
+        offerTile(i, products);
+        offerTile(i + lanes, products + kRows);
+      } else {
+        multiply<1>(rows, work.packed.get() + i * dimension, dimension, products);
+        offerTile(i, products);
+      }
     }
-    if (i < padded) {
-      multiply<1>(rows, work.packed.get() + i * dimension, dimension, products);
-      offerTile(i, products);
+    for (std::size_t r = 0; r < count; ++r) {
+      TwoNearest found = reduce(of_row[r]);
+      found.index = work.order_a[found.index];
+      nearest.of_b[work.order_b[first + r]] = found;
     }
-    for (std::size_t r = 0; r < count; ++r) nearest.of_b[first + r] = reduce(of_row[r]);
   }
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    nearest.of_a[i] = {work.best[i], work.second[i], static_cast<std::uint32_t>(work.index[i])};
+  for (std::size_t i = 0; i < a.size() && !b.empty(); ++i) {
+    const std::uint32_t index = work.order_b[static_cast<std::size_t>(work.index[i])];
+    nearest.of_a[work.order_a[i]] = {work.best[i], work.second[i], index};
   }
 }
 
-/// Bytes are multiplied by as many at a time as SIFT has.
 void findNearestImpl(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
   if (a.form().element == DescriptorElement::kFloat) {
-    findNearestOf<FloatRow, float>(a, b, nearest);
+    findNearestOf<true, FloatRow, float>(a, b, 0.0F, nearest);
   } else if (a.form().dimension == kPackedBytes) {
-    findNearestOf<Row, Packed>(a, b, nearest);
+    findNearestOf<true, Row, Packed>(a, b, 0.0F, nearest);
   } else {
     findNearestPlain(a, b, nearest);
+  }
+}
+
+void findNearestWithinImpl(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px,
+                           NearestDescriptors& nearest) {
+  if (a.form().element == DescriptorElement::kFloat) {
+    findNearestOf<false, FloatRow, float>(a, b, max_dy_px, nearest);
+  } else if (a.form().dimension == kPackedBytes) {
+    findNearestOf<false, Row, Packed>(a, b, max_dy_px, nearest);
+  } else {
+    findNearestWithinPlain(a, b, max_dy_px, nearest);
   }
 }
 
@@ -326,10 +412,16 @@ HWY_AFTER_NAMESPACE();
 namespace visual_localization {
 
 HWY_EXPORT(findNearestImpl);
+HWY_EXPORT(findNearestWithinImpl);
 
 void findNearest(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest) {
   requireAlike(a, b);
   HWY_DYNAMIC_DISPATCH(findNearestImpl)(a, b, nearest);
+}
+
+void findNearestWithin(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px, NearestDescriptors& nearest) {
+  requireAlike(a, b);
+  HWY_DYNAMIC_DISPATCH(findNearestWithinImpl)(a, b, max_dy_px, nearest);
 }
 
 }  // namespace visual_localization

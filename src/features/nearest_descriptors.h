@@ -35,8 +35,17 @@ void requireAlike(const LocalFeatures& a, const LocalFeatures& b);
 /// CPU has (chosen at run time). Throws like requireAlike.
 void findNearest(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest);
 
-/// The same without vectors: what findNearest is tested against, and stands in for it where Highway is missing.
+/// The nearest alone, of those whose row in the image is at most `max_dy_px` away: `best` is -1 where there is none,
+/// and `second` nothing. Of equals the first in orderByRow().
+void findNearestWithin(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px, NearestDescriptors& nearest);
+
+/// The same without vectors: what they are tested against, and stands in for them where Highway is missing.
 void findNearestPlain(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest);
+void findNearestWithinPlain(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px,
+                            NearestDescriptors& nearest);
+
+/// The indices of the features in strips of the image from its top to its bottom, where they keep their order.
+void orderByRow(const LocalFeatures& features, std::vector<std::uint32_t>& order);
 
 /// Whether the angle to the nearest descriptor is below a share of the angle to the second nearest, from the cosines
 /// of both: acos(best) < max_angle_ratio * acos(second). The angles are taken only when a table of bounds does not

@@ -12,11 +12,14 @@
 
 namespace visual_localization::benchmarks {
 
-/// `count` descriptors with the length and the skew of real ones (512 times a unit vector, many entries near zero).
+/// `count` descriptors with the length and the skew of real ones (512 times a unit vector, many entries near zero),
+/// anywhere in an image of 640 x 480 pixels.
 inline LocalFeatures randomDescriptors(std::size_t count, std::uint32_t seed) {
   std::mt19937 engine(seed);
   std::exponential_distribution<double> entry(1.0);
+  std::uniform_real_distribution<float> across(0.0F, 640.0F);
   std::vector<Keypoint> keypoints(count);
+  for (Keypoint& keypoint : keypoints) keypoint = {across(engine), 0.75F * across(engine), 4.0F, 0.0F};
   std::vector<std::uint8_t> bytes;
   bytes.reserve(count * kSiftDimension);
   for (std::size_t i = 0; i < count; ++i) {
@@ -33,18 +36,21 @@ inline LocalFeatures randomDescriptors(std::size_t count, std::uint32_t seed) {
   return LocalFeatures(std::move(keypoints), std::move(bytes));
 }
 
-/// `count` descriptors of which `shared` are those of `other` with some noise, as two images of one place have them.
+/// `count` descriptors of which `shared` are those of `other` with some noise, and in the same place, as two images of
+/// one place have them.
 inline LocalFeatures overlappingDescriptors(const LocalFeatures& other, std::size_t count, double shared,
                                             std::uint32_t seed) {
   LocalFeatures fresh = randomDescriptors(count, seed);
   std::mt19937 engine(seed + 1);
   std::normal_distribution<double> noise(0.0, 4.0);
+  std::vector<Keypoint> keypoints = fresh.keypoints().list();
   std::vector<std::uint8_t> bytes = fresh.bytes();
   const auto common = static_cast<std::size_t>(shared * static_cast<double>(std::min(count, other.size())));
+  for (std::size_t i = 0; i < common; ++i) keypoints[i] = other.keypoints()[i];
   for (std::size_t i = 0; i < common * kSiftDimension; ++i) {
     bytes[i] = static_cast<std::uint8_t>(std::clamp(std::round(other.bytes()[i] + noise(engine)), 0.0, 255.0));
   }
-  return LocalFeatures(fresh.keypoints(), std::move(bytes));
+  return LocalFeatures(std::move(keypoints), std::move(bytes));
 }
 
 }  // namespace visual_localization::benchmarks

@@ -9,6 +9,7 @@
 
 #include "features/nearest_descriptors.h"
 #include "test/benchmark/descriptor_sets.h"
+#include "test/support/cpu_targets.h"
 #include "visual_localization/features/feature_matcher.h"
 #include "visual_localization/features/sift.h"
 #include "visual_localization/localization/similarity.h"
@@ -63,6 +64,13 @@ void votes(benchmark::State& state) {
   const LocalSimilarity sift{{kRatio, "votes"}, SimilarityConfig()};
   for (auto _ : state) benchmark::DoNotOptimize(sift.compare(pair.a, pair.b));
   countMacs(state);
+}
+
+/// On a CPU that has no more than AVX2.
+void votesAvx2(benchmark::State& state) {
+  test::useTargets(hwy::SupportedTargets() & ~(HWY_AVX2 - 1));
+  votes(state);
+  test::useTargets(0);
 }
 
 /// With cross-check, without votes.
@@ -164,6 +172,7 @@ void eigenProduct(benchmark::State& state) {
 FOR_SIZES(symmetricMatch);
 FOR_SIZES(similarity);
 BENCHMARK(votes)->Arg(500)->Arg(600)->Arg(1000)->Unit(benchmark::kMicrosecond);
+BENCHMARK(votesAvx2)->Arg(500)->Unit(benchmark::kMicrosecond);
 BENCHMARK(opencvMutual)->Arg(500)->Unit(benchmark::kMicrosecond);
 FOR_SIZES(nearest);
 FOR_SIZES(nearestPlainLoop);

@@ -116,9 +116,19 @@ TEST(MatchMutual, AsksForNoDistinctNeighbour) {
   std::vector<std::size_t> twice;
   for (std::size_t i = 0; i < 30; ++i) twice.insert(twice.end(), {i, i});
   std::vector<FeatureMatch> matches;
-  matchMutual(a, a.subset(twice), matches);
+  matchMutual(a, a.subset(twice), 1.0, matches);
   EXPECT_EQ(matches.size(), 30u);
   EXPECT_TRUE(matchSymmetric(a, a.subset(twice), 0.6).empty());
+}
+
+TEST(MatchMutual, LooksNoFartherUpOrDown) {
+  const LocalFeatures a = scattered(30, 7);
+  const LocalFeatures lower = movedTo(a, shifted(a, 30, 0.0F, 90.0F).keypoints());
+  std::vector<FeatureMatch> matches;
+  matchBy(MatchConfig{0.6, "votes"}, a, lower, 640.0, matches);
+  EXPECT_EQ(matches.size(), 30u);
+  matchBy(MatchConfig{0.6, "votes"}, a, lower, 320.0, matches);
+  EXPECT_LT(matches.size(), 10u) << "48 pixels at this width";
 }
 
 }  // namespace

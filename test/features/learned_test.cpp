@@ -64,7 +64,7 @@ TEST_F(LearnedTest, FollowsAMovedImage) {
   const LocalFeatures here = extract->extract(viewAt(100));
   const LocalFeatures there = extract->extract(viewAt(132));
   std::vector<FeatureMatch> matches;
-  matchMutual(here, there, matches);
+  matchMutual(here, there, 240.0, matches);
   std::size_t right = 0;
   for (const FeatureMatch& match : matches) {
     const Keypoint a = here.keypoints()[match.a];

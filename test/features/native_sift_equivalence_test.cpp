@@ -5,10 +5,10 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 #include <opencv2/imgproc.hpp>
 
 #include "features/sift/native_sift_extractor.h"
+#include "test/support/cpu_targets.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/features/local_features.h"
 #include "visual_localization/features/sift.h"
@@ -164,26 +164,15 @@ TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsOnWallsAndNoise) {
 }
 
 TEST(NativeSiftEquivalence, EveryKindOfVectorFindsTheSame) {
-  const auto use = [](std::int64_t targets) {
-    hwy::SetSupportedTargetsForTest(targets);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  };
   const cv::Mat image = textured(203, 151, 7);
   const auto extractor = makeSiftExtractor(SiftConfig(), kNativeSift);
-  use(0);
   const LocalFeatures widest = extractor->extract(image);
   ASSERT_GT(widest.size(), 100U);
-  const std::int64_t supported = hwy::SupportedTargets();
   std::size_t tried = 0;
-  for (int bit = 0; bit < 62; ++bit) {
-    const std::int64_t target = std::int64_t{1} << bit;
-    if ((supported & target) == 0) continue;
-    SCOPED_TRACE(hwy::TargetName(target));
-    use(target);
+  test::forEachTarget([&] {
     expectAgreement(extractor->extract(image), widest, 0.99, 10.0);
     ++tried;
-  }
-  use(0);
+  });
   EXPECT_GE(tried, 1U);
 }
 

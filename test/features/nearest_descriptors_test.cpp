@@ -1,10 +1,13 @@
 #include "features/nearest_descriptors.h"
 
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "test/support/cpu_targets.h"
 #include "test/support/synthetic.h"
 #include "visual_localization/features/sift.h"
 
@@ -13,6 +16,17 @@ namespace {
 
 LocalFeatures withDescriptors(const std::vector<std::vector<std::uint8_t>>& descriptors) {
   return test::featuresOf(descriptors);
+}
+
+/// The same anywhere in an image of 300 rows, and some where a map may claim to have them.
+LocalFeatures placed(const LocalFeatures& features, std::mt19937& random) {
+  std::uniform_real_distribution<float> row(0.0F, 300.0F);
+  std::vector<Keypoint> keypoints(features.size());
+  for (std::size_t i = 0; i < keypoints.size(); ++i) keypoints[i] = {0.0F, row(random), 1.0F, 0.0F};
+  constexpr float kInfinite = std::numeric_limits<float>::infinity();
+  const float claimed[] = {std::numeric_limits<float>::quiet_NaN(), kInfinite, -kInfinite, -5.0F, 1e30F};
+  for (std::size_t i = 0; i < keypoints.size(); i += 7) keypoints[i].y_px = claimed[i / 7 % std::size(claimed)];
+  return LocalFeatures(keypoints, features.bytes());
 }
 
 /// Bins up to `largest`, and every `duplicate_every`-th descriptor equal to the one before.
@@ -33,6 +47,17 @@ void expectEqual(const std::vector<TwoNearest>& actual, const std::vector<TwoNea
     ASSERT_EQ(actual[i].best, expected[i].best) << i;
     ASSERT_EQ(actual[i].second, expected[i].second) << i;
   }
+}
+
+void expectWithinLikePlain(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px) {
+  NearestDescriptors fast;
+  NearestDescriptors plain;
+  findNearestWithin(a, b, max_dy_px, fast);
+  findNearestWithinPlain(a, b, max_dy_px, plain);
+  SCOPED_TRACE(std::to_string(a.size()) + " x " + std::to_string(b.size()) + " within " + std::to_string(max_dy_px));
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(plain.of_a[i].second, -1.0F);
+  expectEqual(fast.of_a, plain.of_a);
+  expectEqual(fast.of_b, plain.of_b);
 }
 
 void expectLikePlain(const LocalFeatures& a, const LocalFeatures& b) {
@@ -80,12 +105,45 @@ TEST(NearestDescriptors, ExtremesDoNotOverflow) {
   EXPECT_EQ(nearest.of_a[0].best, 0.0F) << "the zero vector is orthogonal to everything";
 }
 
+TEST(NearestDescriptors, WithinRowsAreThoseOfThePlainLoopOnEveryCpu) {
+  test::forEachTarget([] {
+    std::mt19937 random(4);
+    for (const std::size_t a : {1, 3, 16, 17, 33, 100, 250}) {
+      for (const std::size_t b : {1, 5, 16, 101}) {
+        const LocalFeatures here = placed(randomDescriptors(a, 255, 5, random), random);
+        const LocalFeatures there = placed(randomDescriptors(b, 1, 3, random), random);
+        for (const float max_dy_px : {0.0F, 40.0F, 1e9F}) expectWithinLikePlain(here, there, max_dy_px);
+      }
+    }
+  });
+}
+
+TEST(NearestDescriptors, WithinRowsLookNoFarther) {
+  const std::vector<std::uint8_t> same(kSiftDimension, 3);
+  std::vector<std::uint8_t> other = same;
+  other[0] = 90;
+  const LocalFeatures a({{0.0F, 100.0F, 1.0F, 0.0F}}, std::vector<std::uint8_t>(same));
+  std::vector<std::uint8_t> both = same;
+  both.insert(both.end(), other.begin(), other.end());
+  const LocalFeatures b({{0.0F, 141.0F, 1.0F, 0.0F}, {0.0F, 60.0F, 1.0F, 0.0F}}, std::move(both));
+  NearestDescriptors nearest;
+  findNearestWithin(a, b, 40.0F, nearest);
+  EXPECT_EQ(nearest.of_a[0].index, 1U);
+  EXPECT_EQ(nearest.of_b[0].best, -1.0F);
+  findNearestWithin(a, b, 41.0F, nearest);
+  EXPECT_EQ(nearest.of_a[0].index, 0U);
+}
+
 TEST(NearestDescriptors, NothingHasNoNeighbours) {
   NearestDescriptors nearest;
   findNearest({}, withDescriptors({std::vector<std::uint8_t>(kSiftDimension, 1)}), nearest);
   EXPECT_TRUE(nearest.of_a.empty());
   ASSERT_EQ(nearest.of_b.size(), 1U);
   EXPECT_EQ(nearest.of_b[0].best, -1.0F);
+  findNearestWithin({}, withDescriptors({std::vector<std::uint8_t>(kSiftDimension, 1)}), 9.0F, nearest);
+  EXPECT_EQ(nearest.of_b[0].best, -1.0F);
+  findNearestWithin(withDescriptors({std::vector<std::uint8_t>(kSiftDimension, 1)}), {}, 9.0F, nearest);
+  EXPECT_EQ(nearest.of_a[0].best, -1.0F);
 }
 
 TEST(AngleRatioTest, DecidesLikeTheAnglesThemselves) {

@@ -111,7 +111,7 @@ TEST_F(SecondKind, CannotBeComparedWithAnother) {
   const auto map = builtMap();
   const LocalFeatures sift = makeSiftExtractor(SiftConfig())->extract(viewAt(3.0));
   std::vector<FeatureMatch> matches;
-  EXPECT_THROW(matchMutual(*map->local(3), sift, matches), std::invalid_argument);
+  EXPECT_THROW(matchMutual(*map->local(3), sift, 100.0, matches), std::invalid_argument);
 }
 
 }  // namespace

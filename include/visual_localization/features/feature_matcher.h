@@ -39,8 +39,9 @@ void matchOneWay(const LocalFeatures& a, const LocalFeatures& b, double max_angl
                  std::vector<FeatureMatch>& matches);
 void matchSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_angle_ratio,
                     std::vector<FeatureMatch>& matches);
-/// Pairs that are each other's nearest neighbour, however near the second nearest is.
-void matchMutual(const LocalFeatures& a, const LocalFeatures& b, std::vector<FeatureMatch>& matches);
+/// Pairs that are each other's nearest neighbour among those at most `max_dy_px` above or below, however near the
+/// second nearest is.
+void matchMutual(const LocalFeatures& a, const LocalFeatures& b, double max_dy_px, std::vector<FeatureMatch>& matches);
 /// By the mode and the ratio of `config`. By votes: of matchMutual(), the largest number with a common displacement
 /// (see displacement_votes.h), for images of this width.
 void matchBy(const MatchConfig& config, const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
