@@ -119,6 +119,27 @@ TEST(PlaceFilter, FindsARobotThatWasCarriedAway) {
   EXPECT_GT(filter.within({east_m - 1.0, 0.0}, 5.0), 0.97);
 }
 
+TEST(PlaceFilter, FollowsARobotThatDrivesBackwards) {
+  const auto map = mapOf(streetSession(200));
+  BayesConfig config;
+  config.exponent = 3.0;
+  PlaceFilter filter(*map, config);
+  double east_m = 160.0;
+  for (int i = 0; i < 60; ++i, east_m -= 1.0) {
+    filter.predict(afterSeconds(1.0));
+    PlaceLikelihood likelihood;
+    for (std::size_t k = 0; k < map->size(); ++k) {
+      const double offset_m = map->position_m(k).x() - east_m;
+      Score score;
+      score.matches = static_cast<int>(6.0 + 12.0 * std::exp(-0.5 * offset_m * offset_m));
+      likelihood.compared.push_back(filter.comparedWith(k, score));
+    }
+    filter.update(likelihood);
+    if (i < 15) continue;
+    EXPECT_GT(filter.within({east_m, 0.0}, 3.0), 0.9) << i;
+  }
+}
+
 TEST(PlaceFilter, GoesFromOneSessionToAnother) {
   // The first session ends where the second goes on.
   std::vector<TrainingImage> images = streetSession(50);
