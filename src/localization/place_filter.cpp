@@ -129,32 +129,45 @@ void PlaceFilter::update(const PlaceLikelihood& likelihood) {
 }
 
 void PlaceFilter::mostProbable(std::size_t count, std::vector<std::size_t>& found) const {
-  found.resize(map_.size());
-  std::iota(found.begin(), found.end(), std::size_t{0});
-  if (count >= found.size()) return;
-  std::nth_element(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count), found.end(),
-                   [this](std::size_t a, std::size_t b) {
-                     return probabilities_[a] != probabilities_[b] ? probabilities_[a] > probabilities_[b] : a < b;
-                   });
-  found.resize(count);
+  mostProbable(count, 0.0, found);
+}
+
+/// Those alone whose probability is at least `least`.
+void PlaceFilter::mostProbable(std::size_t count, double least, std::vector<std::size_t>& found) const {
+  const auto is_before = [this](std::size_t a, std::size_t b) {
+    return probabilities_[a] != probabilities_[b] ? probabilities_[a] > probabilities_[b] : a < b;
+  };
+  found.clear();
+  if (count == 0) return;
+  for (std::size_t i = 0; i < probabilities_.size(); ++i) {  // the last one of a heap is at its front
+    if (probabilities_[i] < least) continue;
+    if (found.size() == count) {
+      if (!is_before(i, found.front())) continue;
+      std::pop_heap(found.begin(), found.end(), is_before);
+      found.pop_back();
+    }
+    found.push_back(i);
+    if (count < probabilities_.size()) std::push_heap(found.begin(), found.end(), is_before);
+  }
 }
 
 double PlaceFilter::within(const Eigen::Vector2d& position_m, double radius_m) const {
+  map_.within(position_m, radius_m, around_);
   double sum = 0.0;
-  for (std::size_t i = 0; i < probabilities_.size(); ++i) {
-    if ((map_.position_m(i) - position_m).norm() <= radius_m) sum += probabilities_[i];
-  }
+  for (const std::uint32_t i : around_) sum += probabilities_[i];
   return sum;
 }
 
 PlaceLikelihood PlaceFilter::around(const Eigen::Vector2d& position_m) const {
   constexpr double kSigma_m = 1.0;
+  constexpr double kFarthest = 8.0;  // sigmas
   const double sigma_m = std::max(kSigma_m, spacing_m_);
   PlaceLikelihood likelihood;
   likelihood.elsewhere = 0.0;
   likelihood.is_verified = true;
   const double nearest_m = map_.nearest(position_m).distance_m;
-  for (std::size_t i = 0; i < map_.size(); ++i) {
+  map_.within(position_m, nearest_m + kFarthest * sigma_m, around_);
+  for (const std::uint32_t i : around_) {
     const double distance_m = (map_.position_m(i) - position_m).norm();
     likelihood.compared.push_back({i, gaussian(distance_m - nearest_m, sigma_m)});
   }
@@ -177,21 +190,17 @@ CloudMoments PlaceFilter::mode() const {
   }
   CloudMoments moments;
   double sum = 0.0;
-  const auto forEachThere = [&](auto use) {
-    for (std::size_t i = 0; i < probabilities_.size(); ++i) {
-      if ((map_.position_m(i) - map_.position_m(best)).norm() <= radius_m) use(probabilities_[i], map_.position_m(i));
-    }
-  };
-  forEachThere([&](double probability, const Eigen::Vector2d& position_m) {
-    moments.mean_m += probability * position_m;
-    sum += probability;
-  });
+  map_.within(map_.position_m(best), radius_m, around_);
+  for (const std::uint32_t i : around_) {
+    moments.mean_m += probabilities_[i] * map_.position_m(i);
+    sum += probabilities_[i];
+  }
   if (!(sum > 0.0)) return {map_.position_m(best), Eigen::Matrix2d::Zero()};
   moments.mean_m /= sum;
-  forEachThere([&](double probability, const Eigen::Vector2d& position_m) {
-    const Eigen::Vector2d offset_m = position_m - moments.mean_m;
-    moments.covariance_m2 += probability / sum * offset_m * offset_m.transpose();
-  });
+  for (const std::uint32_t i : around_) {
+    const Eigen::Vector2d offset_m = map_.position_m(i) - moments.mean_m;
+    moments.covariance_m2 += probabilities_[i] / sum * offset_m * offset_m.transpose();
+  }
   return moments;
 }
 

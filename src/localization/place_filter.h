@@ -98,6 +98,7 @@ class PlaceFilter {
     double sigma_m = 0.0;
   };
 
+  void mostProbable(std::size_t count, double least, std::vector<std::size_t>& found) const;
   void learnPace();
   void forgetMotion();
   double secondsOf(const Motion& motion) const;
@@ -128,7 +129,8 @@ class PlaceFilter {
   OffMapBelief off_map_;
   double leaving_ = 0.0;  ///< how likely the motion leads beyond the training images
   std::vector<OffMapBelief::Compared> asked_;
-  mutable std::vector<Neighbour> neighbours_;
+  std::vector<Neighbour> neighbours_;
+  mutable std::vector<std::uint32_t> around_;
   std::vector<double> ahead_m_;
   std::vector<double> kernel_;
 };

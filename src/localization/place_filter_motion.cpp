@@ -110,9 +110,9 @@ void PlaceFilter::predict(const Motion& motion) {
   stayed_ = probabilities_;
   const double least = kLeastMoved * *std::max_element(probabilities_.begin(), probabilities_.end());
   std::vector<std::size_t> moved;
-  mostProbable(kMostMoved, moved);
+  mostProbable(kMostMoved, least, moved);
   for (const std::size_t image : moved) {
-    if (probabilities_[image] < least || probabilities_[image] <= 0.0) continue;
+    if (probabilities_[image] <= 0.0) continue;
     moveFrom(image, motion);
     stayed_[image] = 0.0;
   }

@@ -202,14 +202,15 @@ class PositionIndex::Tree {
   const std::vector<Eigen::Vector2d>& positions() const { return points_.positions_m; }
 
   /// In order of index; when there are more than `most`, any of them, but more than `most`.
-  std::vector<std::uint32_t> within(const Eigen::Vector2d& centre_m, double radius_m, std::size_t most) const {
-    std::vector<std::uint32_t> indices;
-    IndicesWithin results(radius_m * radius_m, most, indices);
+  void within(const Eigen::Vector2d& centre_m, double radius_m, std::size_t most,
+              std::vector<std::uint32_t>& found) const {
+    found.clear();
+    IndicesWithin results(radius_m * radius_m, most, found);
     tree_.findNeighbors(results, centre_m.data(), {});
-    for (std::uint32_t& index : indices) index = points_.sought[index];
-    std::sort(indices.begin(), indices.end());
-    return indices;
+    for (std::uint32_t& index : found) index = points_.sought[index];
+    std::sort(found.begin(), found.end());
   }
+  bool seeksAll() const { return points_.sought.size() == points_.positions_m.size(); }
 
   double nearlyLeastDistance_m(const Eigen::Vector2d& position_m) const {
     NearlyLeastDistance result;
@@ -255,7 +256,9 @@ PositionIndex::PositionIndex(std::vector<Eigen::Vector2d> positions_m) {
       tree_->positions(),
       [this](const Eigen::Vector2d& position_m) { return tree_->nearlyLeastDistance_m(position_m); },
       [this](const Eigen::Vector2d& centre_m, double radius_m) {
-        return tree_->within(centre_m, radius_m, kMostCandidates);
+        std::vector<std::uint32_t> found;
+        tree_->within(centre_m, radius_m, kMostCandidates, found);
+        return found;
       });
 }
 
@@ -270,6 +273,21 @@ Neighbour PositionIndex::nearest(const Eigen::Vector2d& position_m) const {
 void PositionIndex::nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const {
   found.clear();
   if (count > 0 && position_m.allFinite()) tree_->nearest(position_m, count, found);
+}
+
+void PositionIndex::within(const Eigen::Vector2d& position_m, double radius_m,
+                           std::vector<std::uint32_t>& found) const {
+  constexpr double kMore_m = 1e-6;  // the tree takes what is nearer than its radius, by squares
+  found.clear();
+  if (!position_m.allFinite() || !(radius_m >= 0.0)) return;
+  const std::vector<Eigen::Vector2d>& positions_m = tree_->positions();
+  tree_->within(position_m, radius_m * (1.0 + 1e-9) + kMore_m, positions_m.size(), found);
+  if (found.size() >= kMostOnOneSpot && !tree_->seeksAll()) {  // more may lie on a spot
+    found.resize(positions_m.size());
+    std::iota(found.begin(), found.end(), 0U);
+  }
+  const auto is_beyond = [&](std::uint32_t i) { return (positions_m[i] - position_m).norm() > radius_m; };
+  found.erase(std::remove_if(found.begin(), found.end(), is_beyond), found.end());
 }
 
 void PositionIndex::nearest(const Eigen::Vector2d& position_m, const Search& search,

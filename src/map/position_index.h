@@ -60,6 +60,9 @@ class PositionIndex {
   /// 1024 at most. A position that is not finite has none.
   void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const;
 
+  /// Into `found`: all within `radius_m`, in order of index. A position that is not finite has none.
+  void within(const Eigen::Vector2d& position_m, double radius_m, std::vector<std::uint32_t>& found) const;
+
   /// How far a search among the nearest positions goes.
   struct Search {
     std::size_t wanted = 1;                                     ///< so many that are accepted are enough

@@ -177,6 +177,10 @@ void TrainingMap::nearest(const Eigen::Vector2d& position_m, std::size_t count, 
   index_->nearest(position_m, count, found);
 }
 
+void TrainingMap::within(const Eigen::Vector2d& position_m, double radius_m, std::vector<std::uint32_t>& found) const {
+  index_->within(position_m, radius_m, found);
+}
+
 void TrainingMap::nearestFacing(std::size_t i, std::size_t count, double radius_m,
                                 std::vector<Neighbour>& found) const {
   const auto facesAlike = [&](std::size_t other) { return other != i && faceAlike(yaw_rad(i), yaw_rad(other)); };

@@ -155,5 +155,29 @@ TEST(NearestGrid, AnswersBetweenPositionsThatAreFarApart) {
   EXPECT_EQ(shareAnsweredRightly(apart, 1e6), 1.0);
 }
 
+TEST(PositionIndex, WithinARadiusAreAllAndInOrder) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> anywhere(-10.0, 10.0);
+  Positions positions_m(3000, Eigen::Vector2d(1.0, 2.0));  // more on one spot than are sought there
+  while (positions_m.size() < 5000) positions_m.emplace_back(anywhere(random), anywhere(random));
+  std::shuffle(positions_m.begin(), positions_m.end(), random);
+  const PositionIndex index(positions_m);
+  std::vector<std::uint32_t> found;
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector2d place_m(anywhere(random), anywhere(random));
+    const double radius_m = i % 10 == 0 ? (positions_m[0] - place_m).norm() : std::abs(anywhere(random));
+    std::vector<std::uint32_t> expected;
+    for (std::uint32_t k = 0; k < positions_m.size(); ++k) {
+      if ((positions_m[k] - place_m).norm() <= radius_m) expected.push_back(k);
+    }
+    index.within(place_m, radius_m, found);
+    ASSERT_EQ(found, expected) << place_m.transpose() << " within " << radius_m;
+  }
+  index.within({1.0, 2.0}, 0.0, found);
+  EXPECT_EQ(found.size(), 3000U);
+  index.within({std::numeric_limits<double>::quiet_NaN(), 0.0}, 1.0, found);
+  EXPECT_TRUE(found.empty());
+}
+
 }  // namespace
 }  // namespace visual_localization

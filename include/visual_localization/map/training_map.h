@@ -152,6 +152,8 @@ class TrainingMap {
   std::vector<Neighbour> nearest(const Eigen::Vector2d& position_m, std::size_t count) const;
   /// The same into memory that is there already.
   void nearest(const Eigen::Vector2d& position_m, std::size_t count, std::vector<Neighbour>& found) const;
+  /// Into `found`: all within `radius_m` of a position, in order; of one that is not finite none.
+  void within(const Eigen::Vector2d& position_m, double radius_m, std::vector<std::uint32_t>& found) const;
   /// Into `found`: of the `count` training images nearest to image `i`, itself included, the others that are within
   /// `radius_m` and face alike, so that they can show the same; closest first. Where none does four times as many are
   /// looked at, and so on up to 1024.
