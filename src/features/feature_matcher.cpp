@@ -122,9 +122,9 @@ void matchMutual(const LocalFeatures& a, const LocalFeatures& b, double max_dy_p
 }
 
 void matchBy(const MatchConfig& config, const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
-             std::vector<FeatureMatch>& matches) {
+             double vote_rows, std::vector<FeatureMatch>& matches) {
   if (config.isByVotes()) {
-    matchMutual(a, b, kVoteRows * image_width_px, matches);
+    matchMutual(a, b, vote_rows * image_width_px, matches);
     keepLargestVote(a, b, image_width_px, matches);
   } else if (config.isOneWay()) {
     matchOneWay(a, b, config.max_angle_ratio, matches);

@@ -96,7 +96,7 @@ cv::Mat drawMatches(const cv::Mat& grey, const LocalFeatures& sift, const Traini
   ImagePair images(grey, map, training);
   const std::shared_ptr<const LocalFeatures> training_sift = map.local(training);
   std::vector<FeatureMatch> matches;
-  matchBy(match, sift, *training_sift, map.header().image_size.width, matches);
+  map.header().kind->match(match, sift, *training_sift, map.header().image_size.width, matches);
   std::size_t line = 0;
   for (const FeatureMatch& pair : matches) {
     images.join(positionOf(sift.keypoints()[pair.a]), positionOf(training_sift->keypoints()[pair.b]),

@@ -125,9 +125,9 @@ TEST(MatchMutual, LooksNoFartherUpOrDown) {
   const LocalFeatures a = scattered(30, 7);
   const LocalFeatures lower = movedTo(a, shifted(a, 30, 0.0F, 90.0F).keypoints());
   std::vector<FeatureMatch> matches;
-  matchBy(MatchConfig{0.6, "votes"}, a, lower, 640.0, matches);
+  matchBy(MatchConfig{0.6, "votes"}, a, lower, 640.0, 0.15, matches);
   EXPECT_EQ(matches.size(), 30u);
-  matchBy(MatchConfig{0.6, "votes"}, a, lower, 320.0, matches);
+  matchBy(MatchConfig{0.6, "votes"}, a, lower, 320.0, 0.15, matches);
   EXPECT_LT(matches.size(), 10u) << "48 pixels at this width";
 }
 

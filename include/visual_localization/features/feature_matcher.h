@@ -43,9 +43,9 @@ void matchSymmetric(const LocalFeatures& a, const LocalFeatures& b, double max_a
 /// second nearest is.
 void matchMutual(const LocalFeatures& a, const LocalFeatures& b, double max_dy_px, std::vector<FeatureMatch>& matches);
 /// By the mode and the ratio of `config`. By votes: of matchMutual(), the largest number with a common displacement
-/// (see displacement_votes.h), for images of this width.
+/// (see displacement_votes.h), for images of this width. `vote_rows`: see LocalFeatureKind.
 void matchBy(const MatchConfig& config, const LocalFeatures& a, const LocalFeatures& b, double image_width_px,
-             std::vector<FeatureMatch>& matches);
+             double vote_rows, std::vector<FeatureMatch>& matches);
 
 /// Median size of the matched features of `a` as a share of their partners' in `b`: how much larger the same things
 /// look, and so how much nearer they are, seen from a. 1 without matches of sizes above 0.

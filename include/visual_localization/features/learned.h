@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -41,6 +42,8 @@ class Learned final : public LocalFeatureKind {
   /// Of features that match more readily. Gardens Point by day and, on the other side of the path, by night: with 3 3 %
   /// of the claims are wrong and 84 % of the places right, with 2 none and 93 %.
   double likelihoodExponent() const override { return 2.0; }
+  /// In the whole picture: limited, chance matches more of them; by night DPSO is right for 62 instead of 73 % then.
+  double voteRows() const override { return std::numeric_limits<double>::infinity(); }
   std::size_t stored_bytes() const override { return form().dimension; }
   std::vector<std::uint8_t> pack(const LocalFeatures& features) const override;
   LocalFeatures unpack(Keypoints keypoints, const std::uint8_t* bytes, std::size_t size) const override;
