@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <iterator>
 #include <stdexcept>
-#include <thread>
 
 #include <cv_bridge/cv_bridge.h>
 #include <geometry_msgs/TransformStamped.h>
@@ -23,11 +22,6 @@
 namespace visual_localization {
 namespace {
 
-/// Wall time: simulated time may stand still.
-constexpr std::chrono::milliseconds kOdometryWait{100};
-/// While there has never been odometry: every image would wait in vain.
-constexpr std::chrono::milliseconds kUnknownOdometryWait{20};
-constexpr std::chrono::milliseconds kOdometryPoll{5};
 constexpr double kSlidingSigmas = 3.0;
 
 tf2::Transform planar(double x_m, double y_m, double yaw_rad) {
@@ -86,7 +80,7 @@ TransformPublisher::TransformPublisher(const NodeParameters& parameters, const r
       transforms_(config_.odom_frame_id, config_.base_frame_id, log),
       odometry_(parameters.localizer.odometry),
       correction_(config_.tf_smoothing_s, odometry_) {
-  if (config_.tf_mode == "map_to_odom") listener_.emplace(node, transforms_, log);
+  if (config_.tf_mode == "map_to_odom") listener_.emplace(node, transforms_, log, [this] { odometryCame(); });
   if (!between_images_) return;
   ros::NodeHandle timer_node(node);
   timer_node.setCallbackQueue(&queue_);
@@ -99,6 +93,7 @@ TransformPublisher::TransformPublisher(const NodeParameters& parameters, const r
 }
 
 TransformPublisher::~TransformPublisher() {
+  listener_.reset();
   timer_.stop();
   spinner_.reset();
 }
@@ -119,6 +114,7 @@ void TransformPublisher::forget() {
 
 void TransformPublisher::forgetPose() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  late_.clear();
   odom_in_map_.reset();
   correction_ = SlidingCorrection(config_.tf_smoothing_s, odometry_);
   last_between_ = ros::Time();
@@ -129,6 +125,7 @@ std::string TransformPublisher::publish(const Estimate& estimate, const ros::Tim
   if (config_.tf_mode == "none") return {};
   if (stamp == last_stamp_) return last_reason_;  // tf2 complains about a second transform for the same stamp
   last_stamp_ = stamp;
+  const std::lock_guard<std::mutex> lock(mutex_);
   last_reason_ = movesRobot(estimate, config_.tf_metric_only) ? move(estimate.pose, stamp) : hold(stamp);
   return last_reason_;
 }
@@ -138,20 +135,32 @@ std::string TransformPublisher::move(const PoseEstimate& pose, const ros::Time& 
     broadcast(baseInMap(pose), config_.base_frame_id, stamp);
     return {};
   }
+  const auto now = std::chrono::steady_clock::now();
+  late_.await(pose, stamp, now);
+  if (moveByOdometry()) return trouble_between_;
+  if (transforms_.knows(ros::Time()) && !late_.isMissing(now)) return {};  // it will come
   std::string reason;
-  const auto base_in_odom = baseInOdom(stamp, reason);
-  if (!base_in_odom) return reason;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    odom_in_map_ = odomInMap(baseInMap(pose), *base_in_odom);
-    correction_.aimAt(*odom_in_map_, *base_in_odom, largerSigma(pose.covariance_m2), std::sqrt(pose.yaw_variance_rad2));
-  }
-  return hold(stamp);
+  lookUpBaseInOdom(stamp, reason);
+  return reason;
+}
+
+bool TransformPublisher::moveByOdometry() {
+  const auto known = late_.take(transforms_);
+  if (!known) return false;
+  odom_in_map_ = odomInMap(baseInMap(known->pose), known->base_in_odom);
+  correction_.aimAt(*odom_in_map_, known->base_in_odom, largerSigma(known->pose.covariance_m2),
+                    std::sqrt(known->pose.yaw_variance_rad2));
+  hold(known->stamp);
+  return true;
+}
+
+void TransformPublisher::odometryCame() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  moveByOdometry();
 }
 
 /// Without odometry nobody knows where the robot has gone since.
 std::string TransformPublisher::hold(const ros::Time& stamp) {
-  const std::lock_guard<std::mutex> lock(mutex_);
   if (!odom_in_map_) return "no metric pose while tracking (tf_metric_only)";
   if (!between_images_) {
     broadcast(*odom_in_map_, config_.odom_frame_id, stamp);
@@ -173,15 +182,6 @@ void TransformPublisher::broadcastBetween(const ros::Time& now) {
                                           static_cast<std::int64_t>(now.toNSec()));  // ros::Duration ends at 68 years
   broadcast(correction_.after(elapsed_s, *base_in_odom), config_.odom_frame_id, now);
   last_between_ = now;
-}
-
-std::optional<tf2::Transform> TransformPublisher::baseInOdom(const ros::Time& stamp, std::string& reason) const {
-  const bool is_known = transforms_.knows(ros::Time());
-  const auto deadline = std::chrono::steady_clock::now() + (is_known ? kOdometryWait : kUnknownOdometryWait);
-  while (!transforms_.knows(stamp) && std::chrono::steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(kOdometryPoll);
-  }
-  return lookUpBaseInOdom(stamp, reason);
 }
 
 std::optional<tf2::Transform> TransformPublisher::lookUpBaseInOdom(const ros::Time& stamp, std::string& reason) const {

@@ -21,6 +21,7 @@
 
 #include "node/drawings.h"
 #include "node/image_worker.h"
+#include "node/late_odometry.h"
 #include "node/localizer_diagnostics.h"
 #include "node/markers.h"
 #include "node/node_config.h"
@@ -61,8 +62,8 @@ class SlidingCorrection {
 };
 
 /// Broadcasts the estimate as NodeConfig::tf_mode says: with each image, or with map_to_odom at NodeConfig::tf_rate,
-/// from a thread of its own. Without odometry at an image's time, and after an estimate that may not move the robot,
-/// the last transform goes on.
+/// from a thread of its own. A pose moves the robot when odometry of its time has come. Until then, and after an
+/// estimate that may not move the robot, the last transform goes on.
 class TransformPublisher {
  public:
   /// `log` must outlive it.
@@ -79,9 +80,11 @@ class TransformPublisher {
   std::string publish(const Estimate& estimate, const ros::Time& stamp);
 
  private:
+  /// The caller holds the mutex, as for the next two.
   std::string move(const PoseEstimate& pose, const ros::Time& stamp);
+  bool moveByOdometry();
   std::string hold(const ros::Time& stamp);
-  std::optional<tf2::Transform> baseInOdom(const ros::Time& stamp, std::string& reason) const;
+  void odometryCame();
   /// `stamp` 0: the newest. `reason`: why there is none, otherwise empty.
   std::optional<tf2::Transform> lookUpBaseInOdom(const ros::Time& stamp, std::string& reason) const;
   void broadcastBetween(const ros::Time& now);
@@ -99,6 +102,7 @@ class TransformPublisher {
   std::string last_reason_;  ///< why nothing was broadcast for that stamp
   std::mutex mutex_;         ///< of all that follows, until the next comment
   OdometryConfig odometry_;
+  LateOdometry late_;
   std::optional<tf2::Transform> odom_in_map_;         ///< of the last estimate that moved the robot
   SlidingCorrection correction_;                      ///< where that is known
   ros::Time last_between_;                            ///< broadcast

@@ -110,13 +110,17 @@ std::size_t RobotTransforms::frames() const {
   return parents_.size() + statics_.size();
 }
 
-RobotTransformListener::RobotTransformListener(ros::NodeHandle node, RobotTransforms& transforms, ThrottledLog& log)
+RobotTransformListener::RobotTransformListener(ros::NodeHandle node, RobotTransforms& transforms, ThrottledLog& log,
+                                               const std::function<void()>& added)
     : spinner_(1, &queue_) {
   node.setCallbackQueue(&queue_);
   const auto subscribe = [&](const char* topic, bool is_static) {
     const boost::function<void(const tf2_msgs::TFMessageConstPtr&)> add =
-        [&transforms, &log, is_static](const tf2_msgs::TFMessageConstPtr& message) {
-          guarded(log, "tf", [&] { transforms.add(*message, is_static); });
+        [&transforms, &log, added, is_static](const tf2_msgs::TFMessageConstPtr& message) {
+          guarded(log, "tf", [&] {
+            transforms.add(*message, is_static);
+            added();
+          });
         };
     return node.subscribe<tf2_msgs::TFMessage>(topic, kQueue, add);
   };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -57,7 +58,9 @@ class RobotTransforms {
 /// Subscribes RobotTransforms to tf, with a thread of its own: whoever waits for a transform must not hold it up.
 class RobotTransformListener {
  public:
-  RobotTransformListener(ros::NodeHandle node, RobotTransforms& transforms, ThrottledLog& log);
+  /// `added`: after each message.
+  RobotTransformListener(ros::NodeHandle node, RobotTransforms& transforms, ThrottledLog& log,
+                         const std::function<void()>& added);
   ~RobotTransformListener();
   RobotTransformListener(const RobotTransformListener&) = delete;
   RobotTransformListener& operator=(const RobotTransformListener&) = delete;
