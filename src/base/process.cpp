@@ -1,11 +1,13 @@
 #include "base/process.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 #include <dlfcn.h>
@@ -60,6 +62,44 @@ fs::path thisLibrary() {
   return fs::weakly_canonical(info.dli_fname, none);
 }
 
+/// What RLIMIT_DATA counts, and the stack.
+rlim_t writableBytes() {
+  std::ifstream statm("/proc/self/statm");  // proc(5): size resident shared text lib data, in pages
+  rlim_t pages = 0;
+  for (int field = 0; field < 6; ++field) statm >> pages;
+  return pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
+}
+
+void limitMemory(rlim_t most) {
+  rlimit memory{};
+  ::getrlimit(RLIMIT_DATA, &memory);
+  memory.rlim_cur = std::min(memory.rlim_cur, most);
+  ::setrlimit(RLIMIT_DATA, &memory);
+  std::ofstream("/proc/self/oom_score_adj") << 1000;
+}
+
+/// What a copy does; it writes what is thrown to `error_output`.
+[[noreturn]] void runHere(const std::function<void()>& run, unsigned longest_s, rlim_t most, int error_output) {
+  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) ::signal(number, SIG_DFL);
+  const rlimit no_core{0, 0};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  ::dup2(nowhere, STDERR_FILENO);
+  limitMemory(most);
+  ::alarm(longest_s);
+  const auto tell = [error_output](const char* text) {
+    if (::write(error_output, text, std::strlen(text)) < 0) ::_exit(1);
+  };
+  try {
+    run();
+  } catch (const std::exception& error) {
+    tell(error.what());
+  } catch (...) {
+    tell("unknown exception");
+  }
+  ::_exit(0);
+}
+
 }  // namespace
 
 std::string programBeside(const std::string& name) {
@@ -78,26 +118,22 @@ std::string programOfPackage(const std::string& name) {
   return programBeside(name);
 }
 
-std::string howCopyEnds(const std::function<void()>& run, unsigned longest_s) {
+std::string howCopyEnds(const std::function<void()>& run, unsigned longest_s, std::size_t most_bytes) {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::strerror(errno));
+  const rlim_t most = writableBytes() + most_bytes;
   const pid_t copy = ::fork();
-  if (copy < 0) throw std::runtime_error(std::string("no process for it: ") + std::strerror(errno));
-  if (copy == 0) {
-    for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM}) ::signal(number, SIG_DFL);
-    const rlimit no_core{0, 0};
-    ::setrlimit(RLIMIT_CORE, &no_core);
-    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-    ::dup2(nowhere, STDERR_FILENO);
-    ::alarm(longest_s);
-    try {
-      run();
-    } catch (...) {  // which the caller gets when it does the same
-    }
-    ::_exit(0);
-  }
+  const int fork_error = errno;
+  if (copy == 0) runHere(run, longest_s, most, pipe[1]);
+  ::close(pipe[1]);
+  const std::string thrown = copy > 0 ? readAll(pipe[0]) : "";
+  ::close(pipe[0]);
+  if (copy < 0) throw std::runtime_error(std::string("no process for it: ") + std::strerror(fork_error));
   int status = 0;
   while (::waitpid(copy, &status, 0) != copy) {
     if (errno != EINTR) throw std::runtime_error(std::string("nobody knows how it ended: ") + std::strerror(errno));
   }
+  if (status == 0 && !thrown.empty()) throw std::runtime_error(thrown);
   if (status == 0) return {};
   if (!WIFSIGNALED(status)) return "with exit code " + std::to_string(WEXITSTATUS(status));
   if (WTERMSIG(status) == SIGALRM) return "after " + std::to_string(longest_s) + " s without a result";

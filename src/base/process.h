@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -17,9 +18,10 @@ std::string programBeside(const std::string& name);
 std::string programOfPackage(const std::string& name);
 
 /// Runs something in a copy of this process, for libraries that a broken file ends instead of an exception. Empty when
-/// it came to its end or threw; otherwise how the copy ended: "by signal 11 (Segmentation fault)". After `longest_s` it
-/// is ended.
-std::string howCopyEnds(const std::function<void()>& run, unsigned longest_s);
+/// it came to its end; otherwise how the copy ended: "by signal 11 (Segmentation fault)". What it throws is thrown here
+/// as std::runtime_error. After `longest_s` it is ended. It is refused more than `most_bytes` of memory beyond what
+/// this process has, and where memory runs out, the kernel ends it first.
+std::string howCopyEnds(const std::function<void()>& run, unsigned longest_s, std::size_t most_bytes);
 
 /// A program that runs as a process of its own.
 class ChildProcess {

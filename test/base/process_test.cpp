@@ -2,9 +2,13 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <functional>
 #include <future>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -12,6 +16,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 namespace visual_localization {
@@ -65,18 +70,57 @@ TEST(ChildProcess, EndsWhenItIsTerminated) {
   EXPECT_THROW(child.run("/bin/true", {}), std::runtime_error) << "nor does another one start";
 }
 
-TEST(HowCopyEnds, IsEmptyWhereItComesToItsEndOrThrows) {
+constexpr std::size_t kMiB = std::size_t{1} << 20U;
+
+std::string endOf(const std::function<void()>& run, unsigned longest_s = 10) {
+  return howCopyEnds(run, longest_s, 64 * kMiB);
+}
+
+TEST(HowCopyEnds, IsEmptyWhereItComesToItsEnd) {
   int here = 1;
-  EXPECT_EQ(howCopyEnds([&here] { here = 2; }, 10), "");
+  EXPECT_EQ(endOf([&here] { here = 2; }), "");
   EXPECT_EQ(here, 1) << "what it does must not be done here";
-  EXPECT_EQ(howCopyEnds([] { throw std::runtime_error("refused"); }, 10), "");
+}
+
+TEST(HowCopyEnds, ThrowsWhatItThrows) {
+  try {
+    endOf([] { throw std::out_of_range("refused"); });
+    ADD_FAILURE();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "refused");
+  }
+  EXPECT_THROW(endOf([] { throw 1; }), std::runtime_error);
 }
 
 TEST(HowCopyEnds, NamesWhatEndedIt) {
-  EXPECT_EQ(howCopyEnds([] { std::raise(SIGFPE); }, 10), "by signal 8 (Floating point exception)");
-  EXPECT_EQ(howCopyEnds([] { std::abort(); }, 10), "by signal 6 (Aborted)");
-  EXPECT_EQ(howCopyEnds([] { std::_Exit(3); }, 10), "with exit code 3");
-  EXPECT_EQ(howCopyEnds([] { std::this_thread::sleep_for(std::chrono::hours(1)); }, 1), "after 1 s without a result");
+  EXPECT_EQ(endOf([] { std::raise(SIGFPE); }), "by signal 8 (Floating point exception)");
+  EXPECT_EQ(endOf([] { std::abort(); }), "by signal 6 (Aborted)");
+  EXPECT_EQ(endOf([] { std::_Exit(3); }), "with exit code 3");
+  EXPECT_EQ(endOf([] { std::this_thread::sleep_for(std::chrono::hours(1)); }, 1), "after 1 s without a result");
+}
+
+// By the kernel's own call: a sanitizer's operator new does not throw.
+TEST(HowCopyEnds, MemoryBeyondTheBoundIsRefused) {
+  const auto take = [](std::size_t bytes) {
+    const void* block = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (block == MAP_FAILED) throw std::bad_alloc();
+  };
+  EXPECT_EQ(endOf([&] { take(32 * kMiB); }), "");
+  EXPECT_THROW(endOf([&] { take(65 * kMiB); }), std::runtime_error);
+  EXPECT_THROW(endOf([&] {
+                 for (int i = 0; i < 10; ++i) take(8 * kMiB);
+               }),
+               std::runtime_error);
+  EXPECT_NO_THROW(take(65 * kMiB)) << "here it is not";
+}
+
+TEST(HowCopyEnds, ItIsTheFirstToEndWhereMemoryRunsOut) {
+  const auto require_score = [] {
+    int score = 0;
+    std::ifstream("/proc/self/oom_score_adj") >> score;
+    if (score != 1000) std::_Exit(1);
+  };
+  EXPECT_EQ(endOf(require_score), "");
 }
 
 TEST(ProgramOfPackage, FindsProgramsBesideTheLibrary) {

@@ -122,6 +122,28 @@ TEST_F(LearnedTest, RefusesAModelWhoseScoresAreNotFinite) {
   EXPECT_THAT(refusal(path), AllOf(HasSubstr(path), HasSubstr("'scores' is not finite")));
 }
 
+/// Of ONNX's fields (onnx.proto): number, then length and bytes.
+std::string field(char number, const std::string& bytes) {
+  return std::string{static_cast<char>(8 * number + 2), static_cast<char>(bytes.size())} + bytes;
+}
+
+/// Its scores are a plane of zeros of 3 GiB.
+std::string largeModel() {
+  const std::string sides("\x01\x01\x80\x80\x02\x80\xc0\x01");  // 1 x 1 x 32768 x 24576
+  const std::string shape = "\x08\x04\x10\x07" + field(7, sides) + field(8, "shape");
+  const std::string node = field(1, "shape") + field(2, "scores") + field(4, "ConstantOfShape");
+  const std::string real_numbers("\x08\x01\x12\x00", 4);
+  const std::string output = field(1, "scores") + field(2, field(1, real_numbers));
+  const std::string graph = field(1, node) + field(2, "large") + field(5, shape) + field(12, output);
+  return "\x08\x07" + field(7, graph) + field(8, "\x10\x0b");
+}
+
+TEST_F(LearnedTest, RefusesAModelThatTakesTooMuchMemory) {
+  const std::string path = folder_ / "large.onnx";
+  std::ofstream(path, std::ios::binary) << largeModel();
+  EXPECT_THAT(refusal(path), AllOf(HasSubstr(path), HasSubstr("3221225472 bytes"), testing::Not(HasSubstr("\n"))));
+}
+
 // OpenCV 4.6 is ended by three of them.
 TEST_F(LearnedTest, SurvivesDamagedModels) {
   const std::string whole = readFile(TEST_DATA_DIR "/../fuzz/corpus/model/accepted/small.onnx");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <new>
 #include <stdexcept>
 
 #include <opencv2/core/utils/logger.hpp>
@@ -72,8 +73,15 @@ bool isPlane(const cv::Mat& output) { return output.dims == 4 && output.size[0] 
 
 void requireHarmlessModel(const std::string& path) {
   constexpr unsigned kLongest_s = 60;
-  const std::string end =
-      howCopyEnds([&path] { FeatureModel(path).setImage(cv::Mat::zeros(480, 640, CV_8U)); }, kLongest_s);
+  // ALIKE-s takes a tenth; the largest file half, since OpenCV copies it until the network runs.
+  constexpr std::size_t kMost_bytes = std::size_t{2} << 30U;
+  std::string end;
+  try {
+    end =
+        howCopyEnds([&path] { FeatureModel(path).setImage(cv::Mat::zeros(480, 640, CV_8U)); }, kLongest_s, kMost_bytes);
+  } catch (const std::runtime_error& error) {
+    throw ParameterError(error.what());
+  }
   if (end.empty()) return;
   throw ParameterError("model '" + oneLine(path) + "': is damaged: OpenCV " CV_VERSION " ends " + end);
 }
@@ -98,6 +106,8 @@ FeatureModel::FeatureModel(const std::string& path, const std::optional<std::str
     }
   } catch (const cv::Exception& error) {
     throw ParameterError("model '" + oneLine(path) + "': " + inWords(error));
+  } catch (const std::bad_alloc&) {
+    throw ParameterError("model '" + oneLine(path) + "': takes more memory than it may");
   } catch (const std::exception& error) {
     throw ParameterError("model '" + oneLine(path) + "': " + oneLine(error.what()));
   }
