@@ -119,6 +119,17 @@ class Editor {
     }
   }
 
+  /// To be called before repairChecksum().
+  void repairVocabulary() {
+    const Row row = prepare("SELECT learnt FROM vocabulary");
+    if (!row || sqlite3_step(row.get()) != SQLITE_ROW) return;
+    const auto* data = static_cast<const std::uint8_t*>(sqlite3_column_blob(row.get(), 0));
+    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(row.get(), 0));
+    const Row change = prepare("INSERT OR REPLACE INTO meta VALUES('vocabulary', ?)");
+    sqlite3_bind_int64(change.get(), 1, map_schema::crc32Of({data, size}));
+    sqlite3_step(change.get());
+  }
+
   void repairChecksum() {
     map_schema::Checksum checksum;
     for (const map_schema::ImageRow& image : images_) image.addTo(checksum);
@@ -172,28 +183,13 @@ struct Sql {
 };
 
 Sql anySql(Random& random) {
-  static const std::array<const char*, 22> kColumns{"images.id",
-                                                    "images.session",
-                                                    "images.stamp_ns",
-                                                    "images.east_m",
-                                                    "images.north_m",
-                                                    "images.yaw_rad",
-                                                    "images.feature_count",
-                                                    "features.keypoints",
-                                                    "features.descriptors",
-                                                    "features.image",
-                                                    "globals.wgoh",
-                                                    "globals.wgii",
-                                                    "previews.jpeg",
-                                                    "previews.image",
-                                                    "meta.key",
-                                                    "meta.value",
-                                                    "landmarks.pose",
-                                                    "landmarks.points",
-                                                    "landmarks.image",
-                                                    "landmarks.crc32",
-                                                    "masks.session",
-                                                    "masks.bits"};
+  static const std::array<const char*, 27> kColumns{
+      "images.id",      "images.session",       "images.stamp_ns",    "images.east_m",        "images.north_m",
+      "images.yaw_rad", "images.feature_count", "features.keypoints", "features.descriptors", "features.image",
+      "globals.wgoh",   "globals.wgii",         "previews.jpeg",      "previews.image",       "meta.key",
+      "meta.value",     "landmarks.pose",       "landmarks.points",   "landmarks.image",      "landmarks.crc32",
+      "masks.session",  "masks.bits",           "vlads.image",        "vlads.descriptor",     "vlads.crc32",
+      "vocabulary.id",  "vocabulary.learnt"};
   static const std::array<const char*, 25> kValues{"0",
                                                    "1",
                                                    "-1",
@@ -219,7 +215,7 @@ Sql anySql(Random& random) {
                                                    "'sift'",
                                                    "4294967296000000001",
                                                    "-4294967296000000001"};
-  static const std::array<const char*, 23> kOthers{
+  static const std::array<const char*, 30> kOthers{
       "CREATE VIEW v AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) SELECT i FROM n",
       "CREATE TRIGGER t AFTER INSERT ON images BEGIN DELETE FROM meta; END",
       "CREATE INDEX i ON images(abs(session))",
@@ -240,6 +236,13 @@ Sql anySql(Random& random) {
       "UPDATE meta SET value = value - 1 WHERE key LIKE '%/dimension'",
       "UPDATE images SET stamp_ns = stamp_ns * (1 - 2 * (id % 2)) * 3",
       "UPDATE landmarks SET points = CAST(points || points AS BLOB)",
+      "DELETE FROM vlads",
+      "DELETE FROM vocabulary; DELETE FROM meta WHERE key = 'vocabulary'",
+      "INSERT OR REPLACE INTO vlads SELECT image + 1, descriptor, 0 FROM vlads",
+      "UPDATE vlads SET descriptor = randomblob(length(descriptor))",
+      "UPDATE vocabulary SET learnt = CAST(substr(learnt, 1, 4) || randomblob(length(learnt) - 4) AS BLOB)",
+      "UPDATE vocabulary SET learnt = CAST(substr(learnt, 1, 4) || zeroblob(length(learnt) - 4) AS BLOB)",
+      "UPDATE vocabulary SET learnt = CAST(randomblob(4) || substr(learnt, 5) AS BLOB)",
       "PRAGMA page_size = 1024; VACUUM",
       "PRAGMA auto_vacuum = FULL; VACUUM",
       "PRAGMA encoding = 'UTF-16'; VACUUM"};
@@ -259,7 +262,8 @@ void repairChecksums(Editor& editor, const std::string& changed) {
     return changed.empty() || changed == "images" || changed == table;
   };
   editor.readImages();
-  if (is_changed("features") || is_changed("globals") || is_changed("previews") || is_changed("landmarks")) {
+  if (is_changed("features") || is_changed("globals") || is_changed("previews") || is_changed("landmarks") ||
+      is_changed("vlads")) {
     editor.computeSeeds();
   }
   if (is_changed("features")) {
@@ -277,7 +281,11 @@ void repairChecksums(Editor& editor, const std::string& changed) {
     editor.repairRows("SELECT image, pose, points, crc32 FROM landmarks", 2,
                       "UPDATE landmarks SET crc32 = ? WHERE image = ?");
   }
+  if (is_changed("vlads")) {
+    editor.repairRows("SELECT image, descriptor, crc32 FROM vlads", 1, "UPDATE vlads SET crc32 = ? WHERE image = ?");
+  }
   if (is_changed("masks")) editor.repairMasks();
+  if (is_changed("vocabulary")) editor.repairVocabulary();
   editor.repairChecksum();
 }
 
