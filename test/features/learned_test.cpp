@@ -141,7 +141,7 @@ std::string largeModel() {
 TEST_F(LearnedTest, RefusesAModelThatTakesTooMuchMemory) {
   const std::string path = folder_ / "large.onnx";
   std::ofstream(path, std::ios::binary) << largeModel();
-  EXPECT_THAT(refusal(path), AllOf(HasSubstr(path), HasSubstr("3221225472 bytes"), testing::Not(HasSubstr("\n"))));
+  EXPECT_THAT(refusal(path), AllOf(HasSubstr(path), HasSubstr("takes too much memory")));
 }
 
 // OpenCV 4.6 is ended by three of them.

@@ -47,7 +47,21 @@ std::string crc32Of(const std::string& bytes) {
   return hexadecimal(::crc32(0, data, static_cast<uInt>(bytes.size())));
 }
 
-std::string inWords(const cv::Exception& error) { return "OpenCV " CV_VERSION " cannot run it: " + oneLine(error.err); }
+std::string named(const std::string& path) { return "model '" + oneLine(path) + "': "; }
+
+/// OpenCV puts an allocation that is refused into another error.
+bool isOutOfMemory(const cv::Exception& error) {
+  return error.code == cv::Error::StsNoMem || error.err.find("Insufficient memory") != std::string::npos;
+}
+
+std::string inWords(const std::exception& error) {
+  const auto* of_opencv = dynamic_cast<const cv::Exception*>(&error);
+  const bool out_of_memory =
+      of_opencv != nullptr ? isOutOfMemory(*of_opencv) : dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+  if (out_of_memory) return "takes too much memory";
+  if (of_opencv != nullptr) return "OpenCV " CV_VERSION " cannot run it: " + oneLine(of_opencv->err);
+  return oneLine(error.what());
+}
 
 std::string levelName(std::size_t level) { return "descriptors_" + std::to_string(level); }
 
@@ -75,18 +89,24 @@ void requireHarmlessModel(const std::string& path) {
   constexpr unsigned kLongest_s = 60;
   // ALIKE-s takes a tenth; the largest file half, since OpenCV copies it until the network runs.
   constexpr std::size_t kMost_bytes = std::size_t{2} << 30U;
+  const auto try_it = [&path] {
+    try {
+      FeatureModel(path).setImage(cv::Mat::zeros(480, 640, CV_8U));
+    } catch (const std::bad_alloc& error) {
+      throw std::runtime_error(named(path) + inWords(error));
+    }
+  };
   std::string end;
   try {
-    end =
-        howCopyEnds([&path] { FeatureModel(path).setImage(cv::Mat::zeros(480, 640, CV_8U)); }, kLongest_s, kMost_bytes);
+    end = howCopyEnds(try_it, kLongest_s, kMost_bytes);
   } catch (const std::runtime_error& error) {
     throw ParameterError(error.what());
   }
   if (end.empty()) return;
-  throw ParameterError("model '" + oneLine(path) + "': is damaged: OpenCV " CV_VERSION " ends " + end);
+  throw ParameterError(named(path) + "is damaged: OpenCV " CV_VERSION " ends " + end);
 }
 
-FeatureModel::FeatureModel(const std::string& path, const std::optional<std::string>& checksum) {
+FeatureModel::FeatureModel(const std::string& path, const std::optional<std::string>& checksum) : name_(named(path)) {
   const Silence silence;
   try {
     if (path.empty()) throw std::runtime_error("learned features need the ONNX file of their network (--model)");
@@ -104,12 +124,8 @@ FeatureModel::FeatureModel(const std::string& path, const std::optional<std::str
       for (int row = 0; row < ramp.rows; ++row) ramp.row(row).setTo(cv::Scalar(2 * row));
       forward(ramp);
     }
-  } catch (const cv::Exception& error) {
-    throw ParameterError("model '" + oneLine(path) + "': " + inWords(error));
-  } catch (const std::bad_alloc&) {
-    throw ParameterError("model '" + oneLine(path) + "': takes more memory than it may");
   } catch (const std::exception& error) {
-    throw ParameterError("model '" + oneLine(path) + "': " + oneLine(error.what()));
+    throw ParameterError(name_ + inWords(error));
   }
 }
 
@@ -117,8 +133,10 @@ void FeatureModel::setImage(const cv::Mat& grey) {
   const Silence silence;
   try {
     forward(grey);
-  } catch (const cv::Exception& error) {
-    throw std::runtime_error("the model of learned features: " + inWords(error));
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw std::runtime_error(name_ + inWords(error));
   }
 }
 

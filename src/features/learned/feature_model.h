@@ -47,6 +47,7 @@ class FeatureModel {
   void takeHead();
   void sample(const Level& level, double x, double y, float* to) const;
 
+  std::string name_;  ///< in errors
   std::string checksum_;
   cv::dnn::Net net_;
   std::vector<std::string> names_;  ///< of the outputs: scores, descriptors level by level, head
