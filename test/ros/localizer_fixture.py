@@ -31,15 +31,23 @@ def _fail_skipped(result, test, reason):
 xmlrunner._XMLTestResult.addSkip = _fail_skipped  # rosunit would report a skipped test as passed
 
 
-def wait_for(condition, timeout_s, what):
-    """Returns the first true value of `condition()`; fails after `timeout_s` of wall time."""
+def value_within(timeout_s, condition):
+    """Returns the first true value of `condition()`; None after `timeout_s` of wall time."""
     deadline = time.monotonic() + timeout_s
     while time.monotonic() < deadline:
         value = condition()
         if value:
             return value
         time.sleep(0.02)
-    raise AssertionError('waited %.0f s in vain for %s' % (timeout_s, what))
+    return None
+
+
+def wait_for(condition, timeout_s, what):
+    """Returns the first true value of `condition()`; fails after `timeout_s` of wall time."""
+    value = value_within(timeout_s, condition)
+    if value is None:
+        raise AssertionError('waited %.0f s in vain for %s' % (timeout_s, what))
+    return value
 
 
 def others(topic):

@@ -4,6 +4,7 @@ odometry nothing is broadcast. A filter on ~metric_pose gets the same poses."""
 import itertools
 import math
 import sys
+import time
 import unittest
 
 import cv2
@@ -18,6 +19,8 @@ import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus
 
 DEADLINE_S = 30.0
+PERIOD_S = 0.3  # between images
+ANSWER_S = 3.0  # then the image was dropped
 TOLERANCE_S = 0.1
 
 
@@ -68,10 +71,12 @@ class LocalizerWithOdometry(unittest.TestCase):
             if odometry:
                 self.odometry.publish(TFMessage([base_in_odom(stamp, *odometry)]))
             self.camera.publish(image)
-            rospy.sleep(0.3)
-            if not any(s.header.stamp == stamp and s.source_name in sources for s in self.localizer.status.messages()):
-                return []
-            return [pose for pose in self.poses.messages() if pose.header.stamp == stamp]
+            time.sleep(PERIOD_S)
+
+            def of_image(recorder):
+                return fixture.value_within(ANSWER_S, lambda: [m for m in recorder.messages() if m.header.stamp == stamp])
+            status = of_image(self.localizer.status)
+            return status and status[0].source_name in sources and of_image(self.poses)
         return fixture.wait_for(seen, DEADLINE_S, 'a pose that is ' + ' or '.join(sources))[0]
 
     def show_metric(self, odometry=None):
