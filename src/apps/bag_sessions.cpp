@@ -172,7 +172,6 @@ MapBuilderConfig readConfig(const MapBuilderOptions& options) {
     overrideWith(config, "--model", "map/features", "learned");
     overrideWith(config, "--model", "map/model", options.model);
   }
-  if (options.sift_backend) overrideWith(config, "--sift-backend", "map/sift_backend", *options.sift_backend);
   return config;
 }
 

@@ -97,7 +97,6 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   declareRecordings(app, options);
   app.add_option("--output", options.output, "Map file to write")->required();
   declareThreads(app, options.threads);
-  app.add_option("--sift-backend", options.sift_backend, "'native' or 'opencv' (parameter 'map/sift_backend')");
   app.add_flag("--self-calibrate", options.self_calibrate,
                "Without a calibration find the focal length by the images (parameter 'geometry/self_calibration')");
   app.add_option("--plot", options.plot,

@@ -27,7 +27,6 @@ struct MapBuilderOptions {
   std::optional<double> min_spacing_m;
   std::optional<double> spacing_m;
   std::size_t threads = allCores();
-  std::optional<std::string> sift_backend;
   std::string model;
   bool self_calibrate = false;
 };

@@ -89,7 +89,7 @@ std::string withValues(std::string name, const std::vector<Setting>& settings, c
 }
 
 bool concernsFrontEnd(const std::string& parameter) {
-  return parameter.rfind("match/", 0) == 0 || parameter == "prune" || parameter == "sift_backend";
+  return parameter.rfind("match/", 0) == 0 || parameter == "prune";
 }
 
 /// What the entry of one method says before the sweep's values are filled in.

@@ -182,7 +182,7 @@ std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpe
   const std::optional<CameraModel> camera = for_poses ? cameraOf(bag, recording) : std::nullopt;
   const cv::Size usual_size = bag.images(recording.image_topic).usualSize();
   std::unique_ptr<LocalFeatureKind> kind = map.local.chosen().clone();
-  kind->adopt(map.extractor);
+  kind->adopt(map.model);
   DriveRecorder recorder(std::move(kind), front_end, recording.pruning, usual_size, for_poses);
   forEachImage(bag, recording.image_topic,
                [&](std::int64_t stamp_ns, const cv::Mat& grey) { recorder.add(stamp_ns, grey, truth(stamp_ns)); });

@@ -71,7 +71,7 @@ void dropMasked(const Mask& mask, LocalFeatures& features) {
 }
 
 FrontEnd::FrontEnd(const FrontEndConfig& config)
-    : config_(config), local_extractor_(config.kind->makeExtractor(config.extractor)) {}
+    : config_(config), local_extractor_(config.kind->makeExtractor(config.model)) {}
 
 void FrontEnd::configure(const FrontEndConfig& config) {
   config_.match = config.match;

@@ -66,7 +66,7 @@ struct PictureMotion::Waiting {
 
 PictureMotion::PictureMotion(std::size_t threads) : threads_(std::max<std::size_t>(1, threads)) {
   for (std::size_t k = 0; k < threads_; ++k) {
-    extractors_.push_back(makeSiftExtractor(manyFeatures(), siftBackends().front()));
+    extractors_.push_back(makeSiftExtractor(manyFeatures()));
   }
 }
 

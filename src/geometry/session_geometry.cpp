@@ -27,8 +27,12 @@ constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 constexpr double kRough = 1e-3;
 constexpr double kCoarse = 1e-4;
 constexpr double kFine = 1e-6;
-constexpr double kUnknownFocal = 0.3;       ///< one sigma of the logarithm of a focal length that nobody calibrated
-constexpr double kAspectSigma = 0.002;      ///< of square pixels
+constexpr double kUnknownFocal = 0.3;   ///< one sigma of the logarithm of a focal length that nobody calibrated
+constexpr double kAspectSigma = 0.002;  ///< of square pixels
+/// Of a calibration with a chessboard: the principal point as a share of the focal length, and k1 and k2.
+constexpr double kPrincipalPointSigma = 0.01;
+constexpr double kDistortionSigma = 0.05;
+constexpr std::uint32_t kPairSpan = 8;      ///< each image is matched with so many of the next ones
 constexpr double kStretchedAspect = 0.005;  ///< likewise, where the shutter of a camera that moves stretches them
 /// Landmarks that many images show tie all of these to each other, which costs time. Until positions are about right
 /// their tracks are cut.
@@ -40,8 +44,8 @@ using Indices = std::pair<std::uint32_t, std::uint32_t>;
 
 LensCorrection lensSigmaOf(const GeometryConfig& config) {
   LensCorrection sigma;
-  sigma << config.focal_sigma, kAspectSigma, config.principal_point_sigma, config.principal_point_sigma,
-      config.distortion_sigma, config.distortion_sigma;
+  sigma << config.focal_sigma, kAspectSigma, kPrincipalPointSigma, kPrincipalPointSigma, kDistortionSigma,
+      kDistortionSigma;
   return sigma;
 }
 
@@ -85,8 +89,7 @@ class PairMatcher {
     std::vector<FeatureMatch> matches;
     a.kind->correspond(*a.features, *b.features, PairRule::kMatchRatio, matches);
     const std::uint32_t apart = pair.matches.b - pair.matches.a;
-    const double turn_rad =
-        apart <= static_cast<std::uint32_t>(config_.pair_span) ? kMaxTurn_rad * apart : kMaxRevisitTurn_rad;
+    const double turn_rad = apart <= kPairSpan ? kMaxTurn_rad * apart : kMaxRevisitTurn_rad;
     pair.view =
         verifyTwoViews(a.rays->normalised, b.rays->normalised, usable(matches, *a.rays, *b.rays),
                        PairRule::kTolerance_px / std::min(a.focal_px, b.focal_px), PairRule::kMinInliers, turn_rad);
@@ -133,10 +136,9 @@ class SessionAdjuster {
   /// Of images that may show the same.
   std::vector<Indices> pairs() const {
     const auto count = static_cast<std::uint32_t>(session_.images.size());
-    const auto span = static_cast<std::uint32_t>(config_.pair_span);
     std::vector<Indices> indices;
     for (std::uint32_t a = 0; a < count; ++a) {
-      for (std::uint32_t b = a + 1; b < count && b <= a + span; ++b) indices.emplace_back(a, b);
+      for (std::uint32_t b = a + 1; b < count && b <= a + kPairSpan; ++b) indices.emplace_back(a, b);
     }
     std::vector<PathImage> path;
     for (const TrajectoryPoint& image : session_.images) path.push_back({0, image});
@@ -372,14 +374,8 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
   visitor.flag({"geometry/self_calibration", "",
                 "of a session without calibration find the focal length by its images; takes minutes"},
                self_calibration);
-  visitor.integer({"geometry/pair_span", "1", "each image is matched with this number of the next ones"}, pair_span, 1,
-                  100);
   visitor.real({"geometry/focal_sigma", "1", "how well a calibration knows the focal length, as a share of it"},
                focal_sigma, 1e-6, 1.0);
-  visitor.real({"geometry/principal_point_sigma", "1", "and the principal point, as a share of the focal length"},
-               principal_point_sigma, 1e-6, 1.0);
-  visitor.real({"geometry/distortion_sigma", "1", "and the radial coefficients k1 and k2"}, distortion_sigma, 1e-6,
-               1.0);
   visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},
                fix_sigma_m, 0.001, 100.0);
   visitor.integer(

@@ -36,9 +36,6 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
        "most similar training image, by how large things look; of the tracker bayes the mean of that and of its "
        "posterior (interpolated; local features only)"},
       estimate, {"image", "interpolated"});
-  visitor.choice(
-      {"sift_backend", "", "extractor of SIFT features, native or OpenCV's; their maps are compatible", kAtStartOnly},
-      sift_backend, siftBackends());
   visitor.integer(
       {"seed", "1", "of the random generator; the same seed, map and images give the same track", kAtStartOnly}, seed,
       0, std::numeric_limits<int>::max());
@@ -83,7 +80,7 @@ FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& 
                          "features are '" + map.kind->name() + "': must be one of " + joined(allowed));
   }
   FrontEndConfig front_end{map.image_size, map.kind, config.match, config.prune};
-  front_end.extractor = {config.sift_backend, config.model};
+  front_end.model = config.model;
   if (!map.sessions.empty()) front_end.mask = map.sessions.front().mask;  // until somebody gives another camera's
   return front_end;
 }

@@ -99,9 +99,8 @@ void StateConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"state/min_place_ratio", "1",
                 "global similarity here over the best anywhere, mean over the window; below, the position is in doubt"},
                min_place_ratio, 0.0, 1.0);
-  visitor.integer({"state/motion_length", "1", "number of the last estimates that must follow a steady motion"},
-                  motion_length, 2, 1000);
-  visitor.real({"state/max_motion_residual", "m", "up to this root mean square distance from it"},
+  visitor.real({"state/max_motion_residual", "m",
+                "up to this root mean square distance the last ten estimates must follow a steady motion"},
                max_motion_residual_m, 0.0, 10000.0);
   visitor.integer({"state/off_map_images", "1",
                    "this number of images that confirm nothing, with no TRACKING in between, means OFF_MAP"},
@@ -112,15 +111,7 @@ void StateConfig::declare(ParameterVisitor& visitor) {
        "simulated camera without noise"},
       frozen_images, 0, 100000);
   visitor.atMost("state/images_to_confirm", images_to_confirm, "state/window", window);
-  visitor.renamed("state/course_length", "state/motion_length");
   visitor.renamed("state/max_course_residual", "state/max_motion_residual");
-}
-
-void StateAssessor::configure(const StateConfig& config) {
-  if (config.motion_length != config_.motion_length) {
-    motion_ = MotionConsistency(static_cast<std::size_t>(config.motion_length));
-  }
-  config_ = config;
 }
 
 void StateAssessor::reset() { *this = StateAssessor(config_); }

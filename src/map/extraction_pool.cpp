@@ -36,12 +36,12 @@ std::vector<std::uint8_t> jpegOf(const cv::Mat& grey, int quality) {
   return bytes;
 }
 
-std::vector<std::uint8_t> previewOf(const cv::Mat& grey, int width_px) {
+std::vector<std::uint8_t> previewOf(const cv::Mat& grey) {
   constexpr int kPreviewQuality = 70;
-  if (width_px <= 0) return {};
-  const long height_px = std::lround(1.0 * grey.rows * width_px / grey.cols);
+  constexpr int kWidth_px = 80;  // enough to recognise a place on a plot
+  const long height_px = std::lround(1.0 * grey.rows * kWidth_px / grey.cols);
   cv::Mat small;
-  const cv::Size size(width_px, static_cast<int>(std::clamp(height_px, 1L, kMostSide_px)));
+  const cv::Size size(kWidth_px, static_cast<int>(std::clamp(height_px, 1L, kMostSide_px)));
   return jpegOf(fitted(grey, size, small), kPreviewQuality);
 }
 
@@ -63,10 +63,9 @@ std::vector<std::size_t> PruningNeighbours::of(std::size_t image) const {
   return neighbours;
 }
 
-ExtractionPool::ExtractionPool(const LocalFeatureKind& kind, const ExtractorChoice& choice, int preview_width_px,
-                               std::size_t threads)
-    : preview_width_px_(preview_width_px), workers_(std::max<std::size_t>(1, threads)) {
-  for (Worker& worker : workers_) worker.local = kind.makeExtractor(choice);
+ExtractionPool::ExtractionPool(const LocalFeatureKind& kind, const std::string& model, std::size_t threads)
+    : workers_(std::max<std::size_t>(1, threads)) {
+  for (Worker& worker : workers_) worker.local = kind.makeExtractor(model);
 }
 
 ExtractionPool::~ExtractionPool() = default;
@@ -78,7 +77,7 @@ TrainingImage ExtractionPool::extract(const RawImage& image, Worker& worker) con
   LocalFeatures features = worker.local->extract(grey);
   dropMasked(image.mask, features);
   return {image.pose, std::move(features), worker.global.extract(withoutMasked(grey, image.mask, worker.masked)),
-          previewOf(image.grey, preview_width_px_)};
+          previewOf(image.grey)};
 }
 
 std::vector<TrainingImage> ExtractionPool::extract(const std::vector<RawImage>& images) {

@@ -81,9 +81,8 @@ struct RawImage {
 /// Makes training images of several images at once. What comes out does not depend on the number of threads.
 class ExtractionPool {
  public:
-  /// `preview_width_px`: of the stored previews; 0 = none. `threads`: at least 1.
-  ExtractionPool(const LocalFeatureKind& kind, const ExtractorChoice& choice, int preview_width_px,
-                 std::size_t threads);
+  /// `model`: see LocalFeatureKind. `threads`: at least 1.
+  ExtractionPool(const LocalFeatureKind& kind, const std::string& model, std::size_t threads);
   ~ExtractionPool();
 
   /// In the order of `images`, features not pruned. Throws like requireExtractable.
@@ -99,7 +98,6 @@ class ExtractionPool {
   };
   TrainingImage extract(const RawImage& image, Worker& worker) const;
 
-  int preview_width_px_;
   std::vector<Worker> workers_;
 };
 

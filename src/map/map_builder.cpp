@@ -25,9 +25,9 @@ namespace {
 
 constexpr std::size_t kWaitingPerThread = 4;  ///< images: so that no thread waits long for the slowest
 
-/// With what the extractor's model says of the features.
+/// With what the model says of the features.
 MapBuilderConfig adopted(MapBuilderConfig config) {
-  config.local.chosen().adopt(config.extractor);
+  config.local.chosen().adopt(config.model);
   return config;
 }
 
@@ -77,8 +77,7 @@ MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources
                        const std::optional<MapBase>& base)
     : config_(adopted(requireValid(config))),
       resources_(resources),
-      extraction_(std::make_unique<ExtractionPool>(config_.local.chosen(), config_.extractor, config_.preview_width_px,
-                                                   resources.threads)),
+      extraction_(std::make_unique<ExtractionPool>(config_.local.chosen(), config_.model, resources.threads)),
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
       spool_(std::make_unique<ImageSpool>(resources.spool_beside, config_.local.chosen().clone())) {
   header_.kind = config_.local.chosen().clone();
@@ -332,11 +331,7 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
   visitor.flag(
       {"map/prune", "", "keep only features that one of the two nearest training images of its session shows too"},
       prune);
-  visitor.integer({"map/preview_width", "px", "width of the stored previews; 0 stores none"}, preview_width_px, 0, 640);
-  visitor.choice(
-      {"map/sift_backend", "", "extractor of SIFT features: our own, or OpenCV's; either serves any localizer"},
-      extractor.sift_backend, siftBackends());
-  visitor.text({"map/model", "", "ONNX file of learned features"}, extractor.model);
+  visitor.text({"map/model", "", "ONNX file of learned features"}, model);
   visitor.text({"robot/base_frame", "", "frame of the robot in /tf_static"}, base_frame);
   visitor.text({"robot/camera", "m, rad",
                 "x y z yaw pitch roll of the camera (x ahead) on the robot; empty: from /tf_static, or the robot is "

@@ -23,6 +23,7 @@ namespace visual_localization {
 namespace {
 
 constexpr double kSlidingSigmas = 3.0;
+constexpr double kSmoothing_s = 0.5;  ///< until 37 % of a correction are left: smooth, and soon true
 
 tf2::Transform planar(double x_m, double y_m, double yaw_rad) {
   return tf2::Transform(tf2::Quaternion(tf2::Vector3(0.0, 0.0, 1.0), yaw_rad), tf2::Vector3(x_m, y_m, 0.0));
@@ -79,7 +80,7 @@ TransformPublisher::TransformPublisher(const NodeParameters& parameters, const r
       image_timeout_s_(config_.image_timeout_s),
       transforms_(config_.odom_frame_id, config_.base_frame_id, log),
       odometry_(parameters.localizer.odometry),
-      correction_(config_.tf_smoothing_s, odometry_) {
+      correction_(kSmoothing_s, odometry_) {
   if (config_.tf_mode == "map_to_odom") listener_.emplace(node, transforms_, log, [this] { odometryCame(); });
   if (!between_images_) return;
   ros::NodeHandle timer_node(node);
@@ -116,7 +117,7 @@ void TransformPublisher::forgetPose() {
   const std::lock_guard<std::mutex> lock(mutex_);
   late_.clear();
   odom_in_map_.reset();
-  correction_ = SlidingCorrection(config_.tf_smoothing_s, odometry_);
+  correction_ = SlidingCorrection(kSmoothing_s, odometry_);
   last_between_ = ros::Time();
   trouble_between_.clear();
 }

@@ -64,7 +64,7 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
           ROS_WARN_STREAM(text);
         }
       }),
-      extractor_(makeSiftExtractor({}, siftBackends().front())),
+      extractor_(makeSiftExtractor({})),
       updater_(node, private_node, ros::this_node::getName()) {
   assignParameters(config_, privateParameters(private_node_));
   if (!config_.builder_config.empty()) {  // a wrong one would be found after the round

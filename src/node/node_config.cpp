@@ -141,9 +141,6 @@ void NodeConfig::declare(ParameterVisitor& visitor) {
                tf_metric_only);
   visitor.real({"tf_rate", "Hz", "of map_to_odom alone, stamped with the present; 0: with each image", kAtStartOnly},
                tf_rate_hz, 0.0, 1000.0);
-  visitor.real(
-      {"tf_smoothing", "s", "with tf_rate: time constant in which a small correction moves the robot", kAtStartOnly},
-      tf_smoothing_s, 0.0, 60.0);
   visitor.flag(
       {"use_odometry", "", "wheel odometry on the topic odom bridges images that show nothing known", kAtStartOnly},
       use_odometry);

@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <string>
-#include <vector>
 
 #include <ros/node_handle.h>
 #include <xmlrpcpp/XmlRpcValue.h>
@@ -27,7 +26,6 @@ struct NodeConfig {
   std::string tf_mode = "none";
   bool tf_metric_only = true;
   double tf_rate_hz = 0.0;
-  double tf_smoothing_s = 0.5;
   bool use_odometry = false;
   double transform_tolerance_s = 0.1;
   double image_timeout_s = 5.0;

@@ -5,12 +5,14 @@
 #include <utility>
 
 #include "base/time.h"
+#include "survey/map_survey.h"
 
 namespace visual_localization {
 namespace {
 
 constexpr std::size_t kImagesOfSpacing = 10;  ///< noise of fixes, or their low rate, must not look like speed
 constexpr double kSameLine_m = 2.0;
+constexpr double kMaxFixAge_s = 2.0;     ///< slow receivers give a fix a second, and one may be lost
 constexpr std::size_t kNeighbours = 32;  ///< one of each session should be among them
 
 }  // namespace
@@ -19,9 +21,6 @@ void WatchConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"max_spacing", "m", "images farther apart than this are called weak"}, max_spacing_m, 0.1, 100.0);
   visitor.real({"max_fix_sigma", "m", "a fix whose receiver claims a larger standard deviation is called poor"},
                max_fix_sigma_m, 0.01, 1000.0);
-  visitor.real({"max_fix_age", "s", "without a usable fix for longer than this an image has no position"},
-               max_fix_age_s, 0.1, 60.0);
-  visitor.integer({"few_features", "1", "an image with fewer SIFT features is called weak"}, few_features, 0, 100000);
 }
 
 const char* describe(Weakness weakness) {
@@ -56,7 +55,7 @@ void RecordingWatch::addFix(const Fix& fix) {
 }
 
 bool RecordingWatch::hasPositionAt(std::int64_t stamp_ns) const {
-  return last_fix_ && std::abs(secondsBetween(last_fix_->stamp_ns, stamp_ns)) <= config_.max_fix_age_s;
+  return last_fix_ && std::abs(secondsBetween(last_fix_->stamp_ns, stamp_ns)) <= kMaxFixAge_s;
 }
 
 void RecordingWatch::addImage(std::int64_t stamp_ns) {
@@ -98,7 +97,7 @@ void RecordingWatch::addWay() {
 Weakness RecordingWatch::weaknessOf(std::int64_t stamp_ns, std::size_t features) const {
   if (!hasPositionAt(stamp_ns)) return Weakness::kNoFix;
   if (last_fix_->sigma_m > config_.max_fix_sigma_m) return Weakness::kPoorFix;
-  if (features < static_cast<std::size_t>(config_.few_features)) return Weakness::kFewFeatures;
+  if (features < SurveyConfig().few_features) return Weakness::kFewFeatures;
   return summary_.spacing_m > config_.max_spacing_m ? Weakness::kFarApart : Weakness::kNone;
 }
 

@@ -20,8 +20,6 @@ namespace visual_localization {
 struct WatchConfig {
   double max_spacing_m = 2.0;
   double max_fix_sigma_m = 3.0;
-  double max_fix_age_s = 2.0;
-  int few_features = 50;
 
   void declare(ParameterVisitor& visitor);
 };

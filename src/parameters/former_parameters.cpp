@@ -2,8 +2,8 @@
 
 namespace visual_localization {
 
-const std::map<std::string, double>& formerParameters() {
-  static const std::map<std::string, double> values{
+const ParameterValues& formerParameters() {
+  static const ParameterValues values{
       {"bayes/comparisons", 60.0},
       {"bayes/first_comparisons", 400.0},
       {"bayes/uniform", 0.03},
@@ -12,6 +12,8 @@ const std::map<std::string, double>& formerParameters() {
       {"dpso/exclusion_radius", 15.0},
       {"dpso/mode_radius", 5.0},
       {"dpso/rival_share", 0.5},
+      {"few_features", 50.0},
+      {"geometry/distortion_sigma", 0.05},
       {"geometry/epipolar_tolerance", 1.0},
       {"geometry/fix_correlation", 3.3},
       {"geometry/fix_loss", 1.0},
@@ -20,6 +22,12 @@ const std::map<std::string, double>& formerParameters() {
       {"geometry/max_residual", 5.0},
       {"geometry/min_landmarks", 12.0},
       {"geometry/min_pair_inliers", 15.0},
+      {"geometry/pair_span", 8.0},
+      {"geometry/principal_point_sigma", 0.01},
+      {"learned/min_score", 0.1},
+      {"map/preview_width", 80.0},
+      {"map/sift_backend", std::string("native")},
+      {"max_fix_age", 2.0},
       {"max_image_gap", 10.0},
       {"metric/keypoint_sigma", 0.3},
       {"metric/match_ratio", 0.85},
@@ -35,6 +43,10 @@ const std::map<std::string, double>& formerParameters() {
       {"odometry/max_gap", 0.5},
       {"odometry/max_speed", 10.0},
       {"odometry/share", 0.5},
+      {"sift/edge_threshold", 10.0},
+      {"sift/octave_layers", 3.0},
+      {"sift/sigma", 1.6},
+      {"sift_backend", std::string("native")},
       {"similarity/global_exponent", 20.0},
       {"similarity/global_recognised", 0.6},
       {"similarity/votes_exponent", 2.0},
@@ -44,7 +56,9 @@ const std::map<std::string, double>& formerParameters() {
       {"state/min_features", 10.0},
       {"state/min_global_similarity", 0.65},
       {"state/min_matches", 5.0},
+      {"state/motion_length", 10.0},
       {"state/sure_similarity", 0.2},
+      {"tf_smoothing", 0.5},
   };
   return values;
 }

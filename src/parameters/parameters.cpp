@@ -119,12 +119,11 @@ class Assigner : public ParameterVisitor {
   static bool isFormer(const std::string& name, const ParameterValue& value) {
     const auto former = formerParameters().find(name);
     if (former == formerParameters().end()) return false;
-    const auto* real = std::get_if<double>(&value);
     const auto* integer = std::get_if<std::int64_t>(&value);
-    if (real != nullptr && *real == former->second) return true;
-    if (integer != nullptr && static_cast<double>(*integer) == former->second) return true;
+    const ParameterValue given = integer == nullptr ? value : static_cast<double>(*integer);
+    if (given == former->second) return true;
     throw ParameterError("parameter '" + name + "' = " + toString(value) + " can no longer be set: it is always " +
-                         number(former->second));
+                         toString(former->second));
   }
 
   const ParameterValue* find(const std::string& name) {

@@ -95,7 +95,6 @@ class ProgramsTest(ProgramTest):
         for extra, words in ((('--threads', '0'), ('--threads', '0 not in range', '1024')),
                              (('--threads', 'all'), ('--threads', 'all not in range', '1024')),
                              (('--min-spacing', '-1'), ('--min-spacing', '-1', '[0, 1000]')),
-                             (('--sift-backend', 'cuda'), ('--sift-backend', 'cuda', 'native')),
                              (('--plot', 'plot.txt'), ('--plot', 'plot.txt', '.png, .svg or .pdf')),
                              (('--plot', 'png'), ('--plot', "'png'", '.png, .svg or .pdf'))):
             with self.subTest(extra=extra):

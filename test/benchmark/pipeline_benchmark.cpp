@@ -44,12 +44,10 @@ const cv::Mat& imageAt(std::size_t at) {
   return scene().images[place < kImages ? place : 2 * kImages - 1 - place];
 }
 
-void localize(benchmark::State& state, const std::string& features, const std::string& backend,
-              const std::string& pose_source = "place") {
+void localize(benchmark::State& state, const std::string& features, const std::string& pose_source = "place") {
   LocalizerConfig config;
   config.metric.pose_source = pose_source;
   config.features = features;
-  config.sift_backend = backend;
   Localizer localizer(scene().map, config);
   std::size_t at = 0;
   double extract_ms = 0.0;
@@ -69,11 +67,10 @@ void localize(benchmark::State& state, const std::string& features, const std::s
   state.counters["update_ms"] = benchmark::Counter(update_ms, mean);
 }
 
-void metricDpso80(benchmark::State& state) { localize(state, "sift", kNativeSift, "metric"); }
-void siftDpso80(benchmark::State& state) { localize(state, "sift", kNativeSift); }
-void siftDpso80WithOpenCvExtraction(benchmark::State& state) { localize(state, "sift", kOpenCvSift); }
-void hybridDpso80(benchmark::State& state) { localize(state, "hybrid", kNativeSift); }
-void globalDpso80(benchmark::State& state) { localize(state, "global", kNativeSift); }
+void metricDpso80(benchmark::State& state) { localize(state, "sift", "metric"); }
+void siftDpso80(benchmark::State& state) { localize(state, "sift"); }
+void hybridDpso80(benchmark::State& state) { localize(state, "hybrid"); }
+void globalDpso80(benchmark::State& state) { localize(state, "global"); }
 
 void opencvExtractionAlone(benchmark::State& state) {
   cv::setNumThreads(1);
@@ -90,7 +87,6 @@ void opencvExtractionAlone(benchmark::State& state) {
 BENCHMARK(opencvExtractionAlone)->Unit(benchmark::kMillisecond);
 BENCHMARK(metricDpso80)->Unit(benchmark::kMillisecond);
 BENCHMARK(siftDpso80)->Unit(benchmark::kMillisecond);
-BENCHMARK(siftDpso80WithOpenCvExtraction)->Unit(benchmark::kMillisecond);
 BENCHMARK(hybridDpso80)->Unit(benchmark::kMillisecond);
 BENCHMARK(globalDpso80)->Unit(benchmark::kMillisecond);
 

@@ -61,9 +61,10 @@ std::vector<NamedImages> imageSets() {
   return sets;
 }
 
-void extractImages(benchmark::State& state, const NamedImages& set, const char* backend) {
+void extractImages(benchmark::State& state, const NamedImages& set,
+                   std::unique_ptr<LocalExtractor> (*makeExtractor)(const SiftConfig&)) {
   cv::setNumThreads(1);
-  const auto extractor = makeSiftExtractor(SiftConfig(), backend);
+  const auto extractor = makeExtractor(SiftConfig());
   std::size_t next = 0;
   std::size_t features = 0;
   for (auto _ : state) features += extractor->extract(set.images[next++ % set.images.size()]).size();
@@ -175,8 +176,8 @@ void add(const std::string& name, Function function, const Arguments&... argumen
 const bool registered = [] {
   for (const NamedImages& set : imageSets()) {
     if (set.images.empty()) continue;
-    add(set.name + "/opencv", extractImages, set, kOpenCvSift);
-    add(set.name + "/native", extractImages, set, kNativeSift);
+    add(set.name + "/opencv", extractImages, set, makeOpenCvSiftExtractor);
+    add(set.name + "/native", extractImages, set, makeSiftExtractor);
     add(set.name + "/native/scale_space", scaleSpace, set);
     add(set.name + "/native/extrema", extrema, set);
     add(set.name + "/native/refinement", refinement, set);

@@ -39,7 +39,7 @@ class LearnedTest : public ::testing::Test {
     }
   }
 
-  ExtractorChoice choice_{"native", kModel};
+  std::string choice_ = kModel;
   Learned kind_;
   test::TemporaryFolder folder_;
 };

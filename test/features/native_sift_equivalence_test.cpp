@@ -1,7 +1,6 @@
 // Our SIFT features are OpenCV's, and the same on every CPU.
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -74,8 +73,8 @@ void expectAgreement(const LocalFeatures& a, const LocalFeatures& b, double leas
 void expectLikeOpenCv(const cv::Mat& image, const SiftConfig& config, double least = 0.97) {
   // OpenCV rounds to bytes before the roots are taken, and the root of a half is 6 of 512.
   const double apart = config.hellinger ? 40.0 : 10.0;
-  expectAgreement(makeSiftExtractor(config, kNativeSift)->extract(image),
-                  makeSiftExtractor(config, kOpenCvSift)->extract(image), least, apart);
+  expectAgreement(makeSiftExtractor(config)->extract(image), makeOpenCvSiftExtractor(config)->extract(image), least,
+                  apart);
 }
 
 TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsForEverySize) {
@@ -118,9 +117,9 @@ TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsForEveryConfiguration) {
 TEST(NativeSiftEquivalence, UprightFeaturesAreOneForEachPlaceAndScale) {
   const cv::Mat image = textured(320, 240, 6);
   SiftConfig config;
-  const LocalFeatures turned = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures turned = makeSiftExtractor(config)->extract(image);
   config.upright = true;
-  const LocalFeatures upright = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures upright = makeSiftExtractor(config)->extract(image);
   EXPECT_LT(upright.size(), turned.size());
   for (std::size_t i = 0; i < upright.size(); ++i) {
     const Keypoint& point = upright.keypoints()[i];
@@ -134,9 +133,9 @@ TEST(NativeSiftEquivalence, UprightFeaturesAreOneForEachPlaceAndScale) {
 TEST(NativeSiftEquivalence, HellingerDescriptorsAreTheRootsOfTheOthers) {
   const cv::Mat image = textured(320, 240, 6);
   SiftConfig config;
-  const LocalFeatures plain = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures plain = makeSiftExtractor(config)->extract(image);
   config.hellinger = true;
-  const LocalFeatures rooted = makeSiftExtractor(config, kNativeSift)->extract(image);
+  const LocalFeatures rooted = makeSiftExtractor(config)->extract(image);
   ASSERT_EQ(rooted.size(), plain.size());
   for (std::size_t i = 0; i < plain.size(); ++i) {
     double sum = 0.0;
@@ -165,7 +164,7 @@ TEST(NativeSiftEquivalence, TheFeaturesAreOpenCvsOnWallsAndNoise) {
 
 TEST(NativeSiftEquivalence, EveryKindOfVectorFindsTheSame) {
   const cv::Mat image = textured(203, 151, 7);
-  const auto extractor = makeSiftExtractor(SiftConfig(), kNativeSift);
+  const auto extractor = makeSiftExtractor(SiftConfig());
   const LocalFeatures widest = extractor->extract(image);
   ASSERT_GT(widest.size(), 100U);
   std::size_t tried = 0;
@@ -174,16 +173,6 @@ TEST(NativeSiftEquivalence, EveryKindOfVectorFindsTheSame) {
     ++tried;
   });
   EXPECT_GE(tried, 1U);
-}
-
-TEST(SiftBackend, IsChosenByName) {
-  const auto isNative = [](const std::unique_ptr<LocalExtractor>& extractor) {
-    return dynamic_cast<const NativeSiftExtractor*>(extractor.get()) != nullptr;
-  };
-  EXPECT_TRUE(isNative(makeSiftExtractor(SiftConfig())));
-  EXPECT_TRUE(isNative(makeSiftExtractor(SiftConfig(), kNativeSift)));
-  EXPECT_FALSE(isNative(makeSiftExtractor(SiftConfig(), kOpenCvSift)));
-  EXPECT_THROW(makeSiftExtractor(SiftConfig(), "vlfeat"), std::invalid_argument);
 }
 
 }  // namespace

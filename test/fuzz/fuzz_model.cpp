@@ -50,11 +50,11 @@ void requireFeatures(const LocalFeatures& features, const Learned& kind, const c
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace visual_localization;
   static const cv::Mat grey = checkerboard();
-  const ExtractorChoice choice{"native", fuzz::inMemoryFile(data, size)};
+  const std::string model = fuzz::inMemoryFile(data, size);
   fuzz::expect<ParameterError>([&] {
     Learned kind;
-    kind.adopt(choice);
-    const std::unique_ptr<LocalExtractor> extractor = kind.makeExtractor(choice);
+    kind.adopt(model);
+    const std::unique_ptr<LocalExtractor> extractor = kind.makeExtractor(model);
     fuzz::expect<std::runtime_error>([&] {
       requireFeatures(extractor->extract(grey), kind, grey);
       fuzz::countRead();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -286,18 +285,13 @@ TEST_F(LocalizerRules, AnotherShareOfOdometryHoldsFromTheNextImageOn) {
 }
 
 TEST_F(LocalizerRules, SaysHowFarTheLastImagesAreFromASteadyMotion) {
-  LocalizerConfig config = test::swarmConfig();
-  config.state.motion_length = 3;
-  make(config);
-  std::vector<Eigen::Vector2d> positions_m;
+  make(test::swarmConfig());
+  MotionConsistency expected(StateAssessor::kMotionLength);
   double largest_m = 0.0;
   for (const double x_m : {20.0, 21.0, 23.0, 22.0, 24.0, 21.0, 23.0, 22.0}) {
     const Estimate estimate = see(x_m);
-    positions_m.push_back(estimate.tracked.position_m);
-    if (positions_m.size() < 3) continue;
-    const auto last = positions_m.rbegin();
-    // Of three points at even times, from the line that fits them best.
-    EXPECT_NEAR(estimate.motion_residual_m, (last[0] - 2.0 * last[1] + last[2]).norm() / std::sqrt(18.0), 1e-9);
+    expected.add(estimate.stamp_ns, estimate.tracked.position_m);
+    EXPECT_NEAR(estimate.motion_residual_m, expected.residual_m(), 1e-9);
     largest_m = std::max(largest_m, estimate.motion_residual_m);
   }
   EXPECT_GT(largest_m, 0.5);

@@ -1,4 +1,3 @@
-#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -203,17 +202,6 @@ TEST(StateAssessor, OtherThresholdsKeepWhatTheLastImagesSaid) {
   assessor.configure(stricter);
   assess(assessor, kGood, sift());
   EXPECT_EQ(assess(assessor, kGood, sift()), LocalizationState::kTracking);
-}
-
-// Of three points at even times, from the line that fits them best.
-TEST(StateAssessor, AnotherLengthOfTheMotionHoldsFromTheNextImageOn) {
-  StateAssessor assessor{StateConfig()};
-  afterGood(assessor, 10);
-  StateConfig shorter;
-  shorter.motion_length = 3;
-  assessor.configure(shorter);
-  for (const double x_m : {0.0, 7.0, 0.0, 1.0, 3.0}) assess(assessor, seen(0.3, 30, x_m), sift());
-  EXPECT_NEAR(assessor.motionResidual_m(), 1.0 / std::sqrt(18.0), 1e-9);
 }
 
 TEST(StateAssessor, AnImpossibleWindowIsNamedWithBothValues) {

@@ -42,15 +42,13 @@ TEST(MapBuilder, ImagesGetThePositionOfTheirStamp) {
 }
 
 TEST(MapBuilder, PreviewsAreSmallJpegsOfTheImages) {
-  MapBuilderConfig config;
-  config.preview_width_px = 160;
-  MapBuilder builder(config);
+  MapBuilder builder(MapBuilderConfig{});
   builder.beginSession("round", straightRound());
   ASSERT_TRUE(builder.wants(0));
   builder.addImage(0, scene(1, 0));
   const cv::Mat preview = cv::imdecode(builder.build()->preview(0), cv::IMREAD_UNCHANGED);
   ASSERT_EQ(preview.type(), CV_8UC1);
-  ASSERT_EQ(preview.size(), cv::Size(160, 120));
+  ASSERT_EQ(preview.size(), cv::Size(80, 60));
   cv::Mat expected;
   cv::resize(scene(1, 0), expected, preview.size(), 0.0, 0.0, cv::INTER_AREA);
   EXPECT_LT(cv::norm(preview, expected, cv::NORM_L1) / static_cast<double>(expected.total()), 5.0);  // grey levels

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <map>
 #include <set>
 #include <string>
 
@@ -49,12 +48,10 @@ TEST_F(ReconfigureMessages, EverythingThatCanChangeIsDescribedAndNothingElse) {
                                        "camera_info_file",
                                        "mask_file",
                                        "camera_mount",
-                                       "sift_backend",
                                        "seed",
                                        "tf_metric_only",
                                        "use_odometry",
                                        "tf_rate",
-                                       "tf_smoothing",
                                        "usage_file",
                                        "session_folder",
                                        "model"};

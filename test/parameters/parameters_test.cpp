@@ -163,6 +163,9 @@ TEST(Parameters, AFormerParameterMayOnlyHaveItsValue) {
             "parameter 'metric/tolerance' = 3.5 can no longer be set: it is always 3");
   EXPECT_EQ(refusalOfValues({{"metric/tolerance", std::string("3")}}),
             "parameter 'metric/tolerance' = 3 can no longer be set: it is always 3");
+  assignParameters(engine, {{"sift_backend", std::string("native")}});
+  EXPECT_EQ(refusalOfValues({{"sift_backend", std::string("opencv")}}),
+            "parameter 'sift_backend' = opencv can no longer be set: it is always native");
   EXPECT_THAT(refusalOfValues({{"metric/tolerances", 3.0}}), HasSubstr("is unknown"));
 }
 

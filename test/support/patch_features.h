@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -27,7 +26,7 @@ class PatchFeatures final : public LocalFeatureKind {
   void declare(ParameterVisitor& visitor) override {
     visitor.integer({"patches/max_features", "1", "keep at most this number of features"}, max_features_, 1, 1000);
   }
-  std::unique_ptr<LocalExtractor> makeExtractor(const ExtractorChoice&) const override {
+  std::unique_ptr<LocalExtractor> makeExtractor(const std::string&) const override {
     return std::make_unique<Extractor>(max_features_);
   }
   std::vector<std::uint8_t> pack(const LocalFeatures& features) const override {

@@ -66,8 +66,8 @@ struct FrontEndConfig {
   MatchConfig match;                             ///< for pruning
   bool prune = true;                             ///< keep only features that the image before showed as well
   double max_image_gap_s = kMaxImageGap_s;
-  ExtractorChoice extractor = {};
-  Mask mask = {};  ///< of image_size, or empty: features under it are not used
+  std::string model = {};  ///< path of the ONNX file of learned features; empty: none
+  Mask mask = {};          ///< of image_size, or empty: features under it are not used
 };
 
 /// Live image in, features out: resizes to the map's size, spreads the grey levels of a dull image and extracts local

@@ -11,7 +11,7 @@ namespace visual_localization {
 /// What learned features an image has.
 struct LearnedConfig {
   int max_features = 600;
-  double min_score = 0.1;
+  double min_score = 0.1;  ///< weakest accepted score; no parameter of the builder, the number of features binds mostly
   // What the model says.
   int dimension = 64;    ///< of a descriptor
   std::string checksum;  ///< CRC-32 of its file, hexadecimal; empty: no model yet
@@ -35,9 +35,9 @@ class Learned final : public LocalFeatureKind {
   /// With what the model says of itself.
   void declareStored(ParameterVisitor& visitor) override;
   /// Reads the model. Throws ParameterError when it is missing or not such a model.
-  void adopt(const ExtractorChoice& choice) override;
+  void adopt(const std::string& model) override;
   /// Throws like adopt(), and when the model is not the one that was adopted.
-  std::unique_ptr<LocalExtractor> makeExtractor(const ExtractorChoice& choice) const override;
+  std::unique_ptr<LocalExtractor> makeExtractor(const std::string& model) const override;
 
   /// Of features that match more readily. Gardens Point by day and, on the other side of the path, by night: with 3 3 %
   /// of the claims are wrong and 84 % of the places right, with 2 none and 93 %.

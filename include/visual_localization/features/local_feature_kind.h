@@ -12,12 +12,6 @@
 
 namespace visual_localization {
 
-/// How this program extracts features, whatever the map says of them.
-struct ExtractorChoice {
-  std::string sift_backend = "native";
-  std::string model;  ///< path of the ONNX file of learned features; empty: none
-};
-
 /// A kind of local features: how they are extracted, compared and stored. A new kind is a folder of its own and a line
 /// in local_feature_kind.cpp. For several threads at once as long as it is not changed.
 class LocalFeatureKind {
@@ -35,10 +29,11 @@ class LocalFeatureKind {
   virtual void declareStored(ParameterVisitor& visitor) { declare(visitor); }
   /// What a map stores.
   ParameterValues parameters() const;
-  /// Takes over what the choice says of the features, before a map is made of them. Throws std::runtime_error.
-  virtual void adopt(const ExtractorChoice& /*choice*/) {}
-  /// Throws std::runtime_error in one line when the choice does not give these features.
-  virtual std::unique_ptr<LocalExtractor> makeExtractor(const ExtractorChoice& choice) const = 0;
+  /// Takes over what the model, an ONNX file, says of the features, before a map is made of them. Throws
+  /// std::runtime_error.
+  virtual void adopt(const std::string& /*model*/) {}
+  /// Throws std::runtime_error in one line when the model, if one is needed, does not give these features.
+  virtual std::unique_ptr<LocalExtractor> makeExtractor(const std::string& model) const = 0;
 
   /// The pairs that a similarity counts: see matchBy().
   virtual void match(const MatchConfig& config, const LocalFeatures& a, const LocalFeatures& b, double image_width_px,

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "visual_localization/features/local_feature_kind.h"
 #include "visual_localization/features/local_features.h"
@@ -15,12 +14,12 @@ namespace visual_localization {
 constexpr std::size_t kSiftDimension = 128;
 
 /// Parameters of Lowe's detector and descriptor. A map stores the ones it was built with, and the live image
-/// is extracted with the same.
+/// is extracted with the same. What has a comment is no parameter of the builder: Lowe's own value.
 struct SiftConfig {
-  int octave_layers = 3;
+  int octave_layers = 3;  ///< scale samples per octave
   double contrast_threshold = 0.04;
-  double edge_threshold = 10.0;
-  double sigma_px = 1.6;
+  double edge_threshold = 10.0;  ///< largest accepted ratio of principal curvatures
+  double sigma_px = 1.6;         ///< blur of the first scale
   int max_features = 0;
   bool upright = false;
   bool hellinger = false;
@@ -30,20 +29,17 @@ struct SiftConfig {
   static SiftConfig uprightHellinger();
 
   void declare(ParameterVisitor& visitor);
+  /// With what a map stores besides.
+  void declareStored(ParameterVisitor& visitor);
   /// How many features are kept, the strongest.
   int mostFeatures() const { return max_features == 0 ? kMostLocalFeatures : max_features; }
 };
 
-/// Names of the extractors: our own, and OpenCV's. Their features can be matched with each other, so a map does not
-/// store which one it was built with. OpenCV has one from version 4.4 on.
-constexpr const char* kNativeSift = "native";
-constexpr const char* kOpenCvSift = "opencv";
-/// Those of this build.
-const std::vector<std::string>& siftBackends();
-
-/// Throws std::invalid_argument when there is no such backend. Where the package was built without Highway, "native"
-/// gives OpenCV's extractor.
-std::unique_ptr<LocalExtractor> makeSiftExtractor(const SiftConfig& config, const std::string& backend = kNativeSift);
+/// Our own extractor, or OpenCV's where the package was built without Highway. Their features can be matched with each
+/// other, so a map does not store which one it was built with.
+std::unique_ptr<LocalExtractor> makeSiftExtractor(const SiftConfig& config);
+/// OpenCV's, from its version 4.4 on.
+std::unique_ptr<LocalExtractor> makeOpenCvSiftExtractor(const SiftConfig& config);
 
 /// SIFT as a kind of local features.
 class Sift final : public LocalFeatureKind {
@@ -56,8 +52,9 @@ class Sift final : public LocalFeatureKind {
   std::string name() const override { return "sift"; }
   DescriptorForm form() const override { return {DescriptorElement::kByte, kSiftDimension}; }
   void declare(ParameterVisitor& visitor) override { config_.declare(visitor); }
-  std::unique_ptr<LocalExtractor> makeExtractor(const ExtractorChoice& choice) const override {
-    return makeSiftExtractor(config_, choice.sift_backend);
+  void declareStored(ParameterVisitor& visitor) override { config_.declareStored(visitor); }
+  std::unique_ptr<LocalExtractor> makeExtractor(const std::string& /*model*/) const override {
+    return makeSiftExtractor(config_);
   }
 
  private:

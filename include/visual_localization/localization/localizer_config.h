@@ -24,7 +24,6 @@ struct LocalizerConfig : TrackerConfig {
 
   std::string features = "sift";
   std::string estimate = "interpolated";
-  std::string sift_backend = kNativeSift;
   std::string model;
   int seed = 1;
   bool prune = false;

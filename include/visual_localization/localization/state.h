@@ -42,7 +42,6 @@ struct StateConfig {
   bool place_check = true;
   double sure_similarity = 0.2;  ///< a stronger match of local features needs no place check
   double min_place_ratio = 0.985;
-  int motion_length = 10;
   double max_motion_residual_m = 2.5;
   int off_map_images = 10;
   int min_features = 10;  ///< an image with fewer is blind and says nothing about OFF_MAP
@@ -93,10 +92,12 @@ class MotionConsistency {
 /// the image match is independent evidence.
 class StateAssessor {
  public:
-  explicit StateAssessor(const StateConfig& config)
-      : config_(config), motion_(static_cast<std::size_t>(config.motion_length)) {}
+  /// A robot that turns leaves a straight line within more images than so many.
+  static constexpr std::size_t kMotionLength = 10;
+
+  explicit StateAssessor(const StateConfig& config) : config_(config) {}
   /// Other thresholds, with what the last images said: they are not judged anew.
-  void configure(const StateConfig& config);
+  void configure(const StateConfig& config) { config_ = config; }
   /// The position is unknown again.
   void reset();
   /// What the last images confirmed no longer counts; the state until the next one.
@@ -119,7 +120,7 @@ class StateAssessor {
   StateConfig config_;
   std::vector<char> confirmations_;  ///< of the last images, newest at the back
   std::vector<double> place_ratios_;
-  MotionConsistency motion_;
+  MotionConsistency motion_{kMotionLength};
   int unconfirmed_ = 0;  ///< images since the last certain position, without those that are blind or see the map
   bool ever_confirmed_ = false;  ///< since the last reset
   std::optional<Eigen::Vector2d> last_position_m_;

@@ -35,8 +35,7 @@ struct MapBuilderConfig {
   double min_spacing_m = 0.0;
   double spacing_m = 0.0;
   bool prune = false;
-  int preview_width_px = 80;
-  ExtractorChoice extractor;
+  std::string model;
   std::string base_frame = "base_link";
   std::string camera_mount;
   std::string antenna_mount;

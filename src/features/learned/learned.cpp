@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -104,25 +103,24 @@ class LearnedExtractor final : public LocalExtractor {
 void LearnedConfig::declare(ParameterVisitor& visitor) {
   visitor.integer({"learned/max_features", "1", "keep at most this number of features, the strongest"}, max_features, 1,
                   kMostLocalFeatures);
-  visitor.real({"learned/min_score", "1", "weakest accepted score of the network"}, min_score, 0.0, 1.0);
 }
 
 void Learned::declareStored(ParameterVisitor& visitor) {
   declare(visitor);
+  visitor.real({"learned/min_score", "1", "weakest accepted score of the network"}, config_.min_score, 0.0, 1.0);
   visitor.integer({"learned/dimension", "1", "of a descriptor"}, config_.dimension, 1, 256);
   visitor.text({"learned/checksum", "", "CRC-32 of the model's file"}, config_.checksum);
 }
 
-void Learned::adopt(const ExtractorChoice& choice) {
-  requireHarmlessModel(choice.model);
-  const FeatureModel model(choice.model);
-  config_.dimension = static_cast<int>(model.dimension());
-  config_.checksum = model.checksum();
+void Learned::adopt(const std::string& model) {
+  requireHarmlessModel(model);
+  const FeatureModel read(model);
+  config_.dimension = static_cast<int>(read.dimension());
+  config_.checksum = read.checksum();
 }
 
-std::unique_ptr<LocalExtractor> Learned::makeExtractor(const ExtractorChoice& choice) const {
-  FeatureModel model(choice.model, config_.checksum);
-  return std::make_unique<LearnedExtractor>(config_, std::move(model));
+std::unique_ptr<LocalExtractor> Learned::makeExtractor(const std::string& model) const {
+  return std::make_unique<LearnedExtractor>(config_, FeatureModel(model, config_.checksum));
 }
 
 std::vector<std::uint8_t> Learned::pack(const LocalFeatures& features) const {

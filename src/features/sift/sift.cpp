@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 
 #include <opencv2/features2d.hpp>
@@ -82,12 +81,8 @@ SiftConfig SiftConfig::uprightHellinger() {
 }
 
 void SiftConfig::declare(ParameterVisitor& visitor) {
-  visitor.integer({"sift/octave_layers", "1", "scale samples per octave"}, octave_layers, 1, 10);
   visitor.real({"sift/contrast_threshold", "1", "weakest accepted extremum, as a share of full intensity"},
                contrast_threshold, 0.0, 1.0);
-  visitor.real({"sift/edge_threshold", "1", "largest accepted ratio of principal curvatures"}, edge_threshold, 1.0,
-               1000.0);
-  visitor.real({"sift/sigma", "px", "blur of the first scale"}, sigma_px, 0.5, 10.0);
   visitor.integer({"sift/max_features", "1",
                    "keep at most this number of features, the strongest; 0: " + std::to_string(kMostLocalFeatures)},
                   max_features, 0, kMostLocalFeatures);
@@ -101,25 +96,26 @@ void SiftConfig::declare(ParameterVisitor& visitor) {
                hellinger);
 }
 
-const std::vector<std::string>& siftBackends() {
-#ifdef VISUAL_LOCALIZATION_OPENCV_SIFT
-  static const std::vector<std::string> backends{kNativeSift, kOpenCvSift};
-#else
-  static const std::vector<std::string> backends{kNativeSift};
-#endif
-  return backends;
+void SiftConfig::declareStored(ParameterVisitor& visitor) {
+  declare(visitor);
+  visitor.integer({"sift/octave_layers", "1", "scale samples per octave"}, octave_layers, 1, 10);
+  visitor.real({"sift/edge_threshold", "1", "largest accepted ratio of principal curvatures"}, edge_threshold, 1.0,
+               1000.0);
+  visitor.real({"sift/sigma", "px", "blur of the first scale"}, sigma_px, 0.5, 10.0);
 }
 
-std::unique_ptr<LocalExtractor> makeSiftExtractor(const SiftConfig& config, const std::string& backend) {
-#ifdef VISUAL_LOCALIZATION_OPENCV_SIFT
-  if (backend == kOpenCvSift) return std::make_unique<OpenCvSiftExtractor>(config);
-#endif
-  if (backend != kNativeSift) throw std::invalid_argument("there is no SIFT backend '" + backend + "'");
+std::unique_ptr<LocalExtractor> makeSiftExtractor(const SiftConfig& config) {
 #ifdef VISUAL_LOCALIZATION_HIGHWAY
   return std::make_unique<NativeSiftExtractor>(config);
 #else
-  return std::make_unique<OpenCvSiftExtractor>(config);
+  return makeOpenCvSiftExtractor(config);
 #endif
 }
+
+#ifdef VISUAL_LOCALIZATION_OPENCV_SIFT
+std::unique_ptr<LocalExtractor> makeOpenCvSiftExtractor(const SiftConfig& config) {
+  return std::make_unique<OpenCvSiftExtractor>(config);
+}
+#endif
 
 }  // namespace visual_localization
