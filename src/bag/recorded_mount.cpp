@@ -1,7 +1,5 @@
 #include "bag/recorded_mount.h"
 
-#include <memory>
-
 #include "base/text.h"
 
 namespace visual_localization {

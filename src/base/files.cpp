@@ -1,16 +1,11 @@
 #include "base/files.h"
 
-#include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
-#include <climits>
 #include <cstddef>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <random>
@@ -20,12 +15,12 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <signal.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/text.h"
+#include "base/unfinished_files.h"
 
 namespace visual_localization {
 namespace {
@@ -38,7 +33,6 @@ constexpr std::string_view kLockSuffix = ".lock.visual_localization.partial";
 /// Times that an OutputLock is tried, 10 ms apart: removeAbandoned() of another process holds the file for a moment
 /// too.
 constexpr int kLockAttempts = 100;
-constexpr int kPipeWait_ms = 10'000;
 
 bool endsWith(std::string_view text, std::string_view end) {
   return text.size() > end.size() && text.substr(text.size() - end.size()) == end;
@@ -135,73 +129,6 @@ std::string holderIn(const std::string& path) {
   return count > 0 ? oneLine(holder.data()) : "of another program";
 }
 
-/// The names of all unfinished files, in a form that a signal handler may read.
-std::array<std::atomic<char*>, 32> unfinished{};
-
-std::atomic<bool> ending{false};    ///< a signal ends the process
-std::atomic<int> being_changed{0};  ///< threads that make a file and its entry in `unfinished`, or remove them
-
-/// Those that end a program and leave it time to remove its files.
-constexpr std::array<int, 4> kSignals{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
-
-sigset_t endingSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (const int signal_number : kSignals) sigaddset(&signals, signal_number);
-  return signals;
-}
-
-/// While one lives, no signal ends the process: its handler waits, so that it sees every file and no entry that is half
-/// there. Never one within another.
-class Change {
- public:
-  Change() {
-    const sigset_t ending_signals = endingSignals();
-    ::pthread_sigmask(SIG_BLOCK, &ending_signals, &before_);  // a handler in this thread would wait for itself
-    ++being_changed;
-    if (!ending) return;
-    --being_changed;
-    while (true) ::pause();  // the process ends at any moment
-  }
-  ~Change() {
-    --being_changed;
-    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
-  }
-  Change(const Change&) = delete;
-  Change& operator=(const Change&) = delete;
-
- private:
-  sigset_t before_{};
-};
-
-/// Within a Change.
-int enlist(const std::string& path) {
-  char* name = ::strdup(path.c_str());
-  for (std::size_t i = 0; name != nullptr && i < unfinished.size(); ++i) {
-    char* expected = nullptr;
-    if (unfinished[i].compare_exchange_strong(expected, name)) return static_cast<int>(i);
-  }
-  std::free(name);
-  return -1;
-}
-
-/// Within a Change.
-void strike(int slot) {
-  if (slot >= 0) std::free(unfinished[static_cast<std::size_t>(slot)].exchange(nullptr));
-}
-
-/// For one thread, and by another signal for one more: both do the same.
-void removeUnfinishedAndDie(int signal_number) {
-  ending = true;
-  while (being_changed > 0) ::poll(nullptr, 0, 1);
-  for (auto& slot : unfinished) {
-    const char* name = slot.load();
-    if (name != nullptr) ::unlink(name);
-  }
-  ::signal(signal_number, SIG_DFL);  // whoever waits for this process sees how it ended
-  ::raise(signal_number);
-}
-
 [[noreturn]] void refuse(const std::string& path, const std::string& reason) {
   throw FileError(path + ": cannot be written: " + reason);
 }
@@ -265,45 +192,17 @@ void giveRights(int descriptor, const struct stat& rights, mode_t more) {
 /// A new file of a name that nobody else has. Throws FileError.
 int createLocked(const std::string& shown, const std::string& target, std::string& path, int& slot) {
   while (true) {
-    const Change change;
+    const FileChange change;
     path = partialName(target);
-    slot = enlist(path);
+    slot = enlistUnfinished(path);
     const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     const int error = errno;
     // Without locks the file is safe as well, since nobody can lock it to remove it.
     if (descriptor >= 0) ::flock(descriptor, LOCK_EX);
     if (descriptor >= 0 && isAt(descriptor, path)) return descriptor;
     if (descriptor >= 0) ::close(descriptor);  // removed before it was locked
-    strike(slot);
+    strikeUnfinished(slot);
     if (descriptor < 0 && error != EEXIST) refuse(shown, error);
-  }
-}
-
-[[noreturn]] void refuseToRead(const std::string& path, int error) {
-  throw FileError((path.empty() ? "''" : path) + ": cannot be read: " + std::strerror(error));
-}
-
-/// A device has no end, as /dev/zero, or waits for somebody, as a terminal.
-void requireReadable(const std::string& path, int descriptor) {
-  struct stat status {};
-  if (::fstat(descriptor, &status) != 0) refuseToRead(path, errno);
-  if (S_ISDIR(status.st_mode)) refuseToRead(path, EISDIR);
-  if (S_ISREG(status.st_mode) || S_ISFIFO(status.st_mode)) return;
-  throw FileError(path + ": cannot be read: it is neither a file nor a pipe");
-}
-
-/// How many bytes came; 0 at the end.
-std::size_t readBlock(const std::string& path, int descriptor, std::array<char, 65536>& block) {
-  while (true) {
-    pollfd ready{descriptor, POLLIN, 0};
-    const int found = ::poll(&ready, 1, kPipeWait_ms);
-    if (found == 0) {
-      throw FileError(path + ": cannot be read: nobody wrote into this pipe for " +
-                      std::to_string(kPipeWait_ms / 1000) + " s");
-    }
-    const ssize_t count = found < 0 ? -1 : ::read(descriptor, block.data(), block.size());
-    if (count >= 0) return static_cast<std::size_t>(count);
-    if (errno != EINTR && errno != EAGAIN) refuseToRead(path, errno);
   }
 }
 
@@ -317,9 +216,9 @@ PartialFile::PartialFile(const std::string& target) : shown_(target), target_(re
 }
 
 PartialFile::~PartialFile() {
-  const Change change;
+  const FileChange change;
   if (!committed_) ::unlink(partial_.c_str());
-  strike(slot_);
+  strikeUnfinished(slot_);
   ::close(locked_);
 }
 
@@ -357,23 +256,23 @@ OutputLock::OutputLock(const std::string& target) : path_(resolved(target) + std
 }
 
 bool OutputLock::tryLock() {
-  const Change change;
+  const FileChange change;
   locked_ = openLocked(path_, O_CREAT);
   if (locked_ < 0) {
     if (errno == EWOULDBLOCK) return false;
     if (isWithoutLocks(errno)) ::unlink(path_.c_str());  // it keeps nobody away, and nobody else would remove it
     return true;
   }
-  slot_ = enlist(path_);
+  slot_ = enlistUnfinished(path_);
   nameHolder(locked_);
   return true;
 }
 
 OutputLock::~OutputLock() {
   if (locked_ < 0) return;
-  const Change change;
+  const FileChange change;
   ::unlink(path_.c_str());
-  strike(slot_);
+  strikeUnfinished(slot_);
   ::close(locked_);
 }
 
@@ -381,35 +280,6 @@ void writeFile(const std::string& path, const std::string& content) {
   PartialFile file(path);
   file.write(content);
   file.commit();
-}
-
-void removePartialFilesOnSignals() {
-  struct sigaction action {};
-  action.sa_handler = removeUnfinishedAndDie;
-  action.sa_mask = endingSignals();
-  for (const int signal_number : kSignals) {
-    struct sigaction current {};
-    // What the caller chose to ignore (nohup) stays ignored.
-    if (::sigaction(signal_number, nullptr, &current) == 0 && current.sa_handler == SIG_IGN) continue;
-    ::sigaction(signal_number, &action, nullptr);
-  }
-  ::signal(SIGXFSZ, SIG_IGN);
-}
-
-std::string readFile(const std::string& path, std::size_t most_bytes) {
-  // Without waiting: a pipe into which nobody writes would hold the open itself up for ever.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-  if (descriptor < 0) refuseToRead(path, errno);
-  const std::shared_ptr<void> closed(nullptr, [descriptor](void*) { ::close(descriptor); });
-  requireReadable(path, descriptor);
-  std::string text;
-  std::array<char, 65536> block{};
-  while (const std::size_t count = readBlock(path, descriptor, block)) {
-    text.append(block.data(), count);
-    if (text.size() <= most_bytes) continue;
-    throw FileError(path + ": has more than the " + std::to_string(most_bytes) + " bytes that are allowed");
-  }
-  return text;
 }
 
 }  // namespace visual_localization

@@ -1,7 +1,6 @@
 #include "editing/map_selection.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <set>

@@ -60,12 +60,14 @@ auto withPath(const std::string& path, Write write) {
 class MapWriter::Tables {
  public:
   Tables(const PartialFile& file, Kind kind)
-      : kind_(std::move(kind)), database_(createTables(file.path())), looks_(std::make_unique<Looks>(database_)) {}
+      : kind_(std::move(kind)),
+        database_(createTables(file.path())),
+        feature_rows_(std::make_unique<FeatureRows>(database_)) {}
 
   void append(const TrainingImage& image) {
     requireStorable(image);
     poses_.add(image, image.local.size());
-    looks_->write(map_schema::rowOf(poses_, poses_.size() - 1), image, *kind_);
+    feature_rows_->write(map_schema::rowOf(poses_, poses_.size() - 1), image, *kind_);
     if (poses_.size() == 1) vlad_bytes_ = image.vlad.size();
     if (image.vlad.size() != vlad_bytes_) throw sqlite::Error("its images have VLAD of different vocabularies");
     if (image.geometry) ++geometry_count_;
@@ -84,17 +86,17 @@ class MapWriter::Tables {
     writeMeta(metaOf(header));
     writeMasks(header.sessions);
     if (header.vocabulary) writeVocabulary(*header.vocabulary);
-    looks_.reset();
+    feature_rows_.reset();
     pose_row_.reset();
     database_.execute("COMMIT");
     database_.close();
   }
 
  private:
-  /// Writes what an image looked like.
-  class Looks {
+  /// The rows of the wide tables: what a comparison needs of an image.
+  class FeatureRows {
    public:
-    explicit Looks(const sqlite::Database& database)
+    explicit FeatureRows(const sqlite::Database& database)
         : features_(database, "INSERT INTO features VALUES(?,?,?,?)"),
           globals_(database, "INSERT INTO globals VALUES(?,?,?,?)"),
           previews_(database, "INSERT INTO previews VALUES(?,?,?)"),
@@ -194,7 +196,7 @@ class MapWriter::Tables {
 
   Kind kind_;
   sqlite::Database database_;
-  std::unique_ptr<Looks> looks_;
+  std::unique_ptr<FeatureRows> feature_rows_;
   std::unique_ptr<Statement> pose_row_;
   TrainingPoses poses_;
   std::size_t geometry_count_ = 0;

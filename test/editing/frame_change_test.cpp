@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/numbers.h"
-#include "editing/map_merger.h"
+#include "editing/map_alignment.h"
 
 namespace visual_localization {
 namespace {

@@ -1,6 +1,7 @@
+#include "editing/map_alignment.h"
+
 #include <gtest/gtest.h>
 
-#include "editing/map_merger.h"
 #include "test/editing/edited_street.h"
 
 namespace visual_localization {
