@@ -40,12 +40,6 @@ MapUsage readUsage(const std::string& path) {
 
 }  // namespace
 
-void writeUsage(const std::string& path, const MapUsage& usage) {
-  PartialFile file(path);
-  file.write(usage.toCsv());
-  file.commit();
-}
-
 UsageRecorder::UsageRecorder(std::string path, ThrottledLog& log)
     : path_(std::move(path)), log_(log), lock_(path_), usage_(readUsage(path_)) {}
 
@@ -67,7 +61,7 @@ void UsageRecorder::save() {
   changed_ = false;
   saving_ = std::async(std::launch::async, [this, usage = usage_] {
     try {
-      writeUsage(path_, usage);
+      writeFile(path_, usage.toCsv());
     } catch (const FileError& error) {
       log_.error("usage", std::string("Usage of the map is not saved: ") + error.what());
     }
@@ -96,9 +90,7 @@ std::string withEnding(const std::string& bag, const char* ending) {
 void writeMask(const std::string& path, const Mask& mask) {
   std::vector<std::uint8_t> png;
   cv::imencode(".png", mask.grey(), png);
-  PartialFile file(path);
-  file.write(std::string(png.begin(), png.end()));
-  file.commit();
+  writeFile(path, std::string(png.begin(), png.end()));
 }
 
 tf2_msgs::TFMessage mountMessage(const SensorMount& mount, const ros::Time& stamp) {
@@ -243,7 +235,7 @@ SessionExtension SessionRecorder::saved(const Session& session, const std::strin
   SessionExtension extension{session.map_path, bag, kImages, kPoses, "", withEnding(bag, ".usage.csv"), output};
   if (session.has_mask) extension.mask = withEnding(bag, ".mask.png");
   if (extension.output.empty()) extension.output = withEnding(bag, ".map");
-  writeUsage(extension.usage, session.usage);
+  writeFile(extension.usage, session.usage.toCsv());
   return extension;
 }
 

@@ -48,9 +48,6 @@ class UsageRecorder : public ImageOutput {
   std::future<void> saving_;
 };
 
-/// Throws FileError.
-void writeUsage(const std::string& path, const MapUsage& usage);
-
 /// What a recorded session adds to a map.
 struct SessionExtension {
   std::string map;
