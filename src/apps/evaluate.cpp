@@ -4,11 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <system_error>
-#include <vector>
 
 #include <opencv2/core/utility.hpp>
 

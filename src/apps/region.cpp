@@ -1,6 +1,5 @@
 #include "apps/region.h"
 
-#include <utility>
 #include <vector>
 
 #include <boost/geometry/algorithms/correct.hpp>

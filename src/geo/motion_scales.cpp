@@ -1,7 +1,6 @@
 #include "geo/motion_scales.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>

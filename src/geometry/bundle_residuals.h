@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
-#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

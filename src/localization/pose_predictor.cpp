@@ -1,6 +1,5 @@
 #include "localization/pose_predictor.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>

@@ -1,7 +1,6 @@
 #include "localization/session_choice.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 

@@ -1,7 +1,5 @@
 #include "node/robot_transforms.h"
 
-#include <cmath>
-#include <initializer_list>
 #include <stdexcept>
 #include <utility>
 

@@ -5,7 +5,6 @@
 #include <iomanip>
 #include <sstream>
 #include <stdexcept>
-#include <utility>
 
 #include "base/text.h"
 #include "visual_localization/parameters/parameters.h"

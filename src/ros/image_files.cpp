@@ -1,9 +1,6 @@
 #include <algorithm>
-#include <array>
 #include <csetjmp>
-#include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <initializer_list>
 #include <string>
 #include <vector>

@@ -1,7 +1,6 @@
 #include "ros/message_readers.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <exception>
 #include <sstream>

@@ -1,5 +1,4 @@
 // Symmetric ratio match of two images' descriptors: ours, the plain loop, and what OpenCV and Eigen offer for it.
-#include <cmath>
 #include <vector>
 
 #include <Eigen/Core>

@@ -1,5 +1,4 @@
 // Without comparisons: all scores are at hand.
-#include <cmath>
 #include <memory>
 
 #include <benchmark/benchmark.h>

@@ -1,7 +1,6 @@
 #include "visual_localization/camera/mask.h"
 
 #include <string>
-#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

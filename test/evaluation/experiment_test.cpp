@@ -1,6 +1,5 @@
 #include "evaluation/experiment.h"
 
-#include <algorithm>
 #include <filesystem>
 
 #include <gmock/gmock.h>

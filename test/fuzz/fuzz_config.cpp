@@ -1,6 +1,5 @@
 /// Parameter files and experiments: YAML that somebody wrote.
 #include <cstdint>
-#include <stdexcept>
 #include <string>
 #include <vector>
 

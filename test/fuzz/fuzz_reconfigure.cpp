@@ -1,6 +1,5 @@
 /// Requests of dynamic_reconfigure, as anyone on the network may send them.
 #include <cstdint>
-#include <string>
 
 #include <dynamic_reconfigure/Config.h>
 

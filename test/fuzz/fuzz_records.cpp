@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include <opencv2/core.hpp>
 

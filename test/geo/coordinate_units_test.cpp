@@ -1,6 +1,5 @@
 #include "geo/coordinate_units.h"
 
-#include <cmath>
 #include <limits>
 
 #include <gmock/gmock.h>

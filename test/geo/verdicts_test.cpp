@@ -1,6 +1,5 @@
 // Which fixes are left out, to the fix: a straight steady drive with faults at known times.
 
-#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>

@@ -1,7 +1,6 @@
 #include "localization/bayes_tracker.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 #include <gtest/gtest.h>

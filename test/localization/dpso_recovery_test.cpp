@@ -1,7 +1,6 @@
 // How a swarm recovers, and what a restart or an attraction makes it forget.
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>

@@ -1,8 +1,6 @@
 // Odometry leads over images that show nothing known, and does no harm where it is wrong.
 #include <cmath>
 #include <memory>
-#include <random>
-#include <utility>
 
 #include <gtest/gtest.h>
 

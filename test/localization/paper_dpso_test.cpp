@@ -1,7 +1,6 @@
 // Where the swarm differs from the papers, and the switches that make it as they say.
 
 #include <algorithm>
-#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -2,7 +2,6 @@
 
 #include "localization/pose_predictor.h"
 
-#include <cstdint>
 #include <optional>
 
 #include <gtest/gtest.h>

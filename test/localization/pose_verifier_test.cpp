@@ -1,7 +1,6 @@
 #include "localization/pose_verifier.h"
 
 #include <algorithm>
-#include <optional>
 #include <random>
 
 #include <gtest/gtest.h>

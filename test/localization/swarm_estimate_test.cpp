@@ -1,7 +1,6 @@
 // What a swarm makes of particles that match nothing, and of those that are far away.
 
 #include <cstdint>
-#include <vector>
 
 #include <gtest/gtest.h>
 

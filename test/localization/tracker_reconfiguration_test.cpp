@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <tuple>
