@@ -23,12 +23,13 @@ namespace {
 const char* const kNoCalibration = "no calibration (no camera_info, no --camera-info)";
 
 void printFixes(const PlottedSession& session) {
-  constexpr std::array<FixVerdict, 6> verdicts{FixVerdict::kKept,  FixVerdict::kNoFix,     FixVerdict::kDisordered,
-                                               FixVerdict::kSpike, FixVerdict::kMultipath, FixVerdict::kTooFast};
+  constexpr std::array<FixVerdict, 7> verdicts{FixVerdict::kKept,    FixVerdict::kNoFix,     FixVerdict::kDisordered,
+                                               FixVerdict::kSpike,   FixVerdict::kMultipath, FixVerdict::kTooFast,
+                                               FixVerdict::kRepeated};
   std::cout << session.name << ": " << session.fixes.size() << " fixes:";
   for (const FixVerdict verdict : verdicts) {
     const auto count = std::count(session.cleaned.verdicts.begin(), session.cleaned.verdicts.end(), verdict);
-    if (count == 0 && verdict == FixVerdict::kTooFast) continue;
+    if (count == 0 && (verdict == FixVerdict::kTooFast || verdict == FixVerdict::kRepeated)) continue;
     std::cout << (verdict == FixVerdict::kKept ? " " : ", ") << count << ' ' << toString(verdict);
   }
   std::cout << "; " << session.cleaned.gaps_closed << " gaps closed, the longest " << session.cleaned.longest_gap_s

@@ -49,6 +49,63 @@ std::vector<std::size_t> inOrder(const std::vector<Fix>& fixes, const std::vecto
   return ordered;
 }
 
+bool isSamePlace(const Fix& a, const Fix& b) {
+  return a.position.latitude_deg == b.position.latitude_deg && a.position.longitude_deg == b.position.longitude_deg;
+}
+
+/// Where each run of fixes with one position begins, to the last bit, and the end.
+std::vector<std::size_t> runsOf(const std::vector<Fix>& fixes, const std::vector<std::size_t>& ordered) {
+  std::vector<std::size_t> begins;
+  for (std::size_t k = 0; k < ordered.size(); ++k) {
+    if (k == 0 || !isSamePlace(fixes[ordered[k - 1]], fixes[ordered[k]])) begins.push_back(k);
+  }
+  begins.push_back(ordered.size());
+  return begins;
+}
+
+/// How many messages a driver makes of a fix: more than one where its topic is faster than its receiver. Then nearly
+/// all runs are alike, and both coordinates change between them; those of a coarse receiver change one by one.
+std::size_t messagesOfAFix(const std::vector<Fix>& fixes, const std::vector<std::size_t>& ordered,
+                           const std::vector<std::size_t>& begins) {
+  constexpr std::size_t kLeastRuns = 10;
+  constexpr double kAlike = 0.8;
+  constexpr double kWaver = 0.25;  // of the length of a run, at least one message
+  if (begins.size() < kLeastRuns + 3) return 1;
+  std::vector<double> lengths;  // the first and the last may be cut
+  double both_change = 0.0;
+  for (std::size_t run = 1; run + 2 < begins.size(); ++run) {
+    lengths.push_back(static_cast<double>(begins[run + 1] - begins[run]));
+    const GeodeticPoint& before = fixes[ordered[begins[run] - 1]].position;
+    const GeodeticPoint& here = fixes[ordered[begins[run]]].position;
+    both_change += before.latitude_deg != here.latitude_deg && before.longitude_deg != here.longitude_deg ? 1.0 : 0.0;
+  }
+  const double usual = std::round(median(lengths));
+  const auto alike = std::count_if(lengths.begin(), lengths.end(), [usual](double length) {
+    return length > 1.0 && std::abs(length - usual) <= std::max(1.0, kWaver * usual);
+  });
+  const double least = kAlike * static_cast<double>(lengths.size());
+  return usual > 1.0 && static_cast<double>(alike) >= least && both_change >= least ? static_cast<std::size_t>(usual)
+                                                                                    : 1;
+}
+
+/// Without those that a driver only repeats: they are of the time before. A receiver that stands may say the same for
+/// long, so one fix of as many messages as usual stays.
+std::vector<std::size_t> withoutRepeated(const std::vector<Fix>& fixes, const std::vector<std::size_t>& ordered,
+                                         std::vector<FixVerdict>& verdicts) {
+  const std::vector<std::size_t> begins = runsOf(fixes, ordered);
+  const std::size_t messages = messagesOfAFix(fixes, ordered, begins);
+  std::vector<std::size_t> kept;
+  for (std::size_t run = 0; run + 1 < begins.size(); ++run) {
+    for (std::size_t k = begins[run]; k < begins[run + 1]; ++k) {
+      const std::size_t place = k - begins[run];
+      const bool is_fix = place % messages == 0 && (place == 0 || begins[run + 1] - k >= messages);
+      if (is_fix) kept.push_back(ordered[k]);
+      if (!is_fix) verdicts[ordered[k]] = FixVerdict::kRepeated;
+    }
+  }
+  return kept;
+}
+
 }  // namespace
 
 UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, std::vector<FixVerdict>& verdicts) {
@@ -63,7 +120,7 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
     }
   }
   UsableFixes usable;
-  for (const std::size_t i : inOrder(fixes, candidates, verdicts)) {
+  for (const std::size_t i : withoutRepeated(fixes, inOrder(fixes, candidates, verdicts), verdicts)) {
     const std::int64_t start_ns = fixes[usable.indices.empty() ? i : usable.indices.front()].stamp_ns;
     const double time_s = secondsBetween(start_ns, fixes[i].stamp_ns);
     if (!usable.samples.empty() && time_s - usable.samples.back().time_s < kShortestInterval_s) {

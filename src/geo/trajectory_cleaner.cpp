@@ -102,6 +102,8 @@ std::string toString(FixVerdict verdict) {
       return "out of order";
     case FixVerdict::kTooFast:
       return "faster than 50 Hz";
+    case FixVerdict::kRepeated:
+      return "repeated";
     case FixVerdict::kSpike:
       return "spike";
     case FixVerdict::kMultipath:

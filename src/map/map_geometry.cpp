@@ -101,7 +101,7 @@ std::vector<MapFix> inFrame(const std::vector<Fix>& fixes, const std::vector<Fix
                             const LocalFrame& frame) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
-    if (hasPosition(fixes[i])) order.push_back(i);
+    if (hasPosition(fixes[i]) && verdicts[i] != FixVerdict::kRepeated) order.push_back(i);
   }
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return fixes[a].stamp_ns < fixes[b].stamp_ns; });

@@ -57,5 +57,16 @@ TEST(MapFrame, AltitudesOfTheSeaAndOfTheEllipsoidAreBroughtTogether) {
   for (const MapFix& fix : found) EXPECT_NEAR(fix.up_m, found.front().up_m, 1.0);
 }
 
+TEST(MapFrame, AFixThatIsOnlyRepeatedSaysNothingOfItsTime) {
+  const std::vector<Fix> fixes = levelRound();
+  std::vector<FixVerdict> verdicts(fixes.size(), FixVerdict::kKept);
+  verdicts[1] = FixVerdict::kRepeated;
+  verdicts[3] = FixVerdict::kMultipath;
+  const std::vector<MapFix> found = inFrame(fixes, verdicts, frameFor(fixes, {}));
+  ASSERT_EQ(found.size(), fixes.size() - 1);
+  EXPECT_EQ(found[1].stamp_ns, fixes[2].stamp_ns);
+  EXPECT_FALSE(found[2].believed) << "the images decide about multipath";
+}
+
 }  // namespace
 }  // namespace visual_localization

@@ -15,6 +15,7 @@ enum class FixVerdict {
   kNoFix,       ///< the receiver said so, or the coordinates are not finite or out of range
   kDisordered,  ///< stamp not after the one before, or far ahead of those behind
   kTooFast,     ///< less than kShortestInterval_s after the one that was used before
+  kRepeated,    ///< the one before once more, by a driver that is faster than its receiver
   kSpike,       ///< single outlier, or farther from the map's datum than a tangent plane reaches
   kMultipath,   ///< deviation for a while although the receiver claims a fix: a reflected signal
 };
