@@ -16,7 +16,7 @@ double mapVariance_m2(const TrainingMap& map, std::size_t image) {
 }  // namespace
 
 /// The solved pose; without one where the motion so far leads to, if the tracker is not elsewhere; or what the tracker
-/// has.
+/// has. Poses by a calibration that the images contradict lead nowhere.
 void Localizer::choosePose(Estimate& estimate) {
   if (estimate.metric) {
     estimate.pose = poseOf(*estimate.metric);
@@ -27,7 +27,8 @@ void Localizer::choosePose(Estimate& estimate) {
   const bool probable = estimate.evidence.probability && estimate.state == LocalizationState::kTracking;
   const bool placed = estimate.tracked.best.recognised || probable;
   estimate.source = placed ? PoseSource::kPlace : PoseSource::kNone;
-  const auto predicted = isMetric() ? verifier_->predictor().predicted() : std::nullopt;
+  const bool follows_poses = isMetric() && !verifier_->focal().contradicts();
+  const auto predicted = follows_poses ? verifier_->predictor().predicted() : std::nullopt;
   if (!predicted) return;
   const double apart_m = (predicted->position_m - estimate.pose.position_m).norm();
   const bool knows_better = predicted->by_odometry && !estimate.tracked.best.recognised;

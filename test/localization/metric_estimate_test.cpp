@@ -168,6 +168,7 @@ TEST_F(MetricEstimate, ACameraThatTheImagesContradictVerifiesNothing) {
     if (!estimate.camera_contradicted) continue;
     ++contradicted;
     EXPECT_FALSE(estimate.evidence.verified);
+    EXPECT_EQ(estimate.source, PoseSource::kPlace) << i << ": the poses so far lead nowhere";
   }
   EXPECT_GT(contradicted, 10U);
 }
