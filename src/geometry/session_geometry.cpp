@@ -27,13 +27,10 @@ constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
 constexpr double kRough = 1e-3;
 constexpr double kCoarse = 1e-4;
 constexpr double kFine = 1e-6;
-constexpr double kUnknownFocal = 0.3;   ///< one sigma of the logarithm of a focal length that nobody calibrated
-constexpr double kAspectSigma = 0.002;  ///< of square pixels
-/// Of a calibration with a chessboard: the principal point as a share of the focal length, and k1 and k2.
-constexpr double kPrincipalPointSigma = 0.01;
-constexpr double kDistortionSigma = 0.05;
-constexpr std::uint32_t kPairSpan = 8;      ///< each image is matched with so many of the next ones
+constexpr double kUnknownFocal = 0.3;       ///< one sigma of the logarithm of a focal length that nobody calibrated
+constexpr double kAspectSigma = 0.002;      ///< of square pixels
 constexpr double kStretchedAspect = 0.005;  ///< likewise, where the shutter of a camera that moves stretches them
+constexpr std::uint32_t kPairSpan = 8;      ///< each image is matched with so many of the next ones
 /// Landmarks that many images show tie all of these to each other, which costs time. Until positions are about right
 /// their tracks are cut.
 constexpr std::size_t kCoarseViews = 20;
@@ -44,8 +41,8 @@ using Indices = std::pair<std::uint32_t, std::uint32_t>;
 
 LensCorrection lensSigmaOf(const GeometryConfig& config) {
   LensCorrection sigma;
-  sigma << config.focal_sigma, kAspectSigma, kPrincipalPointSigma, kPrincipalPointSigma, kDistortionSigma,
-      kDistortionSigma;
+  sigma << config.focal_sigma, kAspectSigma, config.principal_point_sigma, config.principal_point_sigma,
+      config.distortion_sigma, config.distortion_sigma;
   return sigma;
 }
 
@@ -376,6 +373,10 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                self_calibration);
   visitor.real({"geometry/focal_sigma", "1", "how well a calibration knows the focal length, as a share of it"},
                focal_sigma, 1e-6, 1.0);
+  visitor.real({"geometry/principal_point_sigma", "1", "and the principal point, as a share of the focal length"},
+               principal_point_sigma, 1e-6, 1.0);
+  visitor.real({"geometry/distortion_sigma", "1", "and the radial coefficients k1 and k2"}, distortion_sigma, 1e-6,
+               1.0);
   visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},
                fix_sigma_m, 0.001, 100.0);
   visitor.integer(

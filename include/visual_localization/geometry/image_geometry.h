@@ -17,6 +17,8 @@ struct GeometryConfig {
   bool enabled = true;
   bool self_calibration = false;
   double focal_sigma = 0.03;
+  double principal_point_sigma = 0.01;
+  double distortion_sigma = 0.05;
   double fix_sigma_m = 0.3;
   int window = 2000;
   double spacing_m = 2.0;
