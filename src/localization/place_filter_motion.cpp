@@ -100,7 +100,7 @@ PlaceFilter::Way PlaceFilter::wayBy(const Motion& motion) const {
 
 void PlaceFilter::predict(const Motion& motion) {
   constexpr double kLeastIndependence = 0.1;  // of a robot that stands: noise, and people who pass
-  double expected = 0.0;  // forwards or backwards, as a share of the session's speed
+  double expected = 0.0;                      // forwards or backwards, as a share of the session's speed
   for (std::size_t k = 0; k < speeds_.size(); ++k) expected += speeds_[k] * std::abs(kSpeeds[k]);
   const double expected_m = expected * spacing_m_ / interval_s_ * secondsOf(motion);
   const double way_m = motion.share() > 0.0 ? motion.increment().distance_m : expected_m;

@@ -168,7 +168,30 @@ TEST_F(MetricEstimate, ACameraThatTheImagesContradictVerifiesNothing) {
     if (!estimate.camera_contradicted) continue;
     ++contradicted;
     EXPECT_FALSE(estimate.evidence.verified);
+    EXPECT_FALSE(estimate.other_lens) << "the lens is the map's, the calibration is not";
     EXPECT_EQ(estimate.source, PoseSource::kPlace) << i << ": the poses so far lead nowhere";
+  }
+  EXPECT_GT(contradicted, 10U);
+}
+
+TEST_F(MetricEstimate, ThroughAnotherLensPlacesAreNotTracked) {
+  const Intrinsics lens = localizer_->camera()->intrinsics();
+  const auto zoomed = [&lens](const LocalFeatures& features) {
+    std::vector<Keypoint> keypoints = features.keypoints().list();
+    for (Keypoint& keypoint : keypoints) {
+      keypoint.x_px = static_cast<float>(lens.cx + 1.1 * (static_cast<double>(keypoint.x_px) - lens.cx));
+      keypoint.y_px = static_cast<float>(lens.cy + 1.1 * (static_cast<double>(keypoint.y_px) - lens.cy));
+    }
+    return LocalFeatures(keypoints, features.bytes());
+  };
+  std::size_t contradicted = 0;
+  for (std::size_t i = 5; i < 45; ++i) {
+    const Estimate estimate = show(zoomed(street_.seenFrom(street_.trueNear(i, kHere_m))));
+    if (!estimate.camera_contradicted) continue;
+    ++contradicted;
+    EXPECT_TRUE(estimate.other_lens) << i << ' ' << estimate.focal_scale;
+    EXPECT_NE(estimate.state, LocalizationState::kTracking) << i;
+    EXPECT_NE(estimate.cameraTrouble().find("another lens"), std::string::npos) << estimate.cameraTrouble();
   }
   EXPECT_GT(contradicted, 10U);
 }

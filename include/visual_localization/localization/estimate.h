@@ -46,6 +46,7 @@ struct Estimate {
   std::size_t images_since_metric = 0;    ///< 0 when this image has one
   double focal_scale = 1.0;          ///< focal length by the last images with a pose, as a share of the calibration's
   bool camera_contradicted = false;  ///< by them: no pose is metric
+  bool other_lens = false;           ///< and the map was seen through another one: what looks alike is not as near
   double motion_residual_m = 0.0;    ///< see MotionConsistency; of the last estimates
   std::string session;               ///< of the map, that the next image is compared with; empty: all alike
   std::size_t comparisons = 0;       ///< distinct training images that particles or landmarks were compared with

@@ -109,6 +109,7 @@ class Localizer {
   TrackerEstimate trackVerified(const MetricPose& metric);
   void witness(const Motion& motion, const std::optional<MetricPose>& metric);
   std::optional<double> probabilityOf(const TrackerEstimate& tracked) const;
+  bool isThroughOtherLens(std::size_t training_image) const;
   void learnSession(const TrackerEstimate& tracked);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
   void choosePose(Estimate& estimate);
