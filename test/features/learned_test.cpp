@@ -32,7 +32,7 @@ class LearnedTest : public ::testing::Test {
 
   std::string refusal(const std::string& model) {
     try {
-      Learned().adopt({"native", model});
+      Learned().adopt(model);
       return "";
     } catch (const ParameterError& error) {
       return error.what();
@@ -163,7 +163,7 @@ TEST_F(LearnedTest, OpenCvSeesNoOtherModelThanTheMaps) {
   std::ofstream(path) << "no model at all";
   try {
     kind_.adopt(choice_);
-    kind_.makeExtractor({"native", path});
+    kind_.makeExtractor(path);
     FAIL() << "was taken for the same";
   } catch (const ParameterError& error) {
     EXPECT_THAT(error.what(), AllOf(HasSubstr(path), HasSubstr("is not that of the model")));
