@@ -139,7 +139,7 @@ TEST_F(FrontEndTest, ADullImageIsTheSameInTraining) {
     viewAt(10.0).convertTo(dull, CV_8U, gain, 20.0);
     FrontEnd front_end = makeFrontEnd();
     front_end.setImage(0, dull);
-    ExtractionPool pool(Sift(), {}, 0, 1);
+    ExtractionPool pool(Sift(), {}, 1);
     const std::vector<TrainingImage> training = pool.extract({RawImage{TrainingPose(), dull}});
     EXPECT_EQ(front_end.local().bytes(), training.front().local.bytes()) << gain;
     EXPECT_EQ(front_end.global().wgii, training.front().global.wgii) << gain;
@@ -266,7 +266,7 @@ TEST_F(FrontEndTest, AMapIsMadeUnderTheSameMask) {
   config.mask = rightHalf();
   FrontEnd live(config);
   live.setImage(0, viewAt(10.0));
-  ExtractionPool pool(Sift(), {}, 0, 1);
+  ExtractionPool pool(Sift(), {}, 1);
   const TrainingImage training = pool.extract({{{}, viewAt(10.0), rightHalf()}}).front();
   EXPECT_EQ(training.local.bytes(), live.local().bytes());
   EXPECT_EQ(training.global.wgoh, live.global().wgoh);
