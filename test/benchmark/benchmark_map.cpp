@@ -33,6 +33,7 @@ struct Options {
   std::uint64_t seed = 1;
   double max_range_m = LocalizerConfig().dpso.max_range_m;
   int sweep_images = LocalizerConfig().sweep_images;
+  std::string tracker = LocalizerConfig().tracker;
   bool header = false;
 };
 
@@ -113,6 +114,7 @@ Drive drive(StreetImage& image, Localizer& localizer, std::size_t begin, std::si
 LocalizerConfig configOf(const Options& options) {
   LocalizerConfig config;
   config.sweep_images = options.sweep_images;
+  config.tracker = options.tracker;
   config.dpso.max_range_m = options.max_range_m;
   return config;
 }
@@ -180,6 +182,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "As the map was made with")->capture_default_str();
   app.add_option("--max-range", options.max_range_m, "As dpso/max_range, metres")->capture_default_str();
   app.add_option("--sweep-images", options.sweep_images, "As the parameter of the localizer")->capture_default_str();
+  app.add_option("--tracker", options.tracker, "As the parameter of the localizer")->capture_default_str();
   app.add_flag("--header", options.header, "Print the names of the columns");
   CLI11_PARSE(app, argc, argv);
   try {
