@@ -31,7 +31,7 @@ std::string Estimate::cameraTrouble() const {
   std::ostringstream text;
   text << "the focal length estimated from the images is " << std::fixed << std::setprecision(1) << 100.0 * focal_scale
        << " % of the calibration's: no metric poses";
-  if (other_lens) text << "; the map's images were seen through another lens: its places are off, no TRACKING";
+  if (other_lens) text << "; the map's images were seen through another lens, so that its places are off";
   return text.str();
 }
 

@@ -1,5 +1,5 @@
-// How often the images of a map that look most alike as a whole show the place: recall by VLAD and by global features
-// of the images of a second map, the drive. One line of CSV.
+// How often the images of a map that look most alike show the place: recall by VLAD, by global features and by votes of
+// the images of a second map, the drive. One line of CSV.
 
 #include <algorithm>
 #include <array>
@@ -13,6 +13,7 @@
 #include <CLI/CLI.hpp>
 
 #include "visual_localization/localization/scores.h"
+#include "visual_localization/localization/similarity.h"
 #include "visual_localization/map/map_file.h"
 
 namespace visual_localization::benchmark {
@@ -78,6 +79,11 @@ void measure(const std::string& map_path, const std::string& drive_path, double 
   print("global", recallOf(drive->size(), map->size(), is_right, [&](std::size_t i, std::size_t k) {
           return global.compare(*drive->global(i), *map->global(k)).similarity;
         }));
+  const LocalSimilarity votes({MatchConfig().max_angle_ratio, "votes"}, SimilarityConfig(),
+                              map->header().image_size.width, map->header().kind);
+  print("votes", recallOf(drive->size(), map->size(), is_right, [&](std::size_t i, std::size_t k) {
+          return votes.compare(*drive->local(i), *map->local(k)).similarity;
+        }));
   std::printf("\n");
 }
 
@@ -85,7 +91,7 @@ void measure(const std::string& map_path, const std::string& drive_path, double 
 }  // namespace visual_localization::benchmark
 
 int main(int argc, char** argv) {
-  CLI::App app("Recall at 1, 5 and 10 of proposals by VLAD and by global features.", "measure_retrieval");
+  CLI::App app("Recall at 1, 5 and 10 by VLAD, by global features and by votes.", "measure_retrieval");
   std::string map;
   std::string drive;
   double within_m = 5.0;
