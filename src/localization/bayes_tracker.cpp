@@ -69,7 +69,7 @@ void BayesTracker::choose(Likelihood& likelihood) {
   const bool sees_all = map_.size() <= static_cast<std::size_t>(config_.first_comparisons);
   std::vector<std::size_t> proposed;
   if (!sees_all) proposed = likelihood.mostSimilar(is_known_ ? rest / kProposed : rest / 2);
-  filter_.mostProbable(rest - std::min(rest, proposed.size()), chosen_);
+  filter_.probabilities().mostProbable(rest - std::min(rest, proposed.size()), 0.0, chosen_);
   chosen_.insert(chosen_.end(), proposed.begin(), proposed.end());
   std::sort(chosen_.begin(), chosen_.end());
   chosen_.erase(std::unique(chosen_.begin(), chosen_.end()), chosen_.end());
@@ -121,17 +121,12 @@ TrackerEstimate BayesTracker::estimate(Likelihood& likelihood) {
 
 /// By one random offset and equal steps through the posterior, so that all weigh the same.
 void BayesTracker::drawParticles() {
-  const std::vector<double>& probabilities = filter_.probabilities();
   const double step = 1.0 / static_cast<double>(particles_.size());
-  double target = random_.uniform(0.0, step);
-  double cumulated = probabilities.front();
-  std::size_t image = 0;
-  for (Particle& particle : particles_) {
-    while (target > cumulated && image + 1 < probabilities.size()) cumulated += probabilities[++image];
-    particle = Particle();
-    particle.position_m = map_.position_m(image);
-    particle.weight = step;
-    target += step;
+  const auto images = filter_.probabilities().quantiles(random_.uniform(0.0, step), step, particles_.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    particles_[i] = Particle();
+    particles_[i].position_m = map_.position_m(images[i]);
+    particles_[i].weight = step;
   }
 }
 

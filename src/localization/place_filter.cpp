@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/numbers.h"
 
@@ -19,19 +18,23 @@ void BayesConfig::declare(ParameterVisitor& visitor) {
 }
 
 PlaceFilter::PlaceFilter(const TrainingMap& map, const BayesConfig& config)
-    : map_(map),
-      config_(config),
-      pace_mps_(map.size()),
-      probabilities_(map.size()),
-      likelihoods_(map.size()),
-      stayed_(map.size()),
-      arrival_of_(map.size()) {
+    : map_(map), config_(config), pace_mps_(map.size()), places_(map.size()) {
   learnPace();
+  learnMoments();
   reset();
 }
 
+void PlaceFilter::learnMoments() {
+  const auto count = static_cast<double>(map_.size());
+  for (std::size_t i = 0; i < map_.size(); ++i) centroid_m_ += map_.position_m(i) / count;
+  for (std::size_t i = 0; i < map_.size(); ++i) {
+    const Eigen::Vector2d offset_m = map_.position_m(i) - centroid_m_;
+    scatter_m2_ += offset_m * offset_m.transpose();
+  }
+}
+
 void PlaceFilter::reset() {
-  std::fill(probabilities_.begin(), probabilities_.end(), 1.0 / static_cast<double>(map_.size()));
+  places_.reset(1.0 / static_cast<double>(map_.size()));
   forgetMotion();
   log_best_.reset();
   off_map_.reset();
@@ -39,9 +42,9 @@ void PlaceFilter::reset() {
 
 void PlaceFilter::reset(const std::vector<Eigen::Vector2d>& positions_m) {
   reset();
-  std::fill(probabilities_.begin(), probabilities_.end(), 0.0);
+  places_.reset(0.0);
   for (const Eigen::Vector2d& position_m : positions_m) {
-    probabilities_[map_.nearest(position_m).image] += 1.0 / static_cast<double>(positions_m.size());
+    places_.own(map_.nearest(position_m).image).probability += 1.0 / static_cast<double>(positions_m.size());
   }
   off_map_.ruleOut();
 }
@@ -88,7 +91,7 @@ void PlaceFilter::updateOffMap(const PlaceLikelihood& likelihood) {
     if (is_in_turn) in_turn.push_back(*one->log_matches);
     const auto is_same = [one](const auto& other) { return other.training_image == one->training_image; };
     if (is_in_turn && std::any_of(likelihood.compared.begin(), in_turn_from, is_same)) continue;  // it counts once
-    asked_.push_back({probabilities_[one->training_image], *one->log_matches});
+    asked_.push_back({places_[one->training_image], *one->log_matches});
   }
   if (!off_map_.knowsChance() && !in_turn.empty()) off_map_.learnChance(median(std::move(in_turn)));
   off_map_.update(asked_);
@@ -96,8 +99,9 @@ void PlaceFilter::updateOffMap(const PlaceLikelihood& likelihood) {
 
 /// Once the image says where the robot is: what matched there, and what matched far from it.
 void PlaceFilter::learnMatches(const PlaceLikelihood& likelihood) {
-  const auto most = std::max_element(probabilities_.begin(), probabilities_.end()) - probabilities_.begin();
-  const Eigen::Vector2d place_m = map_.position_m(static_cast<std::size_t>(most));
+  std::vector<std::size_t> most;
+  places_.mostProbable(1, 0.0, most);
+  const Eigen::Vector2d place_m = map_.position_m(most.front());
   std::optional<double> best;
   for (std::size_t i = 0; i < likelihood.compared.size(); ++i) {
     const PlaceLikelihood::Compared& one = likelihood.compared[i];
@@ -111,50 +115,27 @@ void PlaceFilter::learnMatches(const PlaceLikelihood& likelihood) {
 
 void PlaceFilter::update(const PlaceLikelihood& likelihood) {
   updateOffMap(likelihood);
-  const auto count = static_cast<double>(map_.size());
-  std::fill(likelihoods_.begin(), likelihoods_.end(), likelihood.elsewhere);
-  for (const auto& compared : likelihood.compared) likelihoods_[compared.training_image] = compared.likelihood;
-  const double sum = std::accumulate(likelihoods_.begin(), likelihoods_.end(), 0.0);
+  using Place = PlaceProbabilities::Own;
+  places_.forEach([&](Place& place) { place.likelihood = likelihood.elsewhere; });
+  for (const auto& compared : likelihood.compared)
+    places_.own(compared.training_image).likelihood = compared.likelihood;
+  const double sum = places_.sum([](const Place& place) { return place.likelihood; });
   if (!(sum > 0.0) || !std::isfinite(sum)) return;
-  for (double& value : likelihoods_) value = (1.0 - config_.uniform) * value / sum + config_.uniform / count;
-  learnSpeed(std::inner_product(stayed_.begin(), stayed_.end(), likelihoods_.begin(), 0.0));
-  double total = 0.0;
-  for (std::size_t i = 0; i < likelihoods_.size(); ++i) total += probabilities_[i] *= likelihoods_[i];
-  if (total > 0.0) {
-    for (double& probability : probabilities_) probability /= total;
-    learnMatches(likelihood);
-  } else {
-    reset();
-  }
-}
-
-void PlaceFilter::mostProbable(std::size_t count, std::vector<std::size_t>& found) const {
-  mostProbable(count, 0.0, found);
-}
-
-/// Those alone whose probability is at least `least`.
-void PlaceFilter::mostProbable(std::size_t count, double least, std::vector<std::size_t>& found) const {
-  const auto is_before = [this](std::size_t a, std::size_t b) {
-    return probabilities_[a] != probabilities_[b] ? probabilities_[a] > probabilities_[b] : a < b;
-  };
-  found.clear();
-  if (count == 0) return;
-  for (std::size_t i = 0; i < probabilities_.size(); ++i) {  // the last one of a heap is at its front
-    if (probabilities_[i] < least) continue;
-    if (found.size() == count) {
-      if (!is_before(i, found.front())) continue;
-      std::pop_heap(found.begin(), found.end(), is_before);
-      found.pop_back();
-    }
-    found.push_back(i);
-    if (count < probabilities_.size()) std::push_heap(found.begin(), found.end(), is_before);
-  }
+  const double uniform = config_.uniform / static_cast<double>(map_.size());
+  places_.forEach([&](Place& place) { place.likelihood = (1.0 - config_.uniform) * place.likelihood / sum + uniform; });
+  learnSpeed(places_.sum([](const Place& place) { return place.stayed * place.likelihood; }));
+  places_.forEach([](Place& place) { place.probability *= place.likelihood; });
+  const double total = places_.sum([](const Place& place) { return place.probability; });
+  if (!(total > 0.0)) return reset();
+  places_.forEach([total](Place& place) { place.probability /= total; });
+  places_.joinAlike();
+  learnMatches(likelihood);
 }
 
 double PlaceFilter::within(const Eigen::Vector2d& position_m, double radius_m) const {
   map_.within(position_m, radius_m, around_);
   double sum = 0.0;
-  for (const std::uint32_t i : around_) sum += probabilities_[i];
+  for (const std::uint32_t i : around_) sum += places_[i];
   return sum;
 }
 
@@ -180,7 +161,7 @@ CloudMoments PlaceFilter::mode() const {
   constexpr double kWidest_m = 5.0;
   const double radius_m = std::min(kWidest_m, kPlaces * spacing_m_);
   std::vector<std::size_t> candidates;
-  mostProbable(kCandidates, candidates);
+  places_.mostProbable(kCandidates, 0.0, candidates);
   std::sort(candidates.begin(), candidates.end());
   std::size_t best = candidates.front();
   double most = -1.0;
@@ -192,25 +173,28 @@ CloudMoments PlaceFilter::mode() const {
   double sum = 0.0;
   map_.within(map_.position_m(best), radius_m, around_);
   for (const std::uint32_t i : around_) {
-    moments.mean_m += probabilities_[i] * map_.position_m(i);
-    sum += probabilities_[i];
+    moments.mean_m += places_[i] * map_.position_m(i);
+    sum += places_[i];
   }
   if (!(sum > 0.0)) return {map_.position_m(best), Eigen::Matrix2d::Zero()};
   moments.mean_m /= sum;
   for (const std::uint32_t i : around_) {
     const Eigen::Vector2d offset_m = map_.position_m(i) - moments.mean_m;
-    moments.covariance_m2 += probabilities_[i] / sum * offset_m * offset_m.transpose();
+    moments.covariance_m2 += places_[i] / sum * offset_m * offset_m.transpose();
   }
   return moments;
 }
 
 Eigen::Matrix2d PlaceFilter::covarianceAbout(const Eigen::Vector2d& centre_m) const {
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
-  for (std::size_t i = 0; i < probabilities_.size(); ++i) {
-    const Eigen::Vector2d offset_m = map_.position_m(i) - centre_m;
-    covariance_m2 += probabilities_[i] * offset_m * offset_m.transpose();
+  const double common = places_.commonCount() > 0 ? places_.common().probability : 0.0;
+  for (const PlaceProbabilities::Own& place : places_.allOwn()) {
+    const Eigen::Vector2d offset_m = map_.position_m(place.training_image) - centre_m;
+    covariance_m2 += (place.probability - common) * offset_m * offset_m.transpose();
   }
-  return covariance_m2;
+  const Eigen::Vector2d offset_m = centroid_m_ - centre_m;
+  const auto count = static_cast<double>(map_.size());
+  return covariance_m2 + common * (scatter_m2_ + count * offset_m * offset_m.transpose());
 }
 
 }  // namespace visual_localization

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "localization/off_map.h"
+#include "localization/place_probabilities.h"
 #include "visual_localization/localization/motion.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/scores.h"
@@ -59,9 +60,7 @@ class PlaceFilter {
   void update(const PlaceLikelihood& likelihood);
 
   /// Of each training image; they sum to one.
-  const std::vector<double>& probabilities() const { return probabilities_; }
-  /// The `count` most probable training images, the first of equals; not in order.
-  void mostProbable(std::size_t count, std::vector<std::size_t>& found) const;
+  const PlaceProbabilities& probabilities() const { return places_; }
   /// Of being within `radius_m` of a position.
   double within(const Eigen::Vector2d& position_m, double radius_m) const;
   /// Of being where the map has no image. The other probabilities are given that it is not.
@@ -87,7 +86,7 @@ class PlaceFilter {
  private:
   /// Where the robot comes to, by each speed; added up as each training image becomes a place it may come to.
   struct Arrival {
-    std::size_t training_image = 0;
+    std::uint32_t training_image = 0;
     PerSpeed by_speed{};
     double by_odometry = 0.0;
   };
@@ -98,8 +97,8 @@ class PlaceFilter {
     double sigma_m = 0.0;
   };
 
-  void mostProbable(std::size_t count, double least, std::vector<std::size_t>& found) const;
   void learnPace();
+  void learnMoments();
   void forgetMotion();
   double secondsOf(const Motion& motion) const;
   /// From a training image, at a share of the session's speed; and by odometry.
@@ -116,16 +115,15 @@ class PlaceFilter {
   const TrainingMap& map_;
   BayesConfig config_;
   double spacing_m_ = 1.0;
-  double interval_s_ = 1.0;      ///< usual time between successive training images
-  std::vector<float> pace_mps_;  ///< of the session at each training image
-  std::vector<double> probabilities_;
-  PerSpeed speeds_{};                ///< how likely each of kSpeeds is
-  std::vector<double> likelihoods_;  ///< of each training image; kept to save the allocation
-  std::vector<double> stayed_;       ///< probability of those too improbable to be moved
+  double interval_s_ = 1.0;                               ///< usual time between successive training images
+  std::vector<float> pace_mps_;                           ///< of the session at each training image
+  Eigen::Vector2d centroid_m_ = Eigen::Vector2d::Zero();  ///< of the training images
+  Eigen::Matrix2d scatter_m2_ = Eigen::Matrix2d::Zero();  ///< about it, not divided by their number
+  PlaceProbabilities places_;
+  PerSpeed speeds_{};  ///< how likely each of kSpeeds is
   std::vector<Arrival> arrivals_;
-  std::vector<std::uint32_t> arrival_of_;  ///< of each training image; holds if the arrival says so too
-  std::optional<double> log_best_;         ///< of the likelihoods of late, smoothed
-  double independence_ = 1.0;              ///< of the image from the one before, (0, 1]
+  std::optional<double> log_best_;  ///< of the likelihoods of late, smoothed
+  double independence_ = 1.0;       ///< of the image from the one before, (0, 1]
   OffMapBelief off_map_;
   double leaving_ = 0.0;  ///< how likely the motion leads beyond the training images
   std::vector<OffMapBelief::Compared> asked_;

@@ -80,11 +80,11 @@ void PlaceFilter::forgetMotion() {
 }
 
 PlaceFilter::Arrival& PlaceFilter::arrivalAt(std::size_t image) {
-  std::uint32_t& arrival = arrival_of_[image];
-  if (arrival < arrivals_.size() && arrivals_[arrival].training_image == image) return arrivals_[arrival];
-  arrival = static_cast<std::uint32_t>(arrivals_.size());
+  PlaceProbabilities::Own& place = places_.own(image);
+  if (place.arrival != PlaceProbabilities::kNone) return arrivals_[place.arrival];
+  place.arrival = static_cast<std::uint32_t>(arrivals_.size());
   arrivals_.emplace_back();
-  arrivals_.back().training_image = image;
+  arrivals_.back().training_image = place.training_image;
   return arrivals_.back();
 }
 
@@ -99,6 +99,7 @@ PlaceFilter::Way PlaceFilter::wayBy(const Motion& motion) const {
 }
 
 void PlaceFilter::predict(const Motion& motion) {
+  using Place = PlaceProbabilities::Own;
   constexpr double kLeastIndependence = 0.1;  // of a robot that stands: noise, and people who pass
   double expected = 0.0;                      // forwards or backwards, as a share of the session's speed
   for (std::size_t k = 0; k < speeds_.size(); ++k) expected += speeds_[k] * std::abs(kSpeeds[k]);
@@ -107,14 +108,18 @@ void PlaceFilter::predict(const Motion& motion) {
   independence_ = std::clamp(way_m / spacing_m_, kLeastIndependence, 1.0);
   arrivals_.clear();
   leaving_ = 0.0;
-  stayed_ = probabilities_;
-  const double least = kLeastMoved * *std::max_element(probabilities_.begin(), probabilities_.end());
+  places_.forEach([](Place& place) {
+    place.stayed = place.probability;
+    place.arrival = PlaceProbabilities::kNone;
+  });
   std::vector<std::size_t> moved;
-  mostProbable(kMostMoved, least, moved);
+  places_.mostProbable(1, 0.0, moved);
+  places_.mostProbable(kMostMoved, kLeastMoved * places_[moved.front()], moved);
   for (const std::size_t image : moved) {
-    if (probabilities_[image] <= 0.0) continue;
+    // A part of what is common is not moved: all of it, moved alike, would be what it was.
+    if (places_[image] <= 0.0 || (map_.size() > kMostMoved && places_.isCommon(image))) continue;
     moveFrom(image, motion);
-    stayed_[image] = 0.0;
+    places_.own(image).stayed = 0.0;
   }
   off_map_.predict(leaving_);
   const PerSpeed usual = usualSpeeds();
@@ -123,14 +128,16 @@ void PlaceFilter::predict(const Motion& motion) {
     sum += speeds_[k] = std::pow(speeds_[k], kSpeedMemory) * std::pow(usual[k], 1.0 - kSpeedMemory);
   }
   for (double& speed : speeds_) speed /= sum;
-  probabilities_ = stayed_;
-  for (const Arrival& arrival : arrivals_) {
-    const double by_speed =
-        std::inner_product(speeds_.begin(), speeds_.end(), arrival.by_speed.begin(), 0.0) * (1.0 - motion.share());
-    probabilities_[arrival.training_image] += by_speed + motion.share() * arrival.by_odometry;
-  }
   const double anywhere = config_.anywhere / static_cast<double>(map_.size());
-  for (double& probability : probabilities_) probability = (1.0 - config_.anywhere) * probability + anywhere;
+  places_.forEach([&](Place& place) {
+    place.probability = place.stayed;
+    if (place.arrival != PlaceProbabilities::kNone) {
+      const Arrival& arrival = arrivals_[place.arrival];
+      const double by_speed = std::inner_product(speeds_.begin(), speeds_.end(), arrival.by_speed.begin(), 0.0);
+      place.probability += (1.0 - motion.share()) * by_speed + motion.share() * arrival.by_odometry;
+    }
+    place.probability = (1.0 - config_.anywhere) * place.probability + anywhere;
+  });
 }
 
 /// A Gaussian about where each speed leads to, shared among the training images that face alike.
@@ -139,7 +146,8 @@ void PlaceFilter::moveFrom(std::size_t image, const Motion& motion) {
   const auto sessions = static_cast<double>(map_.header().sessions.size());
   const double most = std::min(std::ceil(3.0 * sessions * (1.0 + longest_m / spacing_m_)), 1.0 * kMostAround);
   map_.nearest(map_.position_m(image), static_cast<std::size_t>(most), neighbours_);
-  leaving_ += probabilities_[image] * leavingFrom(image, motion);
+  const double probability = places_[image];
+  leaving_ += probability * leavingFrom(image, motion);
   const double yaw_rad = map_.yaw_rad(image);
   const Eigen::Vector2d heading(std::cos(yaw_rad), std::sin(yaw_rad));
   ahead_m_.clear();
@@ -151,7 +159,6 @@ void PlaceFilter::moveFrom(std::size_t image, const Motion& motion) {
     neighbours_[facing++] = neighbour;
   }
   neighbours_.resize(facing);
-  const double probability = probabilities_[image];
   const auto share = [&](const Way& way, auto add) {
     kernel_.clear();
     for (const double ahead_m : ahead_m_) kernel_.push_back(gaussian(ahead_m - way.distance_m, way.sigma_m));
@@ -201,7 +208,7 @@ void PlaceFilter::learnSpeed(double elsewhere) {
   evidence.fill(elsewhere);
   for (const Arrival& arrival : arrivals_) {
     for (std::size_t k = 0; k < evidence.size(); ++k) {
-      evidence[k] += arrival.by_speed[k] * likelihoods_[arrival.training_image];
+      evidence[k] += arrival.by_speed[k] * places_.own(arrival.training_image).likelihood;
     }
   }
   const double sum = std::inner_product(speeds_.begin(), speeds_.end(), evidence.begin(), 0.0);

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -45,7 +44,7 @@ PlaceLikelihood seenFrom(const TrainingMap& map, double east_m, double at_best =
 }
 
 double sumOf(const PlaceFilter& filter) {
-  return std::accumulate(filter.probabilities().begin(), filter.probabilities().end(), 0.0);
+  return filter.probabilities().sum([](const auto& place) { return place.probability; });
 }
 
 Motion afterSeconds(double seconds) { return Motion(seconds); }
@@ -140,6 +139,43 @@ TEST(PlaceFilter, FollowsARobotThatDrivesBackwards) {
   }
 }
 
+TEST(PlaceFilter, ALargeMapCostsWhatIsProbable) {
+  const auto map = mapOf(streetSession(50000));
+  PlaceFilter filter(*map, {});
+  const auto compared = [&](double east_m, std::size_t first, std::size_t count, std::size_t stride) {
+    PlaceLikelihood likelihood;
+    likelihood.asked_in_turn = count;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double offset_m = map->position_m(first + i * stride).x() - east_m;
+      likelihood.compared.push_back({first + i * stride, 1.0 + 100.0 * std::exp(-0.5 * offset_m * offset_m)});
+    }
+    return likelihood;
+  };
+  for (std::size_t i = 0; i < 100; ++i) {  // lost: others are compared each time
+    filter.predict(afterSeconds(1.0));
+    filter.update(compared(-100.0, i % 125, 400, 125));
+    EXPECT_NEAR(sumOf(filter), 1.0, 1e-9);
+    EXPECT_LE(filter.probabilities().allOwn().size(), PlaceProbabilities::kMostOwn);
+  }
+  double east_m = 30000.0;
+  for (int i = 0; i < 100; ++i, east_m += 1.0) {
+    filter.predict(afterSeconds(1.0));
+    filter.update(compared(east_m, static_cast<std::size_t>(east_m) - 20, 40, 1));
+    EXPECT_NEAR(sumOf(filter), 1.0, 1e-9);
+  }
+  EXPECT_GT(filter.within({east_m - 1.0, 0.0}, 5.0), 0.97);
+  EXPECT_NEAR(filter.mode().mean_m.x(), east_m - 1.0, 0.5);
+  EXPECT_LT(filter.probabilities().allOwn().size(), 1000U);
+  // As for each training image alone.
+  Eigen::Matrix2d expected_m2 = Eigen::Matrix2d::Zero();
+  const Eigen::Vector2d centre_m = filter.mode().mean_m;
+  for (std::size_t i = 0; i < map->size(); ++i) {
+    const Eigen::Vector2d offset_m = map->position_m(i) - centre_m;
+    expected_m2 += filter.probabilities()[i] * offset_m * offset_m.transpose();
+  }
+  EXPECT_NEAR(filter.covarianceAbout(centre_m)(0, 0), expected_m2(0, 0), 1e-6 * expected_m2(0, 0));
+}
+
 TEST(PlaceFilter, GoesFromOneSessionToAnother) {
   // The first session ends where the second goes on.
   std::vector<TrainingImage> images = streetSession(50);
@@ -161,8 +197,9 @@ TEST(PlaceFilter, DoesNotTurnAround) {
   PlaceFilter filter(*map, {});
   filter.reset({{20.0, 0.0}});
   filter.predict(afterSeconds(1.0));
-  const std::vector<double>& probabilities = filter.probabilities();
-  EXPECT_NEAR(std::accumulate(probabilities.begin() + 50, probabilities.end(), 0.0), 0.01, 1e-9);  // of anywhere
+  double back_sum = 0.0;
+  for (std::size_t i = 50; i < map->size(); ++i) back_sum += filter.probabilities()[i];
+  EXPECT_NEAR(back_sum, 0.01, 1e-9);  // of anywhere
 }
 
 TEST(PlaceFilter, TheOrderOfTheSessionsDoesNotMatter) {
