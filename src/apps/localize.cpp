@@ -62,7 +62,7 @@ class OdometryFeed {
 };
 
 NodeParameters configOf(const LocalizeOptions& options) {
-  // The file is the node's: most of what only the node needs is checked, but of no use here.
+  // The file is the node's: parameters of the node alone are checked, but not used.
   NodeParameters config;
   if (!options.config.empty()) {
     try {

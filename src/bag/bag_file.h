@@ -127,9 +127,9 @@ struct Message {
 
 /// A bag (format 2.0) that may come from anyone: every length, offset and number in it is checked before it is used.
 /// rosbag_storage does not check them and reads beyond its buffers; a check in front of it would take a reader like
-/// this one and unpack every compressed chunk once more (for 1.0 GB, processor time: lz4 3.1 instead of 1.7 s, bz2 162
-/// instead of 107 s). Opening reads all records, but neither what messages hold nor compressed chunks: a chunk is
-/// unpacked and checked when one of its messages is read, and kept with others up to kMostUnpacked. Not thread-safe.
+/// this one and unpack every compressed chunk once more. Opening reads all records, but neither what messages hold nor
+/// compressed chunks: a chunk is unpacked and checked when one of its messages is read, and kept with others up to
+/// kMostUnpacked. Not thread-safe.
 class BagFile {
  public:
   /// `bytes`: never null. Throws DamagedBag, or UnsupportedBag when the bag has no index, is encrypted or is of another

@@ -61,8 +61,8 @@ int requireRegular(int descriptor) {
   return S_ISREG(status.st_mode) ? 0 : EINVAL;
 }
 
-/// A new name beside `target`: `<target>.<16 random hexadecimal digits>` and kPartial. Two processes in two containers
-/// have the same number, so it is none of theirs.
+/// A new name beside `target`: `<target>.<16 random hexadecimal digits>` and kPartial. Not by the process's number:
+/// in two containers it may be the same.
 std::string partialName(const std::string& target) {
   std::random_device random;
   std::array<char, kDigits + 1> digits{};
@@ -177,8 +177,8 @@ std::optional<struct stat> rightsOf(const std::string& target) {
   return status;
 }
 
-/// Nobody may read or write the file who may not do so with the one it takes the place of. Root's file stays its
-/// owner's; others cannot give one away. `more`: bits of the mode that it has as well.
+/// Nobody may read or write the file who may not do so with the one that it replaces. Only root can keep the owner.
+/// `more`: bits of the mode that it has as well.
 void giveRights(int descriptor, const struct stat& rights, mode_t more) {
   constexpr mode_t kRights = 0777;
   struct stat own {};

@@ -36,8 +36,8 @@ inline double median(std::vector<double> values) {
 }
 
 /// The middle value; of an even number the larger of the two in the middle, so that it is always one of the values.
-/// Datum and cleaned path of a map and the scale of a match rest on this one: with median() every map and every track
-/// would change. Reorders `values`, of which there must be one.
+/// The datum and cleaned path of a map and the scale of a match are defined by it. Reorders `values`, of which there
+/// must be one.
 template <class T>
 T upperMedian(std::vector<T>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

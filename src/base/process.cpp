@@ -186,7 +186,7 @@ int ChildProcess::waitFor(pid_t process) {
   while (::waitid(P_PID, static_cast<id_t>(process), &ended, WEXITED | WNOWAIT) != 0 && errno == EINTR) {
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  process_ = 0;  // while its number is not another's
+  process_ = 0;  // before waitpid(): afterwards another process may get its number
   int status = 0;
   return ::waitpid(process, &status, 0) == process ? status : -1;
 }

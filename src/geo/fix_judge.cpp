@@ -37,7 +37,7 @@ FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& con
   select(0.0, {});
   std::vector<bool> believed;
   for (std::size_t n = 0; n < nodes_.size(); ++n) believed.push_back(!isLeftOut(n));
-  // To learn again from what was believed must not make the next bend improbable.
+  // Believed nodes may hold few bends: learnt from them alone, the acceleration would make the next one improbable.
   constexpr double kLeastShare = 0.25;
   constant_speed_ = select(kLeastShare * scales_.acceleration_density, believed).isConstant();
   findDoubts(constant_speed_);

@@ -110,7 +110,7 @@ void SpeedPrior::learnDensity(const std::vector<double>& speeds_mps, double nois
 }
 
 double SpeedPrior::cost(double speed_mps) const {
-  constexpr double kStandingCost = 0.5;  // of who drives at constant speed
+  constexpr double kStandingCost = 0.5;  // of a robot that drives at constant speed
   const bool stands = speed_mps < standing_mps_;
   if (isConstant()) {
     if (stands) return kStandingCost;

@@ -102,7 +102,7 @@ class Adjustment {
     return sigmas;
   }
 
-  /// Parameters of some that move, spread over all.
+  /// Parameters of some of the cameras that move, evenly spread.
   std::vector<std::pair<double*, int>> someCameras() {
     constexpr std::size_t kSome = 7;
     std::vector<std::pair<double*, int>> moving;

@@ -35,7 +35,7 @@ struct PositionObservation {
   Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();
   double sigma_m = 0.3;
   Eigen::Vector2d velocity_m_s = Eigen::Vector2d::Zero();  ///< of the antenna
-  bool believed = true;  ///< it always has a say; otherwise only where the images agree with it
+  bool believed = true;  ///< always counts; otherwise only where the images agree with it
 };
 
 /// What it says about how high the antenna was.

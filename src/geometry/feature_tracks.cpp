@@ -195,7 +195,7 @@ Eigen::Vector3d farthest(const Eigen::Vector3d& from, const std::vector<Sight>& 
   return found;
 }
 
-/// Of rays that lie in a plane, as those from a path do, it is the widest; of others all but that.
+/// Exactly for rays in a plane, as those from a path; of others nearly.
 double widestAngle_rad(const std::vector<Sight>& sights) {
   const Eigen::Vector3d one_end = farthest(direction(sights.front()), sights);
   return std::acos(std::clamp(one_end.dot(farthest(one_end, sights)), -1.0, 1.0));

@@ -109,7 +109,6 @@ class Reconstruction {
   /// Adjusts everything, window by window, then drops observations that disagree and landmarks that fewer than
   /// `min_views` images see.
   void adjustAndPrune(double tolerance, std::size_t min_views);
-  /// See the function of that name.
   void moveAsOne();
   /// Images where little of what they match fits start again where the landmarks of others have them, and so on from
   /// there: fixes that are metres off let no landmark begin beside them. `gate_px`, `max_views`: see triangulateAll().
@@ -118,8 +117,8 @@ class Reconstruction {
   void restartAmongNeighbours();
   /// From now on the calibrations are adjusted as well. `sigma`: what is known of each entry before.
   void freeLenses(const LensCorrection& sigma) { bundle_.lens_sigma = sigma; }
-  /// What the images do not tell apart from nothing stays as it was published from now on: entries of the lenses (the
-  /// focal length only if it is known from somewhere), and the delay of the fixes.
+  /// Entries of the lenses that the images do not change significantly keep their published values from now on (the
+  /// focal length only if one was published), and the delay of the fixes stays 0.
   void keepSignificant(bool focal_is_known);
   /// By keepSignificant(); zero for what is held.
   const SharedSigmas& sigmas() const { return shared_; }

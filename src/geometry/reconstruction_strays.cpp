@@ -68,7 +68,7 @@ Eigen::Vector3d Reconstruction::usualTurn_rad(std::size_t image) const {
   return medianOf(turns_rad);
 }
 
-/// Of what each image matches in several others, what landmarks explain; nothing where that is little.
+/// Of each image the share of its tracked features that show landmarks; nothing for few tracked features.
 std::vector<std::optional<double>> Reconstruction::explainedShares() const {
   std::vector<std::size_t> tracked(images_.size());
   for (const FeatureTrack& track : sets_.tracks(kMinViews)) {
@@ -86,14 +86,14 @@ std::vector<std::optional<double>> Reconstruction::explainedShares() const {
   return shares;
 }
 
-/// Where most of what it matches fits it is not, whatever fixes say.
+/// Moved or turned unlike its neighbours. An image of which most matches fit is not astray, whatever fixes say.
 bool Reconstruction::isAstray(std::size_t image, const std::optional<double>& explained) const {
   if (explained.value_or(0.0) > kMostExplained) return false;
   return !((shiftOf_m(image) - usualShift_m(image)).norm() <= kAstray_m &&
            (turnOf_rad(image) - usualTurn_rad(image)).norm() <= kAstray_rad);
 }
 
-/// Of some images, landmarks that others show of what they match.
+/// Of each image of `some`: its tracked features, with the landmarks that other images have for them.
 std::vector<std::vector<LandmarkMatch>> Reconstruction::landmarksOf(const std::vector<bool>& some) const {
   const SeenLandmarks landmarks(problem_.landmarks);
   std::vector<std::vector<LandmarkMatch>> matches(images_.size());

@@ -332,7 +332,7 @@ class FocalSearch {
   }
 
  private:
-  /// Where the camera is far off, so is the answer: ask again from there.
+  /// The focal length that an adjustment with this one asks for: still wrong where this one is far off.
   Focal askedFrom(double focal_px) const {
     const CameraModel camera = pinhole(size_, focal_px);
     session_.camera = &camera;

@@ -260,7 +260,6 @@ Eigen::Vector2d Dpso::centreOfMass() const {
   return count > 0.0 ? Eigen::Vector2d(sum / count) : momentsOf(particles_).mean_m;
 }
 
-/// To what the image showed.
 void Dpso::adapt() {
   adaptSpeed();
   adaptDiversity();

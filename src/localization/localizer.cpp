@@ -60,7 +60,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   last_.reset();  // should this image fail, its repetition must not get the answer of the one before
 
   sessions_->startImage(stamp_ns);
-  // Geometry looks where the motion leads. Without success the tracker proposes, and geometry disposes.
+  // A pose is solved where the motion leads; without success, where the tracker proposes.
   std::optional<MetricPose> metric = poseNearPrediction(stamp_ns);
   // Similarities to the training images are computed on demand, each at most once.
   scores_.startImage(metric ? FeatureKind::kLocal : choice_.next(),
@@ -145,8 +145,7 @@ bool Localizer::isFrozen() const {
          repeats_.at_one_stamp >= kStuck;
 }
 
-/// Asks the second witness only when the first is not sure, so that SIFT alone does without global features while all
-/// is well.
+/// Compares global features only when the local ones are not sure.
 Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric) {
   const StateConfig& state = config_.state;
   Evidence evidence;
@@ -246,8 +245,8 @@ std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) c
 }
 
 /// The images ask for a focal length that is farther from the map's than the calibration's is: then things look as
-/// large from elsewhere, and the place that looks most alike is not the right one. A calibration that is wrong alone is
-/// asked to come nearer. What images ask for is less than the truth (of 25 % 17 on a street, of 10 % 4).
+/// large from elsewhere, and the place that looks most alike is not the right one. Where only the calibration is wrong,
+/// they ask for one nearer to the map's. They ask for less than the truth: on a street for 17 % where it is 25 %.
 bool Localizer::isThroughOtherLens(std::size_t training_image) const {
   constexpr double kMost = 0.02;
   if (!isMetric() || !verifier_->focal().contradicts()) return false;

@@ -70,8 +70,8 @@ PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState
   return pose;
 }
 
-/// Sizes are exact in the same light and poor beside the path; of the posterior it is the other way round. Their errors
-/// have different causes: the mean of both is better than the worse one everywhere, and often than either.
+/// The position by the sizes of features is exact in the same light and poor beside the path, that of the posterior the
+/// other way round. Their errors have different causes: the mean of both is often better than either.
 Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool recognised) {
   const bool by_size = config_.estimate == "interpolated" && scores_.kind() == FeatureKind::kLocal;
   if (!recognised || !by_size) return tracked.position_m;

@@ -19,7 +19,7 @@ constexpr double kSmallestCell_m = 0.05;
 constexpr double kMargin = 0.1;              ///< of the range, beyond the outermost positions: particles stray
 constexpr std::size_t kMostCandidates = 24;  ///< beyond, a tree is as fast
 
-/// Of more on exactly one spot nobody asks: those with the higher indices would make each search look at all of them.
+/// Of more positions on exactly one spot those with the higher indices are left out: each search would look at all.
 constexpr std::size_t kMostOnOneSpot = 1024;
 
 /// All positions, but for those beyond kMostOnOneSpot, in order of index.

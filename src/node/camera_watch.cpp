@@ -147,7 +147,7 @@ void CameraWatch::mapIs(const MapHeader& map) {
   report();
 }
 
-/// Allowed; people only should know.
+/// A difference is allowed, but reported.
 void CameraWatch::compareWithMap() {
   if (!camera_ || !of_map_) return;
   const std::string words = differences(camera_->scaledTo(map_size_), *of_map_);

@@ -160,7 +160,7 @@ void TransformPublisher::odometryCame() {
   moveByOdometry();
 }
 
-/// Without odometry nobody knows where the robot has gone since.
+/// Repeats the last map_to_odom; of map_to_base nothing, since without odometry the robot may be elsewhere by now.
 std::string TransformPublisher::hold(const ros::Time& stamp) {
   if (!odom_in_map_) return "no metric pose while tracking (tf_metric_only)";
   if (!between_images_) {
@@ -171,7 +171,7 @@ std::string TransformPublisher::hold(const ros::Time& stamp) {
   return trouble_between_;
 }
 
-/// Odometry alone says too little then: who waits for the transform stops.
+/// Not after a long silence of the images: odometry alone is not enough then.
 void TransformPublisher::broadcastBetween(const ros::Time& now) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!odom_in_map_ || now == last_between_) return;  // simulated time may stand still

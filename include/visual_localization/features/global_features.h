@@ -26,13 +26,8 @@ double histogramIntersection(const GlobalFeatures::Histogram& query, const Globa
 /// Image in, WGOH and WGII out, each scaled to sum one. Keeps its tables and buffers from image to image. Not
 /// thread-safe: one extractor a thread.
 ///
-/// What the paper leaves open was decided by the error of the single most similar image, the mean over all ordered
-/// pairs of the six campus rounds, same light / sunny and cloudy:
-///   as here                                      2.0 m /  4.9 m
-///   histograms not scaled                        5.0 m / 16.5 m   stronger gradients would always win
-///   each subimage's histogram scaled             2.2 m / 12.2 m   plain subimages would count like the others
-///   orientation bins that begin at 0, 45, ...    2.2 m /  5.2 m   upright edges would fall between two bins
-///   pixels at the border: image continued        2.1 m /  5.5 m
+/// The paper leaves the scale open. Without it stronger gradients would always win; with one for each subimage plain
+/// subimages would count like the others.
 class GlobalExtractor {
  public:
   GlobalExtractor();

@@ -42,8 +42,6 @@ class LocalFeatureKind {
   }
   /// Farther up or down in the picture votes match nothing, as a share of the image's width: 0.15 is 11 degrees where
   /// 65 fill the image. A robot on the same way pitches less, and its features have fewer others to be confused with.
-  /// Of SIFT, nine pairs of drives, the most similar image of the map shows the place 82.3 % of the time, without 81.2
-  /// %.
   virtual double voteRows() const { return 0.15; }
   /// How much a match says: their number and one, raised to this, is a likelihood (see PlaceFilter).
   virtual double likelihoodExponent() const { return 3.0; }

@@ -11,8 +11,7 @@ namespace visual_localization {
 
 class Random;
 
-/// What is known of the robot's motion since the last image. Nobody needs to ask whether there is odometry: without it
-/// nothing is carried along and the displacement is zero.
+/// What is known of the robot's motion since the last image. Without odometry share and displacement are zero.
 class Motion {
  public:
   /// Nothing is known.
@@ -26,7 +25,7 @@ class Motion {
   const OdometryIncrement& increment() const { return increment_; }
   /// Standard deviation of the increment, metres.
   double sigma_m() const { return sigma_m_; }
-  /// Of all hypotheses, the share that odometry carries along; 0 without it. The others find out if it is wrong.
+  /// Share of the hypotheses that follow odometry; 0 without it. The others find out if it is wrong.
   double share() const { return share_; }
   /// Draws whether one hypothesis is among that share.
   bool carries(Random& random) const;

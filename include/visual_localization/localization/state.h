@@ -92,7 +92,7 @@ class MotionConsistency {
 /// the image match is independent evidence.
 class StateAssessor {
  public:
-  /// A robot that turns leaves a straight line within more images than so many.
+  /// Estimates that must follow a straight line; over more of them a robot may turn.
   static constexpr std::size_t kMotionLength = 10;
 
   explicit StateAssessor(const StateConfig& config) : config_(config) {}
@@ -102,9 +102,7 @@ class StateAssessor {
   void reset();
   /// What the last images confirmed no longer counts; the state until the next one.
   LocalizationState doubt(bool recovering);
-  /// The state after one more image.
   LocalizationState update(std::int64_t stamp_ns, const TrackerEstimate& estimate, const Evidence& evidence);
-  /// Whether the last image confirms the position.
   bool lastConfirms() const { return !confirmations_.empty() && confirmations_.back() != 0; }
   /// Whether the last images look more like another position.
   bool isDoubtful() const;
