@@ -66,6 +66,14 @@ float product(const LocalFeatures& a, std::size_t i, const LocalFeatures& b, std
   return static_cast<float>(std::inner_product(a.bytes(i), a.bytes(i) + dimension, b.bytes(j), std::int32_t{0}));
 }
 
+/// Its bytes halved, if it has bytes.
+LocalFeatures halved(const LocalFeatures& features) {
+  if (features.form().element == DescriptorElement::kFloat) return features;
+  std::vector<std::uint8_t> bytes = features.bytes();
+  for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(byte >> 1);
+  return LocalFeatures(features.keypoints(), std::move(bytes));
+}
+
 void offer(TwoNearest& nearest, float cosine, std::size_t candidate) {
   if (cosine > nearest.best) {
     nearest = {cosine, nearest.best, static_cast<std::uint32_t>(candidate)};
@@ -190,9 +198,11 @@ void findNearestPlain(const LocalFeatures& a, const LocalFeatures& b, NearestDes
   }
 }
 
-void findNearestWithinPlain(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px,
+void findNearestWithinPlain(const LocalFeatures& all_a, const LocalFeatures& all_b, float max_dy_px,
                             NearestDescriptors& nearest) {
-  requireAlike(a, b);
+  requireAlike(all_a, all_b);
+  const LocalFeatures a = halved(all_a);
+  const LocalFeatures b = halved(all_b);
   nearest.of_a.assign(a.size(), TwoNearest());
   nearest.of_b.assign(b.size(), TwoNearest());
   std::vector<std::uint32_t> order_a;

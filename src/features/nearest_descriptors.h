@@ -36,7 +36,8 @@ void requireAlike(const LocalFeatures& a, const LocalFeatures& b);
 void findNearest(const LocalFeatures& a, const LocalFeatures& b, NearestDescriptors& nearest);
 
 /// The nearest alone, of those whose row in the image is at most `max_dy_px` away: `best` is -1 where there is none,
-/// and `second` nothing. Of equals the first in orderByRow().
+/// and `second` nothing. Of equals the first in orderByRow(). Bytes are halved, rounded down: the products of two pairs
+/// fit into 16 bits then, and vectors without VNNI take twice as many.
 void findNearestWithin(const LocalFeatures& a, const LocalFeatures& b, float max_dy_px, NearestDescriptors& nearest);
 
 /// The same without vectors: what they are tested against, and stands in for them where Highway is missing.

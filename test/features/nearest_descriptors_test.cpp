@@ -111,11 +111,46 @@ TEST(NearestDescriptors, WithinRowsAreThoseOfThePlainLoopOnEveryCpu) {
     for (const std::size_t a : {1, 3, 16, 17, 33, 100, 250}) {
       for (const std::size_t b : {1, 5, 16, 101}) {
         const LocalFeatures here = placed(randomDescriptors(a, 255, 5, random), random);
-        const LocalFeatures there = placed(randomDescriptors(b, 1, 3, random), random);
+        const LocalFeatures there = placed(randomDescriptors(b, 5, 3, random), random);
         for (const float max_dy_px : {0.0F, 40.0F, 1e9F}) expectWithinLikePlain(here, there, max_dy_px);
       }
     }
   });
+}
+
+TEST(NearestDescriptors, WithinRowsNothingOverflowsOnAnyCpu) {
+  test::forEachTarget([] {
+    std::vector<std::uint8_t> few(kSiftDimension, 0);
+    std::fill_n(few.begin(), 5, std::uint8_t{255});
+    std::vector<std::vector<std::uint8_t>> descriptors{std::vector<std::uint8_t>(kSiftDimension, 0), few};
+    // Squared norms of the halves of every other pair just below and above 2^16, where 16 bits end.
+    for (const int bin : {62, 63, 64, 66, 90, 255}) {
+      descriptors.emplace_back(kSiftDimension, static_cast<std::uint8_t>(bin));
+      descriptors.back()[3] = 0;
+    }
+    const LocalFeatures all = withDescriptors(descriptors);
+    expectWithinLikePlain(all, all, 1.0F);
+    for (const std::vector<std::uint8_t>& one : descriptors) {
+      expectWithinLikePlain(withDescriptors({one}), all, 1.0F);
+      expectWithinLikePlain(withDescriptors({one}), withDescriptors({one}), 1.0F);
+    }
+  });
+}
+
+TEST(NearestDescriptors, HalvedSiftFitsInto16Bits) {
+  for (const bool hellinger : {false, true}) {
+    SiftConfig config;
+    config.hellinger = hellinger;
+    const LocalFeatures features = makeSiftExtractor(config)->extract(test::wall(320, 240, 5));
+    ASSERT_GT(features.size(), 100U);
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      int squared[2] = {0, 0};
+      for (std::size_t k = 0; k < kSiftDimension; ++k) {
+        squared[k / 2 % 2] += (features.bytes(i)[k] / 2) * (features.bytes(i)[k] / 2);
+      }
+      EXPECT_LT(std::max(squared[0], squared[1]), 1 << 16) << i;
+    }
+  }
 }
 
 TEST(NearestDescriptors, WithinRowsLookNoFarther) {
