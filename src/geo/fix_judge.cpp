@@ -26,6 +26,17 @@ double nodeLength_s(const std::vector<PathSample>& samples) {
   return std::max(kLeast_s, interval_s) - kWavering * interval_s;
 }
 
+/// Of some samples, the one that is farthest from the one before; there must be two.
+std::size_t largestJump(const std::vector<PathSample>& samples, const std::vector<std::size_t>& members) {
+  std::size_t at = 1;
+  double largest_m = -1.0;
+  for (std::size_t k = 1; k < members.size(); ++k) {
+    const double jump_m = (samples[members[k]].position_m - samples[members[k - 1]].position_m).norm();
+    if (jump_m > largest_m) largest_m = jump_m, at = k;
+  }
+  return at;
+}
+
 }  // namespace
 
 FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& config)
@@ -40,6 +51,7 @@ FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& con
   // Believed nodes may hold few bends: learnt from them alone, the acceleration would make the next one improbable.
   constexpr double kLeastShare = 0.25;
   constant_speed_ = select(kLeastShare * scales_.acceleration_density, believed).isConstant();
+  splitAtSteps();
   findDoubts(constant_speed_);
   for (const Part& part : parts()) {
     const std::vector<PathState> path = smoothPath(measurementsOf(part, false), motion_);
@@ -55,6 +67,23 @@ SpeedPrior FixJudge::select(double least_density, const std::vector<bool>& belie
   const SpeedPrior speeds(samples_, scales_, config_.speed_tolerance);
   chosen_ = selectNodes(samples_, scales_, speeds, config_.max_bridge_s);
   return speeds;
+}
+
+/// A step lies within a node, or within the one before it: the fixes before it belong to that one, and those behind it
+/// to the node that steps.
+void FixJudge::splitAtSteps() {
+  for (std::size_t n = 1; n < nodes_.size(); ++n) {
+    if (chosen_[n] != NodeVerdict::kStep || isLeftOut(n - 1)) continue;
+    std::vector<std::size_t>& before = nodes_[n - 1].members;
+    std::vector<std::size_t>& behind = nodes_[n].members;
+    std::vector<std::size_t> members = before;
+    members.insert(members.end(), behind.begin(), behind.end());
+    const auto step = members.begin() + static_cast<std::ptrdiff_t>(largestJump(usable_.samples, members));
+    before.assign(members.begin(), step);
+    behind.assign(step, members.end());
+    samples_[n - 1] = medianOf(usable_.samples, before);
+    samples_[n] = medianOf(usable_.samples, behind);
+  }
 }
 
 /// Where multipath begins and ends its fixes look like the path they leave and point the wrong way. Speeds tell where
@@ -105,8 +134,7 @@ double FixJudge::offsetOf(double sigma_m) const {
 }
 
 void FixJudge::addNode(std::size_t node, std::vector<Measurement>& into) const {
-  into.push_back(
-      {samples_[node], scales_.noise_m, offsetOf(nodes_[node].sigma_m), chosen_[node] == NodeVerdict::kStep});
+  into.push_back({samples_[node], scales_.noise_m, offsetOf(nodes_[node].sigma_m)});
 }
 
 /// Together they say as much as their node.
@@ -116,10 +144,7 @@ void FixJudge::addFixes(std::size_t node, std::vector<Measurement>& into) const 
     if (verdicts_[i] == FixVerdict::kKept) kept.push_back(i);
   }
   const double white_m = scales_.noise_m * std::sqrt(static_cast<double>(kept.size()));
-  for (const std::size_t i : kept) {
-    const bool steps = i == kept.front() && chosen_[node] == NodeVerdict::kStep;
-    into.push_back({usable_.samples[i], white_m, offsetOf(usable_.sigmas_m[i]), steps});
-  }
+  for (const std::size_t i : kept) into.push_back({usable_.samples[i], white_m, offsetOf(usable_.sigmas_m[i])});
 }
 
 /// One measurement for nodes [begin, end), which are left out: a bad bridge stays bounded.
@@ -134,13 +159,19 @@ void FixJudge::addStretch(std::size_t begin, std::size_t end, std::vector<Measur
 
 std::vector<Measurement> FixJudge::measurementsOf(const Part& part, bool of_fixes) const {
   std::vector<Measurement> measurements;
+  bool steps = false;  // since the last measurement, also in a node of which nothing is believed or used
   for (std::size_t n = part.begin; n < part.end; ++n) {
+    steps = steps || chosen_[n] == NodeVerdict::kStep;
     if (isLeftOut(n)) {
       const std::size_t end = endOfStretch(n);
       addStretch(n, end, measurements);
       n = end - 1;
     } else if (!doubted_[n] || n == part.begin || n + 1 == part.end) {
+      const std::size_t here = measurements.size();
       of_fixes ? addFixes(n, measurements) : addNode(n, measurements);
+      if (measurements.size() == here) continue;
+      measurements[here].steps = steps;
+      steps = false;
     }
   }
   return measurements;
@@ -155,7 +186,7 @@ void FixJudge::takeBack(const Part& part, const std::vector<PathState>& path) {
     const std::size_t end = endOfStretch(begin);
     bool agrees = true;
     for (std::size_t n = begin; n < end; ++n) {
-      const Reading reading = readingAt(path, motion_, samples_[n].time_s);
+      const Reading reading = readingAt(path, motion_, samples_[n]);
       const double variance = scales_.tolerance[n] * (reading.variance + scales_.noise_m * scales_.noise_m);
       agrees = agrees && (samples_[n].position_m - reading.position_m).squaredNorm() <= kAgrees * variance;
     }
@@ -178,7 +209,7 @@ void FixJudge::judgeFixes(const Part& part, const std::vector<PathState>& path) 
   for (std::size_t n = part.begin; n < part.end; ++n) {
     if (isLeftOut(n)) continue;
     for (const std::size_t i : nodes_[n].members) {
-      const Reading reading = readingAt(path, motion_, usable_.samples[i].time_s);
+      const Reading reading = readingAt(path, motion_, usable_.samples[i]);
       fixes.push_back(i);
       away_m.push_back((usable_.samples[i].position_m - reading.position_m).norm());
       variances.push_back(reading.variance);

@@ -30,6 +30,7 @@ class FixJudge {
   };
 
   SpeedPrior select(double least_density, const std::vector<bool>& believed);
+  void splitAtSteps();
   void findDoubts(bool constant_speed);
   std::vector<Part> parts() const;
   bool isLeftOut(std::size_t node) const { return chosen_[node] == NodeVerdict::kLeftOut; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -23,6 +24,9 @@ struct Transition {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
 };
+
+constexpr double kMedianOfPlane = 1.1774;  // of a distance, in sigmas along one axis
+constexpr double kMuch = 5.0;              // as a ratio of what a receiver promises
 
 double squareOf(double value) { return value * value; }
 
@@ -111,7 +115,6 @@ std::size_t endOfStretch(const std::vector<Measurement>& measurements, std::size
 
 /// What a receiver promises varies a little all the time; where it changes much its error is another one.
 void splitByPromises(std::vector<Measurement>& measurements) {
-  constexpr double kMuch = 5.0;
   double promised_m = measurements.front().offset_m;
   for (Measurement& measurement : measurements) {
     const double ratio = measurement.offset_m / promised_m;
@@ -128,28 +131,85 @@ void splitByPromises(std::vector<Measurement>& measurements) {
   }
 }
 
+/// Measurements between two steps, which share one lasting error.
+struct Stretch {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  double duration_s = 0.0;
+  Eigen::Vector2d offset_m = Eigen::Vector2d::Zero();  ///< the lasting error as the path has it
+};
+
+std::vector<Stretch> stretchesOf(const std::vector<Measurement>& said, const std::vector<PathState>& path) {
+  const double interval_s = (said.back().sample.time_s - said.front().sample.time_s) / static_cast<double>(said.size());
+  std::vector<Stretch> stretches;
+  for (std::size_t begin = 0; begin < said.size(); begin = stretches.back().end) {
+    Stretch stretch{begin, endOfStretch(said, begin)};
+    stretch.duration_s = said[stretch.end - 1].sample.time_s - said[begin].sample.time_s + interval_s;
+    if (!path.empty()) stretch.offset_m = path[begin].offset_m;
+    stretches.push_back(stretch);
+  }
+  return stretches;
+}
+
+/// Whether the receiver promises about the same in all of them, so that its promises do not tell which are good.
+bool arePromisedAlike(const std::vector<Stretch>& stretches, const std::vector<Measurement>& said) {
+  double least_m = said.front().offset_m;
+  double most_m = least_m;
+  for (const Stretch& stretch : stretches) {
+    least_m = std::min(least_m, said[stretch.begin].offset_m);
+    most_m = std::max(most_m, said[stretch.begin].offset_m);
+  }
+  return most_m <= kMuch * least_m;
+}
+
+/// That whose error lies in the middle of all (geometric median), by how long they last.
+const Stretch& middleOf(const std::vector<Stretch>& stretches) {
+  const auto distances = [&](const Stretch& stretch) {
+    double sum = 0.0;
+    for (const Stretch& other : stretches) sum += other.duration_s * (other.offset_m - stretch.offset_m).norm();
+    return sum;
+  };
+  return *std::min_element(stretches.begin(), stretches.end(),
+                           [&](const Stretch& one, const Stretch& other) { return distances(one) < distances(other); });
+}
+
+/// The standard deviation of the lasting errors that half of the time of all but `middle` shows, per axis.
+double deviationFrom(const Stretch& middle, const std::vector<Stretch>& stretches) {
+  std::vector<std::pair<double, double>> away_m;  // with how long each lasts
+  double all_s = 0.0;
+  for (const Stretch& stretch : stretches) {
+    if (&stretch == &middle) continue;
+    away_m.emplace_back((stretch.offset_m - middle.offset_m).norm(), stretch.duration_s);
+    all_s += stretch.duration_s;
+  }
+  std::sort(away_m.begin(), away_m.end());
+  std::size_t half = 0;
+  for (double until_s = away_m[0].second; until_s < 0.5 * all_s; until_s += away_m[half].second) ++half;
+  return away_m[half].first / kMedianOfPlane;
+}
+
 /// A receiver that steps aside for a while is worse for that while: the shorter a stretch between two steps and the
-/// farther off it came out, the less it says about where the path is. `path`: as it came out; empty at first.
+/// farther off it came out, the less it says about where the path is. One that promises the same throughout is believed
+/// as far as it comes back to the same error: an RTK receiver that declares nothing, or 30 m, has centimetres most of
+/// the time. `path`: as it came out; empty at first.
 void weighStretches(const std::vector<Measurement>& said, const std::vector<PathState>& path,
                     std::vector<Measurement>& measurements) {
   constexpr double kLeastWeight = 0.1;  // or else one stretch after the other could lose its say
-  const double interval_s = (said.back().sample.time_s - said.front().sample.time_s) / static_cast<double>(said.size());
-  const auto duration_s = [&](std::size_t begin) {
-    return said[endOfStretch(said, begin) - 1].sample.time_s - said[begin].sample.time_s + interval_s;
-  };
+  constexpr double kLeastAlike = 0.01;  // half of the time is near the middle, and keeps it
+  const std::vector<Stretch> stretches = stretchesOf(said, path);
+  const bool alike = !path.empty() && arePromisedAlike(stretches, said);
+  const Stretch& middle = middleOf(stretches);
+  const Eigen::Vector2d usual_m = alike ? middle.offset_m : Eigen::Vector2d::Zero();
   double longest_s = 0.0;
-  for (std::size_t begin = 0; begin < said.size(); begin = endOfStretch(said, begin)) {
-    longest_s = std::max(longest_s, duration_s(begin));
-  }
-  std::size_t end = 0;
-  for (std::size_t begin = 0; begin < said.size(); begin = end) {
-    end = endOfStretch(said, begin);
-    double squared = 0.0;
-    for (std::size_t i = begin; i < end && !path.empty(); ++i) {
-      squared += path[i].offset_m.squaredNorm() / squareOf(said[i].offset_m) / static_cast<double>(end - begin);
-    }
-    const double factor = std::sqrt(longest_s / duration_s(begin) / std::max(kLeastWeight, studentWeight(squared)));
-    for (std::size_t i = begin; i < end; ++i) measurements[i].offset_m = factor * said[i].offset_m;
+  for (const Stretch& stretch : stretches) longest_s = std::max(longest_s, stretch.duration_s);
+  for (const Stretch& stretch : stretches) {
+    const Measurement& first = said[stretch.begin];
+    double expected_m = first.offset_m;
+    if (alike) expected_m = std::min(expected_m, std::max(first.white_m, deviationFrom(middle, stretches)));
+    const double squared = (stretch.offset_m - usual_m).squaredNorm() / squareOf(expected_m);
+    const double weight = std::max(alike ? kLeastAlike : kLeastWeight, studentWeight(squared));
+    const double offset_m = expected_m * std::sqrt(longest_s / stretch.duration_s / weight);
+    for (std::size_t i = stretch.begin; i < stretch.end; ++i) measurements[i].offset_m = offset_m;
   }
 }
 
@@ -201,11 +261,12 @@ PathState between(const PathState& before, const PathState& after, double time_s
                   share * rest * elapsed_s * (rest * first_mps - share * last_mps);
   at.velocity_mps = 6.0 * share * rest / elapsed_s * way_m + rest * (1.0 - 3.0 * share) * first_mps +
                     share * (3.0 * share - 2.0) * last_mps;
-  at.offset_m = rest * before.offset_m + share * after.offset_m;
+  at.offset_m = share < 0.5 ? before.offset_m : after.offset_m;
   return at;
 }
 
-Reading readingAt(const std::vector<PathState>& path, const Motion& motion, double time_s) {
+Reading readingAt(const std::vector<PathState>& path, const Motion& motion, const PathSample& seen) {
+  const double time_s = seen.time_s;
   const auto after = std::lower_bound(path.begin(), path.end(), time_s,
                                       [](const PathState& state, double at_s) { return state.time_s < at_s; });
   if (after == path.begin() || after == path.end()) {
@@ -219,8 +280,11 @@ Reading readingAt(const std::vector<PathState>& path, const Motion& motion, doub
   const double elapsed_s = after->time_s - before.time_s;
   const double share = (time_s - before.time_s) / elapsed_s;
   const double turned_s = elapsed_s * share * (1.0 - share);
-  return {at.position_m + at.offset_m, (1.0 - share) * before.reading_var + share * after->reading_var +
-                                           motion.acceleration_density * turned_s * turned_s * turned_s / 3.0};
+  const Eigen::Vector2d one_m = at.position_m + before.offset_m;
+  const Eigen::Vector2d other_m = at.position_m + after->offset_m;
+  const bool is_one = (seen.position_m - one_m).squaredNorm() <= (seen.position_m - other_m).squaredNorm();
+  return {is_one ? one_m : other_m, (1.0 - share) * before.reading_var + share * after->reading_var +
+                                        motion.acceleration_density * turned_s * turned_s * turned_s / 3.0};
 }
 
 }  // namespace visual_localization

@@ -42,11 +42,12 @@ std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const M
 /// does not swing.
 PathState between(const PathState& before, const PathState& after, double time_s);
 
-/// What a receiver without white noise would read at a time, in reach of the path or beyond its ends.
+/// What a receiver without white noise would read when it read `seen`, in reach of the path or beyond its ends. At a
+/// step, by the lasting error that is nearer to it.
 struct Reading {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   double variance = 0.0;  ///< along one axis, m^2
 };
-Reading readingAt(const std::vector<PathState>& path, const Motion& motion, double time_s);
+Reading readingAt(const std::vector<PathState>& path, const Motion& motion, const PathSample& seen);
 
 }  // namespace visual_localization

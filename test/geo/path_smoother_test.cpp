@@ -92,12 +92,12 @@ TEST(PathSmoother, WhatIsNotMeasuredIsLessCertain) {
   std::vector<Measurement> measurements = eastward(60);
   measurements.erase(measurements.begin() + 20, measurements.begin() + 40);
   const std::vector<PathState> path = smoothPath(measurements, kWalk);
-  const double beside = readingAt(path, kWalk, 10.5).variance;
-  EXPECT_GT(readingAt(path, kWalk, 29.5).variance, 10.0 * beside);
-  EXPECT_GT(readingAt(path, kWalk, 70.0).variance, 10.0 * beside) << "beyond the end";
-  EXPECT_NEAR(readingAt(path, kWalk, 29.5).position_m.x(), 29.5, 0.3);
-  EXPECT_NEAR(readingAt(path, kWalk, 62.0).position_m.x(), 62.0, 0.3);
-  EXPECT_NEAR(readingAt(path, kWalk, -2.0).position_m.x(), -2.0, 0.3);
+  const double beside = readingAt(path, kWalk, {10.5, {10.5, 0.0}}).variance;
+  EXPECT_GT(readingAt(path, kWalk, {29.5, {29.5, 0.0}}).variance, 10.0 * beside);
+  EXPECT_GT(readingAt(path, kWalk, {70.0, {70.0, 0.0}}).variance, 10.0 * beside) << "beyond the end";
+  EXPECT_NEAR(readingAt(path, kWalk, {29.5, {29.5, 0.0}}).position_m.x(), 29.5, 0.3);
+  EXPECT_NEAR(readingAt(path, kWalk, {62.0, {62.0, 0.0}}).position_m.x(), 62.0, 0.3);
+  EXPECT_NEAR(readingAt(path, kWalk, {-2.0, {-2.0, 0.0}}).position_m.x(), -2.0, 0.3);
 }
 
 TEST(Between, MeetsItsEndsAndTheirVelocities) {

@@ -127,18 +127,38 @@ TEST(Receivers, NoneIsWorseThanItsFixesAndGoodFixesAreBelieved) {
   }
 }
 
-TEST(Receivers, StepsBetweenFloatAndFixedDoNotMoveThePath) {
-  const Path path = mower();
+/// Fixes of a receiver that is aside for 70 of `period_s`, from `begin_s` on, and declares 0.5 m meanwhile.
+std::vector<Fix> floatAndFixed(const Path& path, double begin_s, double period_s) {
   std::vector<Fix> fixes = recordedBy(path, kReceivers[3]);
   for (Fix& fix : fixes) {
-    const double time_s = std::fmod(timeOf(fix), 200.0);
-    if (time_s < 60.0 || time_s > 130.0) continue;
+    const double time_s = std::fmod(timeOf(fix), period_s);
+    if (time_s < begin_s || time_s > begin_s + 70.0) continue;
     test::shift(fix, {1.2, timeOf(fix) < 300.0 ? -0.5 : 0.8});
     fix.sigma_m = 0.5;
   }
+  return fixes;
+}
+
+TEST(Receivers, StepsBetweenFloatAndFixedDoNotMoveThePath) {
+  const Path path = mower();
+  const std::vector<Fix> fixes = floatAndFixed(path, 60.0, 200.0);
   const CleanedTrajectory cleaned = clean(fixes);
   EXPECT_LT(meanOf(errorsOf(cleaned, path, kDrive_s)), 0.2);
   EXPECT_GE(countOf(cleaned, FixVerdict::kKept), fixes.size() * 95 / 100);
+}
+
+TEST(Receivers, StepsOfAReceiverThatAlwaysDeclaresTheSameDoNotMoveThePath) {
+  const Path path = mower();
+  for (const double declared_m : {0.0, 30.0}) {
+    for (const double begin_s : {75.5, 90.1}) {  // and ends: while it drives
+      SCOPED_TRACE(std::to_string(declared_m) + " m, from " + std::to_string(begin_s) + " s on");
+      std::vector<Fix> fixes = floatAndFixed(path, begin_s, 240.0);
+      for (Fix& fix : fixes) fix.sigma_m = declared_m;
+      const CleanedTrajectory cleaned = clean(fixes);
+      EXPECT_LT(meanOf(errorsOf(cleaned, path, kDrive_s)), 0.1);
+      EXPECT_GE(countOf(cleaned, FixVerdict::kKept), fixes.size() * 95 / 100);
+    }
+  }
 }
 
 TEST(Receivers, AJumpOfACarsReceiverDoesNotMoveThePath) {
