@@ -8,7 +8,9 @@
 namespace visual_localization {
 
 void BayesConfig::declare(ParameterVisitor& visitor) {
-  visitor.real({"bayes/anywhere", "1", "probability that the next image is from anywhere in the map (kidnapping)"},
+  visitor.real({"bayes/anywhere", "1",
+                "probability that the next image is from anywhere in the map (kidnapping); less where images follow "
+                "each other more closely than training images"},
                anywhere, 1e-6, 0.5);
   visitor.real(
       {"bayes/exponent", "1",

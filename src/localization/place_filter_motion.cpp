@@ -128,7 +128,8 @@ void PlaceFilter::predict(const Motion& motion) {
     sum += speeds_[k] = std::pow(speeds_[k], kSpeedMemory) * std::pow(usual[k], 1.0 - kSpeedMemory);
   }
   for (double& speed : speeds_) speed /= sum;
-  const double anywhere = config_.anywhere / static_cast<double>(map_.size());
+  const double carried_away = independence_ * config_.anywhere;
+  const double anywhere = carried_away / static_cast<double>(map_.size());
   places_.forEach([&](Place& place) {
     place.probability = place.stayed;
     if (place.arrival != PlaceProbabilities::kNone) {
@@ -136,7 +137,7 @@ void PlaceFilter::predict(const Motion& motion) {
       const double by_speed = std::inner_product(speeds_.begin(), speeds_.end(), arrival.by_speed.begin(), 0.0);
       place.probability += (1.0 - motion.share()) * by_speed + motion.share() * arrival.by_odometry;
     }
-    place.probability = (1.0 - config_.anywhere) * place.probability + anywhere;
+    place.probability = (1.0 - carried_away) * place.probability + anywhere;
   });
 }
 

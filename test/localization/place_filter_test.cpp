@@ -176,6 +176,38 @@ TEST(PlaceFilter, ALargeMapCostsWhatIsProbable) {
   EXPECT_NEAR(filter.covarianceAbout(centre_m)(0, 0), expected_m2(0, 0), 1e-6 * expected_m2(0, 0));
 }
 
+TEST(PlaceFilter, ManyImagesOfARobotThatStandsAreNotManyChancesToBeCarriedAway) {
+  const auto map = mapOf(streetSession(200));
+  BayesConfig config;
+  config.exponent = 3.0;
+  PlaceFilter filter(*map, config);
+  const auto look = [&](double east_m) {  // in bad light
+    PlaceLikelihood likelihood;
+    for (std::size_t i = 0; i < map->size(); ++i) {
+      const double offset_m = map->position_m(i).x() - east_m;
+      Score score;
+      score.matches = static_cast<int>(6.0 + 12.0 * std::exp(-0.5 * offset_m * offset_m));
+      likelihood.compared.push_back(filter.comparedWith(i, score));
+    }
+    filter.update(likelihood);
+  };
+  double east_m = 10.0;
+  for (int i = 0; i < 20; ++i, east_m += 1.0) {
+    filter.predict(afterSeconds(1.0));
+    look(east_m);
+  }
+  for (int i = 0; i < 300; ++i) {
+    filter.predict(afterSeconds(0.1));
+    look(east_m);
+    EXPECT_GT(filter.within({east_m, 0.0}, 5.0), 0.97) << i;
+  }
+  for (int i = 0; i < 100; ++i) {  // and then it is carried away
+    filter.predict(afterSeconds(0.1));
+    look(150.0);
+  }
+  EXPECT_GT(filter.within({150.0, 0.0}, 5.0), 0.97);
+}
+
 TEST(PlaceFilter, GoesFromOneSessionToAnother) {
   // The first session ends where the second goes on.
   std::vector<TrainingImage> images = streetSession(50);
