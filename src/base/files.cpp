@@ -1,10 +1,13 @@
 #include "base/files.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <mutex>
 #include <optional>
@@ -17,6 +20,7 @@
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include "base/text.h"
@@ -96,6 +100,21 @@ int openLocked(const std::string& path, int flags) {
   }
 }
 
+/// Whether another machine may be writing the file although it was locked here: some network disks, as NFS with
+/// `nolock`, lock for one machine alone. After a day without a change nobody does.
+bool mayBeInUseElsewhere(int descriptor) {
+  constexpr std::array<std::uint32_t, 6> kNetworks{0x6969,     0x517B,     0xFF534D42,   // NFS, SMB, CIFS
+                                                   0xFE534D42, 0x65735546, 0x01021997};  // SMB2, FUSE, 9P
+  constexpr std::time_t kDay_s = 86400;
+  struct statfs system {};
+  struct stat status {};
+  if (::fstatfs(descriptor, &system) == 0 &&
+      std::find(kNetworks.begin(), kNetworks.end(), static_cast<std::uint32_t>(system.f_type)) == kNetworks.end()) {
+    return false;
+  }
+  return ::fstat(descriptor, &status) != 0 || std::time(nullptr) - status.st_mtime < kDay_s;
+}
+
 /// Removes the temporary files in the folder, by their names, that no living process holds. Does so once for each
 /// folder; what cannot be read, locked or removed stays.
 void removeAbandoned(const std::string& folder) {
@@ -106,7 +125,7 @@ void removeAbandoned(const std::string& folder) {
     const std::string path = entry->path().string();
     const int descriptor = openLocked(path, 0);
     if (descriptor < 0) continue;
-    ::unlink(path.c_str());
+    if (!mayBeInUseElsewhere(descriptor)) ::unlink(path.c_str());
     ::close(descriptor);
   }
 }

@@ -249,6 +249,25 @@ TEST(PartialFile, AFileSystemWithoutLocksIsWrittenAndLeftClean) {
   }
 }
 
+TEST(PartialFile, WhatAnotherMachineMayBeWritingStaysForADay) {
+  const test::TemporaryFolder folder;
+  const std::string name = "b.0123456789abcdef.visual_localization.partial";
+  test::writeAll(folder / name, "theirs");
+  for (const bool is_old : {false, true}) {
+    if (is_old) {
+      const auto now = std::filesystem::file_time_type::clock::now();
+      std::filesystem::last_write_time(folder / name, now - std::chrono::hours(25));
+    }
+    const int outcome = withoutCalls({SYS_fstatfs}, EIO, [&folder] {  // the disk may be a network's
+      writeFile(folder / "a", "mine");
+      return 0;
+    });
+    if (outcome == kNoFilter) GTEST_SKIP() << "no filter of system calls here";
+    EXPECT_EQ(outcome, 0);
+    EXPECT_EQ(std::filesystem::exists(folder / name), !is_old);
+  }
+}
+
 std::vector<unsigned> renames() {
   return {
 #ifdef SYS_rename
