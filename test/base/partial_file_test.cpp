@@ -302,12 +302,18 @@ TEST(PartialFile, ANetworkDiskThatGoesAwayKeepsTheOldFile) {
   }
 }
 
+/// As a program that was started from a terminal: one in the background of a script ignores SIGINT.
+void startInTheForeground() {
+  ::signal(SIGINT, SIG_DFL);
+  removePartialFilesOnSignals();
+}
+
 TEST(PartialFile, DisappearsWhenTheProcessIsInterrupted) {
   const test::TemporaryFolder folder;
   for (const int signal_number : {SIGINT, SIGTERM}) {
     const pid_t child = ::fork();
     if (child == 0) {
-      removePartialFilesOnSignals();
+      startInTheForeground();
       const PartialFile file(folder / "a");
       ::raise(signal_number);
       ::_exit(0);
@@ -335,7 +341,7 @@ TEST(PartialFile, DisappearsWhenTheProcessIsInterruptedWhileAnotherThreadMakesIt
   for (int i = 0; i < kTimes; ++i) {
     const pid_t child = ::fork();
     if (child == 0) {
-      removePartialFilesOnSignals();
+      startInTheForeground();
       makeFilesWithoutEnd(folder / "a");
     }
     ASSERT_GT(child, 0);
