@@ -10,7 +10,7 @@
 namespace visual_localization {
 namespace {
 
-double sumOf(const PlaceProbabilities& places) {
+double totalOf(const PlaceProbabilities& places) {
   return places.sum([](const auto& place) { return place.probability; });
 }
 
@@ -20,7 +20,7 @@ PlaceProbabilities someOf(std::size_t count, std::size_t own, std::uint32_t seed
   PlaceProbabilities places(count);
   places.reset(2.0);
   for (std::size_t i = 0; i < own; ++i) places.own(random() % count).probability = static_cast<double>(random() % 5);
-  const double sum = sumOf(places);
+  const double sum = totalOf(places);
   places.forEach([sum](auto& place) { place.probability /= sum; });
   return places;
 }
@@ -35,7 +35,7 @@ TEST(PlaceProbabilities, TheSumIsThatOfAll) {
   for (const std::size_t own : {0U, 3U, 40U, 1000U}) {
     const PlaceProbabilities places = someOf(50, own, 1);
     const std::vector<double> dense = denseOf(places);
-    EXPECT_NEAR(sumOf(places), 1.0, 1e-12) << own;
+    EXPECT_NEAR(totalOf(places), 1.0, 1e-12) << own;
     EXPECT_NEAR(std::accumulate(dense.begin(), dense.end(), 0.0), 1.0, 1e-12) << own;
   }
 }
@@ -91,7 +91,7 @@ TEST(PlaceProbabilities, WhatIsAlikeIsJoined) {
   EXPECT_DOUBLE_EQ(places[7], 0.02);
   EXPECT_DOUBLE_EQ(places[8], 0.0);
   EXPECT_DOUBLE_EQ(places[9], 0.01);
-  EXPECT_NEAR(sumOf(places), 1.0, 1e-12);
+  EXPECT_NEAR(totalOf(places), 1.0, 1e-12);
 }
 
 TEST(PlaceProbabilities, NothingIsJoinedWhereNothingIsCommon) {
@@ -102,7 +102,7 @@ TEST(PlaceProbabilities, NothingIsJoinedWhereNothingIsCommon) {
   places.own(2);
   places.joinAlike();
   EXPECT_EQ(places.allOwn().size(), 3U);
-  EXPECT_DOUBLE_EQ(sumOf(places), 1.0);
+  EXPECT_DOUBLE_EQ(totalOf(places), 1.0);
   EXPECT_DOUBLE_EQ(places[2], 0.5);
 }
 
@@ -113,10 +113,10 @@ TEST(PlaceProbabilities, OfTooManyTheMostProbableStay) {
   for (std::size_t i = 0; i < 2 * PlaceProbabilities::kMostOwn; ++i) {
     places.own(kCount - 1 - i).probability = i % 2 == 0 ? 3.0 + static_cast<double>(i) : 0.5;
   }
-  const double sum = sumOf(places);
+  const double sum = totalOf(places);
   places.joinAlike();
   EXPECT_EQ(places.allOwn().size(), PlaceProbabilities::kMostOwn);
-  EXPECT_NEAR(sumOf(places), sum, 1e-9 * sum);
+  EXPECT_NEAR(totalOf(places), sum, 1e-9 * sum);
   for (std::size_t i = 0; i < 2 * PlaceProbabilities::kMostOwn; ++i) {
     if (i % 2 == 0)
       EXPECT_DOUBLE_EQ(places[kCount - 1 - i], 3.0 + static_cast<double>(i));
