@@ -31,9 +31,14 @@ using Shorts = hn::Repartition<std::int16_t, Ints>;
 constexpr std::size_t kBins = kPackedBytes;
 constexpr std::size_t kRows = 4;  ///< of B at a time: each load of a tile serves so many scalar products
 
-HWY_INLINE hn::Vec<Floats> toFloats(hn::Vec<Ints> sum) { return hn::ConvertTo(Floats(), sum); }
+/// The four bytes at `group` in each lane.
+HWY_INLINE hn::Vec<Ints> broadcast(const void* group) {
+  std::int32_t bits = 0;
+  std::memcpy(&bits, group, sizeof(bits));
+  return hn::Set(Ints(), bits);
+}
 
-/// Four bins, halved if they are.
+/// Four bins, or their halves.
 template <bool kHalved>
 HWY_INLINE std::uint32_t fourBins(const std::uint8_t* bins) {
   std::uint32_t four = 0;
@@ -64,9 +69,10 @@ struct ByteRow {
     for (std::size_t i = 0; i < kGroup; ++i) to[i] = static_cast<Packed>(kHalved ? bins[i] >> 1 : bins[i]);
   }
 #endif
-  static constexpr std::size_t kGroups = kBins / kGroup;
 
-  alignas(4) Packed groups[kBins];
+  static constexpr std::size_t groups(std::size_t /*dimension*/) { return kBins / kGroup; }
+
+  alignas(4) Packed packed[kBins];
   std::int32_t correction = 0;  ///< what the packing took away from each scalar product
 
   HWY_INLINE void set(const std::uint8_t* descriptor) {
@@ -76,77 +82,38 @@ struct ByteRow {
     for (std::size_t i = 0; i < kBins; i += sizeof(sum)) {
       __m512i bins = _mm512_loadu_si512(descriptor + i);
       if (kHalved) bins = _mm512_and_si512(_mm512_srli_epi16(bins, 1), _mm512_set1_epi8(0x7F));
-      _mm512_storeu_si512(groups + i, bins);
+      _mm512_storeu_si512(packed + i, bins);
       sum = _mm512_dpbusd_epi32(sum, bins, ones);
     }
     if (!kHalved) correction = 128 * _mm512_reduce_add_epi32(sum);
 #else
-    for (std::size_t i = 0; i < kBins; ++i)
-      groups[i] = static_cast<Packed>(kHalved ? descriptor[i] >> 1 : descriptor[i]);
+    for (std::size_t i = 0; i < kBins; i += kGroup) pack(descriptor + i, packed + i);
 #endif
   }
+  HWY_INLINE hn::Vec<Ints> group(std::size_t i) const { return broadcast(packed + i * kGroup); }
+
+  /// The scalar products of a row with a tile, of which some CPUs add the odd groups apart.
+  struct Sum {
+    hn::Vec<Ints> sum;
+    hn::Vec<Ints> odd;
+
+    HWY_INLINE explicit Sum(const ByteRow& row) : sum(hn::Set(Ints(), row.correction)), odd(hn::Zero(Ints())) {}
+    HWY_INLINE void add(hn::Vec<Ints> row, const Packed* tile) {
+#if HWY_TARGET == HWY_AVX3_DL
+      sum = hn::Vec<Ints>{_mm512_dpbusd_epi32(sum.raw, row.raw, _mm512_load_si512(tile))};
+#else
+      sum = hn::ReorderWidenMulAccumulate(Ints(), hn::BitCast(Shorts(), row), hn::Load(Shorts(), tile), sum, odd);
+#endif
+    }
+    HWY_INLINE hn::Vec<Floats> total() const {
+#if HWY_TARGET == HWY_AVX3_DL
+      return hn::ConvertTo(Floats(), sum);
+#else
+      return hn::ConvertTo(Floats(), hn::RearrangeToOddPlusEven(sum, odd));
+#endif
+    }
+  };
 };
-
-template <class Row>
-HWY_INLINE hn::Vec<Ints> broadcast(const Row& row, std::size_t group) {
-  std::int32_t bits = 0;
-  std::memcpy(&bits, row.groups + group * Row::kGroup, sizeof(bits));
-  return hn::Set(Ints(), bits);
-}
-
-/// `sum` + the scalar products of one group with a tile's.
-template <class Packed>
-HWY_INLINE hn::Vec<Ints> multiplyAdd(hn::Vec<Ints> row, const Packed* tile, hn::Vec<Ints>& sum, hn::Vec<Ints>& odd) {
-#if HWY_TARGET == HWY_AVX3_DL
-  (void)odd;
-  return hn::Vec<Ints>{_mm512_dpbusd_epi32(sum.raw, row.raw, _mm512_load_si512(tile))};
-#else
-  return hn::ReorderWidenMulAccumulate(Ints(), hn::BitCast(Shorts(), row), hn::Load(Shorts(), tile), sum, odd);
-#endif
-}
-
-/// The sum of all groups, of which some CPUs add the odd ones apart.
-HWY_INLINE hn::Vec<Ints> total(hn::Vec<Ints> sum, hn::Vec<Ints> odd) {
-#if HWY_TARGET == HWY_AVX3_DL
-  (void)odd;
-  return sum;
-#else
-  return hn::RearrangeToOddPlusEven(sum, odd);
-#endif
-}
-
-/// Scalar products of kRows rows with `kTiles` tiles, one lane each: those of the first tile, then of the second. Two
-/// tiles at a time keep eight sums going, enough to hide how long one step takes.
-template <std::size_t kTiles, bool kHalved>
-HWY_INLINE void multiply(const ByteRow<kHalved>* rows, const typename ByteRow<kHalved>::Packed* tiles,
-                         std::size_t /*dimension*/, hn::Vec<Floats>* products) {
-  using Row = ByteRow<kHalved>;
-  const Ints ints;
-  const std::size_t step = hn::Lanes(ints) * Row::kGroup;
-  const auto* second = tiles + (kTiles - 1) * Row::kGroups * step;
-  hn::Vec<Ints> s0 = hn::Set(ints, rows[0].correction), s1 = hn::Set(ints, rows[1].correction),
-                s2 = hn::Set(ints, rows[2].correction), s3 = hn::Set(ints, rows[3].correction);
-  hn::Vec<Ints> t0 = s0, t1 = s1, t2 = s2, t3 = s3;
-  hn::Vec<Ints> o0 = hn::Zero(ints), o1 = o0, o2 = o0, o3 = o0, p0 = o0, p1 = o0, p2 = o0, p3 = o0;
-  for (std::size_t group = 0; group < Row::kGroups; ++group, tiles += step, second += step) {
-    const auto r0 = broadcast(rows[0], group), r1 = broadcast(rows[1], group), r2 = broadcast(rows[2], group),
-               r3 = broadcast(rows[3], group);
-    s0 = multiplyAdd(r0, tiles, s0, o0);
-    s1 = multiplyAdd(r1, tiles, s1, o1);
-    s2 = multiplyAdd(r2, tiles, s2, o2);
-    s3 = multiplyAdd(r3, tiles, s3, o3);
-    if (kTiles == 1) continue;
-    t0 = multiplyAdd(r0, second, t0, p0);
-    t1 = multiplyAdd(r1, second, t1, p1);
-    t2 = multiplyAdd(r2, second, t2, p2);
-    t3 = multiplyAdd(r3, second, t3, p3);
-  }
-  products[0] = toFloats(total(s0, o0)), products[1] = toFloats(total(s1, o1));
-  products[2] = toFloats(total(s2, o2)), products[3] = toFloats(total(s3, o3));
-  if (kTiles == 1) return;
-  products[4] = toFloats(total(t0, p0)), products[5] = toFloats(total(t1, p1));
-  products[6] = toFloats(total(t2, p2)), products[7] = toFloats(total(t3, p3));
-}
 
 #undef VISUAL_LOCALIZATION_NARROW
 #if HWY_TARGET == HWY_SSSE3 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
@@ -162,88 +129,84 @@ struct NarrowRow {
   static constexpr std::uint64_t kMostSquared = std::uint64_t{1} << 32;
   using Packed = std::uint8_t;
   static constexpr std::size_t kGroup = 4;
-  static constexpr std::size_t kGroups = kBins / kGroup;
+  static constexpr std::size_t groups(std::size_t /*dimension*/) { return kBins / kGroup; }
   static HWY_INLINE void pack(const std::uint8_t* bins, Packed* to) {
     const std::uint32_t four = fourBins<true>(bins);
     std::memcpy(to, &four, sizeof(four));
   }
 
-  alignas(4) Packed groups[kBins];
+  alignas(4) Packed packed[kBins];
   HWY_INLINE void set(const std::uint8_t* descriptor) {
-    for (std::size_t group = 0; group < kGroups; ++group) pack(descriptor + group * kGroup, groups + group * kGroup);
+    for (std::size_t i = 0; i < kBins; i += kGroup) pack(descriptor + i, packed + i);
   }
-};
+  HWY_INLINE hn::Vec<Ints> group(std::size_t i) const { return broadcast(packed + i * kGroup); }
 
-HWY_INLINE hn::Vec<Words> multiplyAdd(hn::Vec<Ints> row, hn::Vec<Bytes> tile, hn::Vec<Words> sum) {
+  struct Sum {
+    hn::Vec<Words> sum;  ///< two a lane
+
+    HWY_INLINE explicit Sum(const NarrowRow& /*row*/) : sum(hn::Zero(Words())) {}
+    HWY_INLINE void add(hn::Vec<Ints> row, const Packed* tile) {
+      const auto bins = hn::Load(Bytes(), tile);
 #if HWY_TARGET == HWY_AVX3
-  const hn::Vec<Words> pairs{_mm512_maddubs_epi16(tile.raw, row.raw)};
+      const hn::Vec<Words> pairs{_mm512_maddubs_epi16(bins.raw, row.raw)};
 #elif HWY_TARGET == HWY_AVX2
-  const hn::Vec<Words> pairs{_mm256_maddubs_epi16(tile.raw, row.raw)};
+      const hn::Vec<Words> pairs{_mm256_maddubs_epi16(bins.raw, row.raw)};
 #else
-  const hn::Vec<Words> pairs{_mm_maddubs_epi16(tile.raw, row.raw)};
+      const hn::Vec<Words> pairs{_mm_maddubs_epi16(bins.raw, row.raw)};
 #endif
-  return hn::Add(sum, pairs);
-}
-
-/// Of both halves of each lane.
-HWY_INLINE hn::Vec<Floats> total(hn::Vec<Words> sum) {
-  const Ints ints;
-  const auto both = hn::BitCast(hn::RebindToUnsigned<Ints>(), sum);
-  const auto low = hn::And(both, hn::Set(hn::RebindToUnsigned<Ints>(), 0xFFFFU));
-  return toFloats(hn::BitCast(ints, hn::Add(low, hn::ShiftRight<16>(both))));
-}
-
-template <std::size_t kTiles>
-HWY_INLINE void multiply(const NarrowRow* rows, const std::uint8_t* tiles, std::size_t /*dimension*/,
-                         hn::Vec<Floats>* products) {
-  const Bytes bytes;
-  const std::size_t step = hn::Lanes(bytes);
-  const std::uint8_t* second = tiles + (kTiles - 1) * NarrowRow::kGroups * step;
-  hn::Vec<Words> s0 = hn::Zero(Words()), s1 = s0, s2 = s0, s3 = s0, t0 = s0, t1 = s0, t2 = s0, t3 = s0;
-  for (std::size_t group = 0; group < NarrowRow::kGroups; ++group, tiles += step, second += step) {
-    const auto r0 = broadcast(rows[0], group), r1 = broadcast(rows[1], group), r2 = broadcast(rows[2], group),
-               r3 = broadcast(rows[3], group);
-    const auto tile = hn::Load(bytes, tiles);
-    s0 = multiplyAdd(r0, tile, s0), s1 = multiplyAdd(r1, tile, s1);
-    s2 = multiplyAdd(r2, tile, s2), s3 = multiplyAdd(r3, tile, s3);
-    if (kTiles == 1) continue;
-    const auto next = hn::Load(bytes, second);
-    t0 = multiplyAdd(r0, next, t0), t1 = multiplyAdd(r1, next, t1);
-    t2 = multiplyAdd(r2, next, t2), t3 = multiplyAdd(r3, next, t3);
-  }
-  products[0] = total(s0), products[1] = total(s1), products[2] = total(s2), products[3] = total(s3);
-  if (kTiles == 1) return;
-  products[4] = total(t0), products[5] = total(t1), products[6] = total(t2), products[7] = total(t3);
-}
+      sum = hn::Add(sum, pairs);
+    }
+    HWY_INLINE hn::Vec<Floats> total() const {
+      const hn::RebindToUnsigned<Ints> lanes;
+      const auto both = hn::BitCast(lanes, sum);
+      const auto whole = hn::Add(hn::And(both, hn::Set(lanes, 0xFFFFU)), hn::ShiftRight<16>(both));
+      return hn::ConvertTo(Floats(), hn::BitCast(Ints(), whole));
+    }
+  };
+};
 #endif
 
 /// Of descriptors of floats.
 struct FloatRow {
   using Packed = float;
+  static constexpr std::size_t kGroup = 1;
+  static std::size_t groups(std::size_t dimension) { return dimension; }
+
   const float* elements = nullptr;
   HWY_INLINE void set(const float* descriptor) { elements = descriptor; }
+  HWY_INLINE hn::Vec<Floats> group(std::size_t i) const { return hn::Set(Floats(), elements[i]); }
+
+  struct Sum {
+    hn::Vec<Floats> sum;
+
+    HWY_INLINE explicit Sum(const FloatRow& /*row*/) : sum(hn::Zero(Floats())) {}
+    HWY_INLINE void add(hn::Vec<Floats> row, const Packed* tile) {
+      sum = hn::MulAdd(row, hn::Load(Floats(), tile), sum);
+    }
+    HWY_INLINE hn::Vec<Floats> total() const { return sum; }
+  };
 };
 
-template <std::size_t kTiles>
-HWY_INLINE void multiply(const FloatRow* rows, const float* tiles, std::size_t dimension, hn::Vec<Floats>* products) {
-  const Floats floats;
-  const std::size_t step = hn::Lanes(floats);
-  const float* second = tiles + (kTiles - 1) * dimension * step;
-  hn::Vec<Floats> s0 = hn::Zero(floats), s1 = s0, s2 = s0, s3 = s0, t0 = s0, t1 = s0, t2 = s0, t3 = s0;
-  for (std::size_t k = 0; k < dimension; ++k, tiles += step, second += step) {
-    const auto r0 = hn::Set(floats, rows[0].elements[k]), r1 = hn::Set(floats, rows[1].elements[k]),
-               r2 = hn::Set(floats, rows[2].elements[k]), r3 = hn::Set(floats, rows[3].elements[k]);
-    const auto tile = hn::Load(floats, tiles);
-    s0 = hn::MulAdd(r0, tile, s0), s1 = hn::MulAdd(r1, tile, s1);
-    s2 = hn::MulAdd(r2, tile, s2), s3 = hn::MulAdd(r3, tile, s3);
+/// Scalar products of kRows rows with `kTiles` tiles, one lane each: those of the first tile, then of the second. Two
+/// tiles at a time keep eight sums going, enough to hide how long one step takes.
+template <std::size_t kTiles, class Row>
+HWY_INLINE void multiply(const Row* rows, const typename Row::Packed* tiles, std::size_t dimension,
+                         hn::Vec<Floats>* products) {
+  using Sum = typename Row::Sum;
+  const std::size_t step = hn::Lanes(Ints()) * Row::kGroup;
+  const std::size_t groups = Row::groups(dimension);
+  const typename Row::Packed* second = tiles + (kTiles - 1) * groups * step;
+  Sum s0(rows[0]), s1(rows[1]), s2(rows[2]), s3(rows[3]);
+  Sum t0 = s0, t1 = s1, t2 = s2, t3 = s3;
+  for (std::size_t i = 0; i < groups; ++i, tiles += step, second += step) {
+    const auto r0 = rows[0].group(i), r1 = rows[1].group(i), r2 = rows[2].group(i), r3 = rows[3].group(i);
+    s0.add(r0, tiles), s1.add(r1, tiles), s2.add(r2, tiles), s3.add(r3, tiles);
     if (kTiles == 1) continue;
-    const auto next = hn::Load(floats, second);
-    t0 = hn::MulAdd(r0, next, t0), t1 = hn::MulAdd(r1, next, t1);
-    t2 = hn::MulAdd(r2, next, t2), t3 = hn::MulAdd(r3, next, t3);
+    t0.add(r0, second), t1.add(r1, second), t2.add(r2, second), t3.add(r3, second);
   }
-  products[0] = s0, products[1] = s1, products[2] = s2, products[3] = s3;
+  products[0] = s0.total(), products[1] = s1.total(), products[2] = s2.total(), products[3] = s3.total();
   if (kTiles == 1) return;
-  products[4] = t0, products[5] = t1, products[6] = t2, products[7] = t3;
+  products[4] = t0.total(), products[5] = t1.total(), products[6] = t2.total(), products[7] = t3.total();
 }
 
 /// Descriptors in `order` side by side, filled up to whole tiles with zeros. `padded`: their number then.
@@ -255,9 +218,7 @@ void pack(const LocalFeatures& features, const std::vector<std::uint32_t>& order
   for (std::size_t i = 0; i < padded; ++i) {
     const std::uint8_t* from = i < features.size() ? features.bytes(order[i]) : kNone;
     typename Row::Packed* tile = to + i / lanes * lanes * kBins + i % lanes * Row::kGroup;
-    for (std::size_t group = 0; group < Row::kGroups; ++group) {
-      Row::pack(from + group * Row::kGroup, tile + group * lanes * Row::kGroup);
-    }
+    for (std::size_t k = 0; k < kBins; k += Row::kGroup) Row::pack(from + k, tile + k * lanes);
   }
 }
 

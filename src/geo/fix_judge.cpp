@@ -10,8 +10,6 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kMedianOfPlane = 1.1774;  // of a distance, in sigmas along one axis
-
 std::vector<PathSample> samplesOf(const std::vector<Node>& nodes) {
   std::vector<PathSample> samples;
   for (const Node& node : nodes) samples.push_back(node.sample);

@@ -12,6 +12,8 @@ double studentCost(double squared);
 /// The weight that Student's t leaves to something so far away: 1 near its middle.
 double studentWeight(double squared);
 
+/// Median of a distance in the plane, in sigmas along one axis.
+constexpr double kMedianOfPlane = 1.1774;
 /// Speeds are measured over about this.
 constexpr double kSpeedLag_s = 4.0;
 

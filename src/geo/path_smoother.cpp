@@ -25,8 +25,7 @@ struct Transition {
   Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
 };
 
-constexpr double kMedianOfPlane = 1.1774;  // of a distance, in sigmas along one axis
-constexpr double kMuch = 5.0;              // as a ratio of what a receiver promises
+constexpr double kMuch = 5.0;  // as a ratio of what a receiver promises
 
 double squareOf(double value) { return value * value; }
 
@@ -200,12 +199,13 @@ void weighStretches(const std::vector<Measurement>& said, const std::vector<Path
   const bool alike = !path.empty() && arePromisedAlike(stretches, said);
   const Stretch& middle = middleOf(stretches);
   const Eigen::Vector2d usual_m = alike ? middle.offset_m : Eigen::Vector2d::Zero();
+  const double shown_m = alike ? deviationFrom(middle, stretches) : 0.0;
   double longest_s = 0.0;
   for (const Stretch& stretch : stretches) longest_s = std::max(longest_s, stretch.duration_s);
   for (const Stretch& stretch : stretches) {
     const Measurement& first = said[stretch.begin];
     double expected_m = first.offset_m;
-    if (alike) expected_m = std::min(expected_m, std::max(first.white_m, deviationFrom(middle, stretches)));
+    if (alike) expected_m = std::min(expected_m, std::max(first.white_m, shown_m));
     const double squared = (stretch.offset_m - usual_m).squaredNorm() / squareOf(expected_m);
     const double weight = std::max(alike ? kLeastAlike : kLeastWeight, studentWeight(squared));
     const double offset_m = expected_m * std::sqrt(longest_s / stretch.duration_s / weight);
@@ -261,7 +261,6 @@ PathState between(const PathState& before, const PathState& after, double time_s
                   share * rest * elapsed_s * (rest * first_mps - share * last_mps);
   at.velocity_mps = 6.0 * share * rest / elapsed_s * way_m + rest * (1.0 - 3.0 * share) * first_mps +
                     share * (3.0 * share - 2.0) * last_mps;
-  at.offset_m = share < 0.5 ? before.offset_m : after.offset_m;
   return at;
 }
 
