@@ -120,10 +120,12 @@ ClockCheck judged(const std::optional<ClockOffset>& found) {
     const double known_s = 2.0 * found->sigma_s;
     const double apart_s = std::abs(found->offset_s);
     check.sigma_s = std::hypot(found->offset_s, found->sigma_s);
-    check.remark = {apart_s > known_s
-                        ? "clocks: the turns leave up to " + seconds(apart_s + known_s) +
-                              " open between fixes and images; landmarks tell more: calibrate, or --self-calibrate"
-                        : "clocks: by the turns, fixes and images agree within " + seconds(known_s)};
+    check.remark = {apart_s > known_s ? "clocks: the turns leave up to " + seconds(apart_s + known_s) +
+                                            " open between fixes and images"
+                                      : "clocks: by the turns, fixes and images agree within " + seconds(known_s)};
+    if (apart_s > std::max(known_s, kSmallestOffset_s)) {
+      check.remark.text += "; landmarks tell more: calibrate, or --self-calibrate";
+    }
   }
   return check;
 }

@@ -85,6 +85,21 @@ TEST(ClockOffset, IsNothingForPicturesOfAnotherDrive) {
   EXPECT_FALSE(clockOffset(picturesOf(other), coursePathOf(block, 0.0, 0.12)));
 }
 
+TEST(ClockOffset, IsNothingByASingleTurn) {
+  const auto aside = [](double by_m, double from_s, double lasts_s) {
+    return Path([=](double time_s) {
+      const double share = std::clamp((time_s - from_s) / lasts_s, 0.0, 1.0);
+      return Eigen::Vector2d(test::kSpeed * time_s, by_m * share * share * (3.0 - 2.0 * share));
+    });
+  };
+  for (const double step_m : {0.2, 0.4, 1.0, 4.0}) {
+    for (const double swerve_s : {1.0, 2.0, 4.0}) {
+      const auto fixes = coursePathOf(aside(step_m, 180.0, 0.01), 0.0, 0.02);
+      EXPECT_FALSE(clockOffset(picturesOf(aside(0.6, 200.0, swerve_s)), fixes)) << step_m << " m, " << swerve_s << " s";
+    }
+  }
+}
+
 TEST(ClockOffset, IsNothingBeyondItsReach) {
   EXPECT_FALSE(clockOffset(picturesOf(block), coursePathOf(block, 45.0, 0.05)));
   EXPECT_FALSE(clockOffset(picturesOf(block), coursePathOf(block, 3600.0, 0.05)));
