@@ -45,6 +45,13 @@ struct ConstantVelocity {
     position_var *= variance / total;
   }
 
+  /// The receiver's error changes at once; the velocity is kept.
+  void stepTo(const Eigen::Vector2d& measured_m, double variance) {
+    position_m = measured_m;
+    position_var = variance;
+    covariance = 0.0;
+  }
+
   double logDeterminant() const {
     constexpr double kLeast = 1e-30;  // rounding may leave less than nothing
     return std::log(std::max(kLeast, position_var * velocity_var - covariance * covariance));

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "base/numbers.h"
 
 namespace visual_localization {
 namespace {
+
+constexpr double kSpike = 4.3;  ///< sigmas: one in ten thousand in the plane
 
 std::vector<PathSample> samplesOf(const std::vector<Node>& nodes) {
   std::vector<PathSample> samples;
@@ -40,8 +43,9 @@ std::size_t largestJump(const std::vector<PathSample>& samples, const std::vecto
 FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& config)
     : usable_(usable),
       config_(config),
-      nodes_(nodesOf(usable, nodeLength_s(usable.samples))),
+      nodes_(nodesOf(usable, nodeLength_s(usable.samples), stepsIn(usable))),
       samples_(samplesOf(nodes_)),
+      aside_(nodes_.size(), false),
       verdicts_(usable.samples.size(), FixVerdict::kKept) {
   select(0.0, {});
   std::vector<bool> believed;
@@ -55,15 +59,18 @@ FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& con
     const std::vector<PathState> path = smoothPath(measurementsOf(part, false), motion_);
     takeBack(part, path);
     judgeFixes(part, path);
+    findAside(part, path);
   }
   judgeLeftOut();
 }
 
 SpeedPrior FixJudge::select(double least_density, const std::vector<bool>& believed) {
-  scales_ = learnScales(samples_, believed, least_density);
+  std::vector<bool> steps;
+  for (const Node& node : nodes_) steps.push_back(node.is_behind_step);
+  scales_ = learnScales(samples_, believed, least_density, steps);
   motion_ = {scales_.acceleration_density, scales_.usual_mps};
   const SpeedPrior speeds(samples_, scales_, config_.speed_tolerance);
-  chosen_ = selectNodes(samples_, scales_, speeds, config_.max_bridge_s);
+  chosen_ = selectNodes(samples_, scales_, speeds, config_.max_bridge_s, steps);
   return speeds;
 }
 
@@ -71,7 +78,7 @@ SpeedPrior FixJudge::select(double least_density, const std::vector<bool>& belie
 /// to the node that steps.
 void FixJudge::splitAtSteps() {
   for (std::size_t n = 1; n < nodes_.size(); ++n) {
-    if (chosen_[n] != NodeVerdict::kStep || isLeftOut(n - 1)) continue;
+    if (chosen_[n] != NodeVerdict::kStep || nodes_[n].is_behind_step || isLeftOut(n - 1)) continue;
     std::vector<std::size_t>& before = nodes_[n - 1].members;
     std::vector<std::size_t>& behind = nodes_[n].members;
     std::vector<std::size_t> members = before;
@@ -122,12 +129,11 @@ std::size_t FixJudge::endOfStretch(std::size_t node) const {
 
 /// What a receiver promises is its whole error; what is white of it shows.
 double FixJudge::offsetOf(double sigma_m) const {
-  constexpr double kUsual_m = 1.5;
   constexpr double kOfNoise = 3.0;
   constexpr double kLeast_m = 1e-3;
   constexpr double kMost_m = 100.0;
   const double noise_m = scales_.noise_m;
-  if (sigma_m == 0.0) return std::max(kUsual_m, kOfNoise * noise_m);
+  if (sigma_m == 0.0) return std::max(kUsualError_m, kOfNoise * noise_m);
   return std::clamp(std::sqrt(std::max(0.0, sigma_m * sigma_m - noise_m * noise_m)), kLeast_m, kMost_m);
 }
 
@@ -139,7 +145,8 @@ void FixJudge::addNode(std::size_t node, std::vector<Measurement>& into) const {
 void FixJudge::addFixes(std::size_t node, std::vector<Measurement>& into) const {
   std::vector<std::size_t> kept;
   for (const std::size_t i : nodes_[node].members) {
-    if (verdicts_[i] == FixVerdict::kKept) kept.push_back(i);
+    if (verdicts_[i] == FixVerdict::kKept || (aside_[node] && verdicts_[i] == FixVerdict::kMultipath))
+      kept.push_back(i);
   }
   const double white_m = scales_.noise_m * std::sqrt(static_cast<double>(kept.size()));
   for (const std::size_t i : kept) into.push_back({usable_.samples[i], white_m, offsetOf(usable_.sigmas_m[i])});
@@ -197,8 +204,7 @@ void FixJudge::takeBack(const Part& part, const std::vector<PathState>& path) {
 
 /// Spikes within believed nodes. A receiver's noise may have wide tails: a spike is beyond them.
 void FixJudge::judgeFixes(const Part& part, const std::vector<PathState>& path) {
-  constexpr double kSpike = 4.3;  // sigmas: one in ten thousand in the plane
-  constexpr double kTail = 0.8;   // of the fixes
+  constexpr double kTail = 0.8;  // of the fixes
   constexpr double kBeyondTail = 3.0;
   constexpr double kPromised = 3.0;  // sigmas by the receiver's own claim
   std::vector<std::size_t> fixes;
@@ -223,6 +229,33 @@ void FixJudge::judgeFixes(const Part& part, const std::vector<PathState>& path) 
   }
 }
 
+/// Nodes between two steps whose error is not the usual one and larger than their receiver promises, where it promises
+/// the same throughout. Their relative positions shape the path all the same.
+void FixJudge::findAside(const Part& part, const std::vector<PathState>& path) {
+  std::vector<double> east_m;
+  std::vector<double> north_m;
+  constexpr double kPromise = 2.45;  // sigmas: 95 % in the plane
+  double least_m = std::numeric_limits<double>::infinity();
+  double most_m = 0.0;
+  for (const PathState& state : path) {
+    east_m.push_back(state.offset_m.x());
+    north_m.push_back(state.offset_m.y());
+  }
+  for (std::size_t n = part.begin; n < part.end; ++n) {
+    least_m = std::min(least_m, offsetOf(nodes_[n].sigma_m));
+    most_m = std::max(most_m, offsetOf(nodes_[n].sigma_m));
+  }
+  if (most_m > kOtherPromise * least_m) return;
+  const Eigen::Vector2d usual_m(median(std::move(east_m)), median(std::move(north_m)));
+  auto state = path.begin();
+  for (std::size_t n = part.begin; n < part.end; ++n) {
+    while (state + 1 != path.end() && state->time_s < samples_[n].time_s) ++state;
+    const double promised_m = (nodes_[n].sigma_m > 0.0 ? kPromise : 1.0) * offsetOf(nodes_[n].sigma_m);
+    const double limit_m = std::max(promised_m, kSpike * scales_.noise_m);
+    aside_[n] = !isLeftOut(n) && (state->offset_m - usual_m).norm() > limit_m;
+  }
+}
+
 /// Also what a believed node has in excess beside a stretch that is left out belongs to it.
 void FixJudge::judgeLeftOut() {
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
@@ -230,7 +263,7 @@ void FixJudge::judgeLeftOut() {
     for (const std::size_t i : nodes_[n].members) {
       if (isLeftOut(n)) {
         verdicts_[i] = alone && nodes_[n].members.size() == 1 ? FixVerdict::kSpike : FixVerdict::kMultipath;
-      } else if (doubted_[n] && verdicts_[i] == FixVerdict::kSpike) {
+      } else if (aside_[n] || (doubted_[n] && verdicts_[i] == FixVerdict::kSpike)) {
         verdicts_[i] = FixVerdict::kMultipath;
       }
     }

@@ -42,6 +42,7 @@ class FixJudge {
   std::vector<Measurement> measurementsOf(const Part& part, bool of_fixes) const;
   void takeBack(const Part& part, const std::vector<PathState>& path);
   void judgeFixes(const Part& part, const std::vector<PathState>& path);
+  void findAside(const Part& part, const std::vector<PathState>& path);
   void judgeLeftOut();
 
   const UsableFixes& usable_;
@@ -53,6 +54,7 @@ class FixJudge {
   std::vector<NodeVerdict> chosen_;
   bool constant_speed_ = false;
   std::vector<bool> doubted_;  ///< nodes that are believed but do not shape the path
+  std::vector<bool> aside_;    ///< nodes whose position is wrong, but not the way between them
   std::vector<FixVerdict> verdicts_;
 };
 

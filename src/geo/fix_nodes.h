@@ -9,6 +9,9 @@
 
 namespace visual_localization {
 
+/// Of receivers that promise nothing: along one axis, and lasting.
+constexpr double kUsualError_m = 1.5;
+
 /// Fixes of one recording with their local positions, in order of time.
 struct UsableFixes {
   std::vector<PathSample> samples;   ///< time since the first of them
@@ -21,6 +24,7 @@ struct Node {
   PathSample sample;
   double sigma_m = 0.0;              ///< by the receiver's own claim; 0: none
   std::vector<std::size_t> members;  ///< of UsableFixes
+  bool is_behind_step = false;       ///< the fixes themselves show that the receiver's error has changed at once
 };
 
 /// Those that can be judged. Gives the others their verdict.
@@ -29,8 +33,13 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
 /// Median of the times between fixes.
 double typicalInterval(const std::vector<PathSample>& samples);
 
-/// Nodes of about `node_s` seconds.
-std::vector<Node> nodesOf(const UsableFixes& usable, double node_s);
+/// The first fixes behind steps of the receiver's error that no robot drives: four fixes or more within a second on
+/// either side differ by more than the receiver promises, than any robot accelerates, and than eight sigmas of what
+/// others do. Slow receivers show none.
+std::vector<std::size_t> stepsIn(const UsableFixes& usable);
+
+/// Nodes of about `node_s` seconds, none across one of `steps`.
+std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::vector<std::size_t>& steps);
 
 /// Median of some of the fixes, axis by axis.
 PathSample medianOf(const std::vector<PathSample>& samples, const std::vector<std::size_t>& members);

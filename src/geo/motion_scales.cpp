@@ -30,7 +30,9 @@ struct Evidence {
   const std::vector<PathSample>& nodes;
   const std::vector<bool>& believed;
   double usual_mps;
+  const std::vector<bool>& steps;
 
+  bool isStep(std::size_t i) const { return !steps.empty() && steps[i]; }
   bool uses(std::size_t i) const { return believed.empty() || believed[i]; }
 };
 
@@ -50,6 +52,7 @@ double filter(const Evidence& evidence, const Scales& scales, Innovations* found
     } else {
       next.predict(node.time_s - last_s, scales.density);
     }
+    if (evidence.isStep(i)) next.stepTo(node.position_m, noise_var);
     const double variance = next.position_var + noise_var;
     const double squared = (node.position_m - next.position_m).squaredNorm() / variance;
     if (found != nullptr) {
@@ -196,15 +199,15 @@ double studentWeight(double squared) {
   return std::min(1.0, (kDegreesOfFreedom + 2.0) / (kDegreesOfFreedom + squared));
 }
 
-MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector<bool>& believed,
-                         double least_density) {
+MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector<bool>& believed, double least_density,
+                         const std::vector<bool>& steps) {
   constexpr double kLeastMoving = 0.05;
   constexpr double kFits = 2.0;
   constexpr int kMostSteps = 8;
   constexpr double kLeastStanding = 0.3;  // a robot that stands will drive again
   MotionScales scales;
   const std::vector<bool> moving = findMotion(nodes, scales.usual_mps);
-  const Evidence evidence{nodes, believed, scales.usual_mps};
+  const Evidence evidence{nodes, believed, scales.usual_mps, steps};
   Scales likely = mostLikely(evidence);
   Innovations found;
   filter(evidence, likely, &found);

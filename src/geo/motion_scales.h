@@ -30,7 +30,9 @@ struct MotionScales {
 /// Maximum likelihood of the innovations of a constant-velocity filter over acceleration density and noise (Student's
 /// t, so that outliers decide little). Standing or cruising for most of the time would then make bends improbable: the
 /// density is enlarged until the moving nodes fit. `nodes`: in order of time, at least one. `believed`: those to learn
-/// from; empty: all. `least_density`: of the acceleration.
-MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector<bool>& believed, double least_density);
+/// from; empty: all. `least_density`: of the acceleration. `steps`: nodes before which the receiver's error changes at
+/// once, which is no motion; empty: none.
+MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector<bool>& believed, double least_density,
+                         const std::vector<bool>& steps = {});
 
 }  // namespace visual_localization

@@ -16,7 +16,7 @@ constexpr double kPerNode = 1.0;    // each node in it, more than what believing
 constexpr double kPerSecond = 1.0;  // and each second of it beyond kShort_s
 constexpr double kShort_s = 20.0;
 constexpr double kAtAnEnd = 8.0;     // more where the recording begins or ends
-constexpr double kStep = 9.0;        // a step of the receiver's error
+constexpr double kStep = 9.0;        // a step of the receiver's error that the fixes do not show
 constexpr double kPerLogStep = 1.5;  // and by its size: large ones are rare
 constexpr double kUsualStep_m = 1.5;
 constexpr double kMostForUncertain = 12.0;  // a prediction over a long stretch says little
@@ -34,8 +34,13 @@ struct Survivor {
 class Selection {
  public:
   Selection(const std::vector<PathSample>& nodes, const MotionScales& scales, const SpeedPrior& speeds,
-            double max_bridge_s)
-      : nodes_(nodes), scales_(scales), speeds_(speeds), max_bridge_s_(max_bridge_s), survivors_(nodes.size()) {
+            double max_bridge_s, const std::vector<bool>& steps)
+      : nodes_(nodes),
+        scales_(scales),
+        speeds_(speeds),
+        max_bridge_s_(max_bridge_s),
+        steps_(steps),
+        survivors_(nodes.size()) {
     for (const double mean_cost : scales.mean_cost) skipped_.push_back(skipped_.back() + mean_cost + kPerNode);
   }
 
@@ -90,14 +95,12 @@ class Selection {
     add(next, j);
   }
 
-  /// The velocity is kept.
   void addStep(Survivor next, std::size_t j) {
     const double steps = (nodes_[j].position_m - next.state.position_m).norm() / kUsualStep_m;
-    next.cost += scales_.mean_cost[j] + kStep + kPerLogStep * std::log1p(steps * steps);
+    next.cost += scales_.mean_cost[j] + kPerLogStep * std::log1p(steps * steps);
+    if (steps_.empty() || !steps_[j]) next.cost += kStep;
     next.steps = true;
-    next.state.position_m = nodes_[j].position_m;
-    next.state.position_var = scales_.noise_m * scales_.noise_m;
-    next.state.covariance = 0.0;
+    next.state.stepTo(nodes_[j].position_m, scales_.noise_m * scales_.noise_m);
     add(next, j);
   }
 
@@ -149,6 +152,7 @@ class Selection {
   const MotionScales& scales_;
   const SpeedPrior& speeds_;
   double max_bridge_s_;
+  const std::vector<bool>& steps_;
   std::vector<std::vector<Survivor>> survivors_;
   std::vector<double> skipped_{0.0};  ///< cost of leaving out all nodes before
 };
@@ -156,9 +160,9 @@ class Selection {
 }  // namespace
 
 std::vector<NodeVerdict> selectNodes(const std::vector<PathSample>& nodes, const MotionScales& scales,
-                                     const SpeedPrior& speeds, double max_bridge_s) {
+                                     const SpeedPrior& speeds, double max_bridge_s, const std::vector<bool>& steps) {
   std::vector<NodeVerdict> verdicts(nodes.size(), NodeVerdict::kLeftOut);
-  Selection selection(nodes, scales, speeds, max_bridge_s);
+  Selection selection(nodes, scales, speeds, max_bridge_s, steps);
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= nodes.size(); ++i) {
     if (i < nodes.size() && nodes[i].time_s - nodes[i - 1].time_s <= max_bridge_s) continue;

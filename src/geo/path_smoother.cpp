@@ -25,8 +25,6 @@ struct Transition {
   Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
 };
 
-constexpr double kMuch = 5.0;  // as a ratio of what a receiver promises
-
 double squareOf(double value) { return value * value; }
 
 Transition transition(const Measurement& from, const Measurement& to, double density) {
@@ -117,7 +115,7 @@ void splitByPromises(std::vector<Measurement>& measurements) {
   double promised_m = measurements.front().offset_m;
   for (Measurement& measurement : measurements) {
     const double ratio = measurement.offset_m / promised_m;
-    if (ratio > kMuch || ratio < 1.0 / kMuch) measurement.steps = true;
+    if (ratio > kOtherPromise || ratio < 1.0 / kOtherPromise) measurement.steps = true;
     if (measurement.steps) promised_m = measurement.offset_m;
   }
   std::size_t end = 0;
@@ -158,7 +156,38 @@ bool arePromisedAlike(const std::vector<Stretch>& stretches, const std::vector<M
     least_m = std::min(least_m, said[stretch.begin].offset_m);
     most_m = std::max(most_m, said[stretch.begin].offset_m);
   }
-  return most_m <= kMuch * least_m;
+  return most_m <= kOtherPromise * least_m;
+}
+
+/// Whether the receiver comes back to an error that it left: then it is known which of its errors is aside.
+bool comesBack(const std::vector<Stretch>& stretches) {
+  constexpr double kNear = 0.5;  // of the smallest step in between
+  for (std::size_t i = 0; i + 2 < stretches.size(); ++i) {
+    double smallest_m = (stretches[i + 1].offset_m - stretches[i].offset_m).norm();
+    for (std::size_t k = i + 2; k < stretches.size(); ++k) {
+      smallest_m = std::min(smallest_m, (stretches[k].offset_m - stretches[k - 1].offset_m).norm());
+      if ((stretches[k].offset_m - stretches[i].offset_m).norm() < kNear * smallest_m) return true;
+    }
+  }
+  return false;
+}
+
+/// Whether it is known which of the errors are aside: by promises, as the receiver comes back, or by how long they
+/// last.
+bool tellsAside(const std::vector<Stretch>& stretches, const std::vector<Measurement>& said) {
+  constexpr double kMostOfTheTime = 0.75;
+  double longest_s = 0.0;
+  double all_s = 0.0;
+  for (const Stretch& stretch : stretches) {
+    longest_s = std::max(longest_s, stretch.duration_s);
+    all_s += stretch.duration_s;
+  }
+  return longest_s > kMostOfTheTime * all_s || !arePromisedAlike(stretches, said) || comesBack(stretches);
+}
+
+std::vector<Measurement> withoutSteps(std::vector<Measurement> measurements) {
+  for (Measurement& measurement : measurements) measurement.steps = false;
+  return measurements;
 }
 
 /// That whose error lies in the middle of all (geometric median), by how long they last.
@@ -236,6 +265,7 @@ std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const M
   }
   if (steps) weighStretches(said, {}, measurements);
   std::vector<PathState> path = smooth(measurements, motion);
+  if (steps && !tellsAside(stretchesOf(said, path), said)) return smoothPath(withoutSteps(said), motion);
   for (int iteration = 0; (doubts || steps) && iteration < kIterations; ++iteration) {
     if (steps) weighStretches(said, path, measurements);
     for (std::size_t i = 0; i < said.size(); ++i) {

@@ -16,6 +16,9 @@ struct Measurement {
   bool doubtful = false;
 };
 
+/// By such a ratio of what it promises a receiver's error is another one.
+constexpr double kOtherPromise = 5.0;
+
 /// How a robot moves.
 struct Motion {
   double acceleration_density = 0.0;  ///< m^2/s^3
@@ -35,7 +38,9 @@ struct PathState {
 
 /// Fixed-interval smoother (Rauch, Tung, Striebel) over position, velocity and an error of the receiver that lasts; the
 /// acceleration is white. The lasting error is another one behind a step, and where the receiver comes to promise much
-/// more or less. `measurements`: at least one, in strictly increasing order of time.
+/// more or less. Steps of one that promises alike throughout, and neither comes back to an error nor keeps one most of
+/// the time, do not count: nothing tells which of its errors is aside. `measurements`: at least one, in strictly
+/// increasing order of time.
 std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const Motion& motion);
 
 /// Between two states the path of least acceleration; where the way is much shorter than their velocities ask for, it
