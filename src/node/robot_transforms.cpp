@@ -40,6 +40,7 @@ void RobotTransforms::add(geometry_msgs::TransformStamped transform, bool is_sta
   const bool is_on_way = way_.count(transform.child_frame_id) != 0;
   if (!is_on_way && !is_static) return;
   if (!joinsTwoFrames(transform)) throw std::invalid_argument("it does not join two frames by a rigid motion");
+  if (!isWithinReach(transform.transform)) throw std::invalid_argument("it is not finite, or leads farther than 1e9 m");
   if (!is_static) requireUsableStamp(transform.header.stamp);
   if (is_static) {
     if (statics_.size() >= kMostFrames && statics_.count(transform.child_frame_id) == 0) {

@@ -22,6 +22,7 @@ std::string troubleOf(const geometry_msgs::Transform& transform) {
   const Eigen::Vector3d translation(transform.translation.x, transform.translation.y, transform.translation.z);
   const double norm = rotationOf(transform).norm();
   if (!translation.allFinite() || !std::isfinite(norm)) return "is not finite";
+  if (!isWithinReach(transform)) return "leads farther than 1e9 m";
   if (norm == 0.0) return "has a quaternion of zeros";
   if (std::abs(norm - 1.0) > kUnitTolerance) return "has a quaternion that is not of unit length";
   return "";
@@ -41,6 +42,12 @@ bool same(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
 }
 
 }  // namespace
+
+bool isWithinReach(const geometry_msgs::Transform& transform) {
+  constexpr double kFarthest_m = 1e9;  // farther than any frame of a robot on the earth, and sums of it stay finite
+  const auto isNear = [](double metres) { return std::abs(metres) <= kFarthest_m; };
+  return isNear(transform.translation.x) && isNear(transform.translation.y) && isNear(transform.translation.z);
+}
 
 std::string withoutSlash(const std::string& frame) {
   return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;

@@ -23,6 +23,9 @@ constexpr std::size_t kMostFrames = 4096;
 /// By names of a length that names have.
 bool joinsTwoFrames(const geometry_msgs::TransformStamped& transform);
 
+/// Finite, and no farther than a robot's frames can be.
+bool isWithinReach(const geometry_msgs::Transform& transform);
+
 /// What does not move on a robot, by /tf_static and by what never changes in /tf. Unlike a buffer of tf2 it knows why a
 /// frame has no place: nothing that contradicts itself is believed. Not thread-safe.
 class StaticTransforms {

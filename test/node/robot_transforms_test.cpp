@@ -107,7 +107,11 @@ TEST_F(RobotTransformsTest, AStampNearTheEndOfTimeIsLeftOut) {
 }
 
 TEST_F(RobotTransformsTest, WhatIsNoTransformIsLeftOut) {
-  move("odom", "base_link", std::nan(""), now_);
+  for (const double x_m : {std::nan(""), HUGE_VAL, 1e185, -2e9}) {
+    move("odom", "base_link", x_m, now_);
+    fix("odom", "base_link", x_m);
+    EXPECT_THAT(lines_.back(), testing::HasSubstr("1e9 m")) << x_m;
+  }
   move("base_link", "base_link", 1.0, now_);
   move("", "base_link", 1.0, now_);
   move(std::string(1000, 'x'), "base_link", 1.0, now_);
