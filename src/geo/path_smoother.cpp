@@ -185,11 +185,6 @@ bool tellsAside(const std::vector<Stretch>& stretches, const std::vector<Measure
   return longest_s > kMostOfTheTime * all_s || !arePromisedAlike(stretches, said) || comesBack(stretches);
 }
 
-std::vector<Measurement> withoutSteps(std::vector<Measurement> measurements) {
-  for (Measurement& measurement : measurements) measurement.steps = false;
-  return measurements;
-}
-
 /// That whose error lies in the middle of all (geometric median), by how long they last.
 const Stretch& middleOf(const std::vector<Stretch>& stretches) {
   const auto distances = [&](const Stretch& stretch) {
@@ -255,8 +250,8 @@ std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const M
   constexpr int kIterations = 4;
   constexpr double kNoWeight = 1e3;
   splitByPromises(measurements);
-  const std::vector<Measurement> said = measurements;
-  const bool steps = endOfStretch(said, 0) < said.size();
+  std::vector<Measurement> said = measurements;
+  bool steps = endOfStretch(said, 0) < said.size();
   bool doubts = false;
   for (Measurement& measurement : measurements) {
     if (!measurement.doubtful) continue;
@@ -265,7 +260,14 @@ std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const M
   }
   if (steps) weighStretches(said, {}, measurements);
   std::vector<PathState> path = smooth(measurements, motion);
-  if (steps && !tellsAside(stretchesOf(said, path), said)) return smoothPath(withoutSteps(said), motion);
+  if (steps && !tellsAside(stretchesOf(said, path), said)) {
+    steps = false;
+    for (std::size_t i = 0; i < said.size(); ++i) {
+      said[i].steps = measurements[i].steps = false;
+      measurements[i].offset_m = said[i].offset_m;
+    }
+    path = smooth(measurements, motion);
+  }
   for (int iteration = 0; (doubts || steps) && iteration < kIterations; ++iteration) {
     if (steps) weighStretches(said, path, measurements);
     for (std::size_t i = 0; i < said.size(); ++i) {

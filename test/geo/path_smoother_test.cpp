@@ -74,6 +74,19 @@ TEST(PathSmoother, PromisesThatVaryALittleAreNoSteps) {
   }
 }
 
+TEST(PathSmoother, AStepThatNothingTellsAsideIsBelieved) {
+  for (const bool creeps : {false, true}) {  // a promise that is another one by its first value alone
+    std::vector<Measurement> measurements = eastward(60, 0.02);
+    for (std::size_t i = 30; i < 60; ++i) measurements[i].sample.position_m.y() = 3.0;
+    for (std::size_t i = 1; creeps && i < 60; ++i) measurements[i].offset_m = i < 30 ? 4.9 : 5.1;
+    measurements[30].steps = true;
+    const std::vector<PathState> path = smoothPath(measurements, {0.1, 1.0});
+    for (const std::size_t i : {0U, 15U, 25U, 35U, 45U, 59U}) {
+      EXPECT_LT((path[i].position_m - measurements[i].sample.position_m).norm(), 0.3) << creeps << ", " << i;
+    }
+  }
+}
+
 TEST(PathSmoother, ADoubtfulMeasurementOnlyBoundsWhatIsNotKnown) {
   std::vector<Measurement> known = eastward(30);
   known[15].doubtful = true;
