@@ -20,7 +20,7 @@ using Spectrum = std::vector<std::complex<double>>;
 constexpr double kLeastSigmas = 7.0;       ///< against the errors that are left once the turns are explained
 constexpr double kLeastBlindSigmas = 4.5;  ///< against the path's own spectrum, in which the turns themselves count
 /// Without the one turn that says most: a swerve looks like a jump of the fixes. Drives of their own have 6.9 to 27
-/// sigmas without it, two thirds of all or more; foreign ones with jumps at most 4.6, and a quarter.
+/// sigmas without it, two thirds of all or more; 325 foreign ones with jumps at most 4.6, and 0.36.
 constexpr double kLeastSigmasOfOthers = 5.5;
 constexpr double kLeastShareOfOthers = 0.5;
 constexpr double kOneTurn_s = 6.0;
