@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/numbers.h"
+#include "geo/receiver_steps.h"
 
 namespace visual_localization {
 namespace {
@@ -232,21 +233,17 @@ void FixJudge::judgeFixes(const Part& part, const std::vector<PathState>& path) 
 /// Nodes between two steps whose error is not the usual one and larger than their receiver promises, where it promises
 /// the same throughout. Their relative positions shape the path all the same.
 void FixJudge::findAside(const Part& part, const std::vector<PathState>& path) {
-  std::vector<double> east_m;
-  std::vector<double> north_m;
   constexpr double kPromise = 2.45;  // sigmas: 95 % in the plane
+  std::vector<Eigen::Vector2d> offsets_m;
   double least_m = std::numeric_limits<double>::infinity();
   double most_m = 0.0;
-  for (const PathState& state : path) {
-    east_m.push_back(state.offset_m.x());
-    north_m.push_back(state.offset_m.y());
-  }
+  for (const PathState& state : path) offsets_m.push_back(state.offset_m);
   for (std::size_t n = part.begin; n < part.end; ++n) {
     least_m = std::min(least_m, offsetOf(nodes_[n].sigma_m));
     most_m = std::max(most_m, offsetOf(nodes_[n].sigma_m));
   }
   if (most_m > kOtherPromise * least_m) return;
-  const Eigen::Vector2d usual_m(median(std::move(east_m)), median(std::move(north_m)));
+  const Eigen::Vector2d usual_m = medianOf(offsets_m);
   auto state = path.begin();
   for (std::size_t n = part.begin; n < part.end; ++n) {
     while (state + 1 != path.end() && state->time_s < samples_[n].time_s) ++state;

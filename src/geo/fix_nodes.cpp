@@ -6,7 +6,6 @@
 
 #include "base/numbers.h"
 #include "base/time.h"
-#include "geo/motion_scales.h"
 
 namespace visual_localization {
 namespace {
@@ -142,88 +141,6 @@ double typicalInterval(const std::vector<PathSample>& samples) {
   return median(std::move(intervals));
 }
 
-namespace {
-
-/// Fixes on either side of a step that tell it.
-constexpr std::size_t kBeside = 4;
-
-/// Of the fixes around the one at `i`, axis by axis the median.
-Eigen::Vector2d velocityAround(const std::vector<PathSample>& samples, std::size_t i) {
-  std::vector<double> east;
-  std::vector<double> north;
-  for (std::size_t k = i - kBeside + 1; k < i + kBeside; ++k) {
-    const double elapsed_s = samples[k].time_s - samples[k - 1].time_s;
-    east.push_back((samples[k].position_m - samples[k - 1].position_m).x() / elapsed_s);
-    north.push_back((samples[k].position_m - samples[k - 1].position_m).y() / elapsed_s);
-  }
-  return {median(std::move(east)), median(std::move(north))};
-}
-
-/// By how far the fixes from the one at `i` on are aside of those before it, for a robot that keeps its velocity.
-double asideAt(const std::vector<PathSample>& samples, std::size_t i) {
-  const Eigen::Vector2d velocity_mps = velocityAround(samples, i);
-  const auto middleFrom = [&](std::size_t begin) {
-    std::vector<double> east;
-    std::vector<double> north;
-    for (std::size_t k = begin; k < begin + kBeside; ++k) {
-      const double elapsed_s = samples[k].time_s - samples[i].time_s;
-      east.push_back(samples[k].position_m.x() - elapsed_s * velocity_mps.x());
-      north.push_back(samples[k].position_m.y() - elapsed_s * velocity_mps.y());
-    }
-    return Eigen::Vector2d(median(std::move(east)), median(std::move(north)));
-  };
-  return (middleFrom(i) - middleFrom(i - kBeside)).norm();
-}
-
-/// Medians see a step also from a fix or two beside it: the fix that is farthest from the one before.
-std::size_t exactly(const std::vector<PathSample>& samples, std::size_t i) {
-  const Eigen::Vector2d velocity_mps = velocityAround(samples, i);
-  const auto jump_m = [&](std::size_t k) {
-    const double elapsed_s = samples[k].time_s - samples[k - 1].time_s;
-    return (samples[k].position_m - samples[k - 1].position_m - elapsed_s * velocity_mps).norm();
-  };
-  std::size_t best = i;
-  for (std::size_t k = i - kBeside / 2; k <= i + kBeside / 2 && k < samples.size(); ++k) {
-    if (jump_m(k) > jump_m(best)) best = k;
-  }
-  return best;
-}
-
-}  // namespace
-
-std::vector<std::size_t> stepsIn(const UsableFixes& usable) {
-  constexpr double kLongest_s = 1.0;  // of kBeside fixes: a robot turns and brakes in longer ones
-  constexpr double kSigmas = 8.0;
-  constexpr double kMost_mps2 = 10.0;  // of a robot
-  constexpr std::size_t kAround = 50;
-  const std::vector<PathSample>& samples = usable.samples;
-  std::vector<double> aside_m(samples.size(), 0.0);
-  for (std::size_t i = kBeside; i + kBeside <= samples.size(); ++i) {
-    const bool is_fast = samples[i].time_s - samples[i - kBeside].time_s <= kLongest_s &&
-                         samples[i + kBeside - 1].time_s - samples[i - 1].time_s <= kLongest_s;
-    if (is_fast) aside_m[i] = asideAt(samples, i);
-  }
-  const auto around = [&](std::size_t i, std::size_t reach) {
-    const auto begin = aside_m.begin() + static_cast<std::ptrdiff_t>(i - std::min(i, reach));
-    return std::vector<double>(begin,
-                               aside_m.begin() + static_cast<std::ptrdiff_t>(std::min(i + reach + 1, aside_m.size())));
-  };
-  std::vector<std::size_t> steps;
-  const double usual_m = median(aside_m);
-  for (std::size_t i = kBeside; i + kBeside <= samples.size(); ++i) {
-    const double promised_m = usable.sigmas_m[i] > 0.0 ? usable.sigmas_m[i] : kUsualError_m;
-    const double half_s = 0.25 * (samples[i + kBeside - 1].time_s - samples[i - kBeside].time_s);
-    const double driven_m = 0.5 * kMost_mps2 * half_s * half_s;
-    if (aside_m[i] <= std::max({promised_m, driven_m, kSigmas / kMedianOfPlane * usual_m})) continue;
-    const std::vector<double> beside = around(i, kBeside);
-    if (*std::max_element(beside.begin(), beside.end()) > aside_m[i]) continue;
-    if (aside_m[i] <= kSigmas / kMedianOfPlane * median(around(i, kAround))) continue;
-    const std::size_t step = exactly(samples, i);
-    if (steps.empty() || step > steps.back()) steps.push_back(step);
-  }
-  return steps;
-}
-
 std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::vector<std::size_t>& steps) {
   std::vector<Node> nodes;
   double node_end_s = 0.0;
@@ -248,15 +165,23 @@ std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::v
 }
 
 PathSample medianOf(const std::vector<PathSample>& samples, const std::vector<std::size_t>& members) {
-  std::vector<double> time;
+  std::vector<double> times_s;
+  std::vector<Eigen::Vector2d> positions_m;
+  for (const std::size_t i : members) {
+    times_s.push_back(samples[i].time_s);
+    positions_m.push_back(samples[i].position_m);
+  }
+  return {median(std::move(times_s)), medianOf(positions_m)};
+}
+
+Eigen::Vector2d medianOf(const std::vector<Eigen::Vector2d>& vectors) {
   std::vector<double> east;
   std::vector<double> north;
-  for (const std::size_t i : members) {
-    time.push_back(samples[i].time_s);
-    east.push_back(samples[i].position_m.x());
-    north.push_back(samples[i].position_m.y());
+  for (const Eigen::Vector2d& vector : vectors) {
+    east.push_back(vector.x());
+    north.push_back(vector.y());
   }
-  return {median(std::move(time)), {median(std::move(east)), median(std::move(north))}};
+  return {median(std::move(east)), median(std::move(north))};
 }
 
 }  // namespace visual_localization

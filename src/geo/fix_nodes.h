@@ -33,15 +33,11 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
 /// Median of the times between fixes.
 double typicalInterval(const std::vector<PathSample>& samples);
 
-/// The first fixes behind steps of the receiver's error that no robot drives: four fixes or more within a second on
-/// either side differ by more than the receiver promises, than any robot accelerates, and than eight sigmas of what
-/// others do. Slow receivers show none.
-std::vector<std::size_t> stepsIn(const UsableFixes& usable);
-
 /// Nodes of about `node_s` seconds, none across one of `steps`.
 std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::vector<std::size_t>& steps);
 
 /// Median of some of the fixes, axis by axis.
 PathSample medianOf(const std::vector<PathSample>& samples, const std::vector<std::size_t>& members);
+Eigen::Vector2d medianOf(const std::vector<Eigen::Vector2d>& vectors);
 
 }  // namespace visual_localization

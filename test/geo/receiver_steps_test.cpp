@@ -1,10 +1,11 @@
+#include "geo/receiver_steps.h"
+
 #include <cmath>
 #include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "geo/fix_nodes.h"
 #include "test/geo/recorded_round.h"
 
 namespace visual_localization {

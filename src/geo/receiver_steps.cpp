@@ -1,0 +1,90 @@
+#include "geo/receiver_steps.h"
+
+#include <algorithm>
+
+#include "base/numbers.h"
+#include "geo/motion_scales.h"
+
+namespace visual_localization {
+namespace {
+
+/// Fixes on either side of a step that tell it.
+constexpr std::size_t kBeside = 4;
+
+Eigen::Vector2d velocityBefore(const std::vector<PathSample>& samples, std::size_t i) {
+  const double elapsed_s = samples[i].time_s - samples[i - 1].time_s;
+  return (samples[i].position_m - samples[i - 1].position_m) / elapsed_s;
+}
+
+/// Median of the fixes around the one at `i`.
+Eigen::Vector2d velocityAround(const std::vector<PathSample>& samples, std::size_t i) {
+  std::vector<Eigen::Vector2d> velocities_mps;
+  for (std::size_t k = i - kBeside + 1; k < i + kBeside; ++k) velocities_mps.push_back(velocityBefore(samples, k));
+  return medianOf(velocities_mps);
+}
+
+/// By how far the fixes from the one at `i` on are aside of those before it, for a robot that keeps its velocity.
+double asideAt(const std::vector<PathSample>& samples, std::size_t i) {
+  const Eigen::Vector2d velocity_mps = velocityAround(samples, i);
+  const auto middleFrom = [&](std::size_t begin) {
+    std::vector<Eigen::Vector2d> positions_m;
+    for (std::size_t k = begin; k < begin + kBeside; ++k) {
+      positions_m.emplace_back(samples[k].position_m - (samples[k].time_s - samples[i].time_s) * velocity_mps);
+    }
+    return medianOf(positions_m);
+  };
+  return (middleFrom(i) - middleFrom(i - kBeside)).norm();
+}
+
+/// Medians see a step also from a fix or two beside it: the fix that is farthest from the one before.
+std::size_t exactly(const std::vector<PathSample>& samples, std::size_t i) {
+  const Eigen::Vector2d velocity_mps = velocityAround(samples, i);
+  const auto jump_m = [&](std::size_t k) {
+    const double elapsed_s = samples[k].time_s - samples[k - 1].time_s;
+    return (samples[k].position_m - samples[k - 1].position_m - elapsed_s * velocity_mps).norm();
+  };
+  std::size_t best = i;
+  for (std::size_t k = i - kBeside / 2; k <= i + kBeside / 2 && k < samples.size(); ++k) {
+    if (jump_m(k) > jump_m(best)) best = k;
+  }
+  return best;
+}
+
+/// Values from `reach` before the one at `i` to as many behind it.
+std::vector<double> around(const std::vector<double>& values, std::size_t i, std::size_t reach) {
+  const std::size_t begin = i - std::min(i, reach);
+  const std::size_t end = std::min(i + reach + 1, values.size());
+  return {values.begin() + static_cast<std::ptrdiff_t>(begin), values.begin() + static_cast<std::ptrdiff_t>(end)};
+}
+
+}  // namespace
+
+std::vector<std::size_t> stepsIn(const UsableFixes& usable) {
+  constexpr double kLongest_s = 1.0;              // of kBeside fixes: a robot turns and brakes in longer ones
+  constexpr double kMost = 8.0 / kMedianOfPlane;  // of the usual median: eight sigmas
+  constexpr double kMost_mps2 = 10.0;             // of a robot
+  constexpr std::size_t kAround = 50;
+  const std::vector<PathSample>& samples = usable.samples;
+  std::vector<double> aside_m(samples.size(), 0.0);
+  for (std::size_t i = kBeside; i + kBeside <= samples.size(); ++i) {
+    const bool is_fast = samples[i].time_s - samples[i - kBeside].time_s <= kLongest_s &&
+                         samples[i + kBeside - 1].time_s - samples[i - 1].time_s <= kLongest_s;
+    if (is_fast) aside_m[i] = asideAt(samples, i);
+  }
+  std::vector<std::size_t> steps;
+  const double usual_m = median(aside_m);
+  for (std::size_t i = kBeside; i + kBeside <= samples.size(); ++i) {
+    const double promised_m = usable.sigmas_m[i] > 0.0 ? usable.sigmas_m[i] : kUsualError_m;
+    const double half_s = 0.25 * (samples[i + kBeside - 1].time_s - samples[i - kBeside].time_s);
+    const double driven_m = 0.5 * kMost_mps2 * half_s * half_s;
+    if (aside_m[i] <= std::max({promised_m, driven_m, kMost * usual_m})) continue;
+    const std::vector<double> beside_m = around(aside_m, i, kBeside);
+    if (*std::max_element(beside_m.begin(), beside_m.end()) > aside_m[i]) continue;
+    if (aside_m[i] <= kMost * median(around(aside_m, i, kAround))) continue;
+    const std::size_t step = exactly(samples, i);
+    if (steps.empty() || step > steps.back()) steps.push_back(step);
+  }
+  return steps;
+}
+
+}  // namespace visual_localization
