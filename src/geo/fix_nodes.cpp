@@ -141,6 +141,26 @@ double typicalInterval(const std::vector<PathSample>& samples) {
   return median(std::move(intervals));
 }
 
+double roundingOf(const std::vector<PathSample>& samples) {
+  constexpr double kNothing_m = 0.01;   // the frame of a large map is not quite straight
+  constexpr double kSmall = 0.1;        // of the changes
+  constexpr double kLeastShare = 0.05;  // fewer changes are steps and turns
+  constexpr double kOfUniform = 1.0 / 12.0;
+  double variance = 0.0;
+  for (const int axis : {0, 1}) {
+    std::vector<double> changes_m;  // of the way from fix to fix
+    for (std::size_t i = 2; i < samples.size(); ++i) {
+      const double change_m =
+          samples[i].position_m[axis] - 2.0 * samples[i - 1].position_m[axis] + samples[i - 2].position_m[axis];
+      if (std::abs(change_m) > kNothing_m) changes_m.push_back(std::abs(change_m));
+    }
+    if (changes_m.empty() || static_cast<double>(changes_m.size()) < kLeastShare * static_cast<double>(samples.size()))
+      continue;
+    variance += kOfUniform * std::pow(nearestRank(changes_m, kSmall), 2) / 2.0;
+  }
+  return std::sqrt(variance);
+}
+
 std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::vector<std::size_t>& steps) {
   std::vector<Node> nodes;
   double node_end_s = 0.0;

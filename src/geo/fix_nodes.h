@@ -33,6 +33,9 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
 /// Median of the times between fixes.
 double typicalInterval(const std::vector<PathSample>& samples);
 
+/// What rounding of the coordinates leaves along one axis: a standard deviation. Next to nothing for exact ones.
+double roundingOf(const std::vector<PathSample>& samples);
+
 /// Nodes of about `node_s` seconds, none across one of `steps`.
 std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::vector<std::size_t>& steps);
 

@@ -70,7 +70,7 @@ double filter(const Evidence& evidence, const Scales& scales, Innovations* found
   return cost;
 }
 
-Scales mostLikely(const Evidence& evidence) {
+Scales mostLikely(const Evidence& evidence, double least_noise_m) {
   constexpr double kLeastNoise_m = 0.01;
   constexpr double kMostNoise_m = 60.0;
   constexpr double kLeastDensity = 1e-4;
@@ -84,13 +84,15 @@ Scales mostLikely(const Evidence& evidence) {
     best = scales;
   };
   for (double density = kLeastDensity; density < kMostDensity; density *= 4.0) {
-    for (double noise_m = kLeastNoise_m; noise_m < kMostNoise_m; noise_m *= 2.5) consider({density, noise_m});
+    for (double noise_m = kLeastNoise_m; noise_m < kMostNoise_m; noise_m *= 2.5) {
+      consider({density, std::max(least_noise_m, noise_m)});
+    }
   }
   for (const double finer : {2.0, 1.4}) {
     const Scales middle = best;
     for (const double density : {middle.density / finer, middle.density, middle.density * finer}) {
       for (const double factor : {1.0 / std::sqrt(finer), 1.0, std::sqrt(finer)}) {
-        consider({density, std::max(kLeastNoise_m, factor * middle.noise_m)});
+        consider({density, std::max({kLeastNoise_m, least_noise_m, factor * middle.noise_m})});
       }
     }
   }
@@ -200,7 +202,7 @@ double studentWeight(double squared) {
 }
 
 MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector<bool>& believed, double least_density,
-                         const std::vector<bool>& steps) {
+                         const std::vector<bool>& steps, double least_noise_m) {
   constexpr double kLeastMoving = 0.05;
   constexpr double kFits = 2.0;
   constexpr int kMostSteps = 8;
@@ -208,7 +210,7 @@ MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector
   MotionScales scales;
   const std::vector<bool> moving = findMotion(nodes, scales.usual_mps);
   const Evidence evidence{nodes, believed, scales.usual_mps, steps};
-  Scales likely = mostLikely(evidence);
+  Scales likely = mostLikely(evidence, least_noise_m);
   Innovations found;
   filter(evidence, likely, &found);
   for (int step = 0; step < kMostSteps; ++step) {

@@ -31,8 +31,8 @@ struct MotionScales {
 /// t, so that outliers decide little). Standing or cruising for most of the time would then make bends improbable: the
 /// density is enlarged until the moving nodes fit. `nodes`: in order of time, at least one. `believed`: those to learn
 /// from; empty: all. `least_density`: of the acceleration. `steps`: nodes before which the receiver's error changes at
-/// once, which is no motion; empty: none.
+/// once, which is no motion; empty: none. `least_noise_m`: what the receiver rounds to leaves so much.
 MotionScales learnScales(const std::vector<PathSample>& nodes, const std::vector<bool>& believed, double least_density,
-                         const std::vector<bool>& steps = {});
+                         const std::vector<bool>& steps = {}, double least_noise_m = 0.0);
 
 }  // namespace visual_localization

@@ -23,17 +23,30 @@ Eigen::Vector2d velocityAround(const std::vector<PathSample>& samples, std::size
   return medianOf(velocities_mps);
 }
 
-/// By how far the fixes from the one at `i` on are aside of those before it, for a robot that keeps its velocity.
-double asideAt(const std::vector<PathSample>& samples, std::size_t i) {
+/// Fixes before the one at `i` and from it on, as if a robot that keeps its velocity had stood there.
+struct Sides {
+  std::vector<Eigen::Vector2d> before_m;
+  std::vector<Eigen::Vector2d> behind_m;
+
+  double apart_m() const { return (medianOf(behind_m) - medianOf(before_m)).norm(); }
+};
+
+Sides sidesOf(const std::vector<PathSample>& samples, std::size_t i) {
   const Eigen::Vector2d velocity_mps = velocityAround(samples, i);
-  const auto middleFrom = [&](std::size_t begin) {
-    std::vector<Eigen::Vector2d> positions_m;
-    for (std::size_t k = begin; k < begin + kBeside; ++k) {
-      positions_m.emplace_back(samples[k].position_m - (samples[k].time_s - samples[i].time_s) * velocity_mps);
-    }
-    return medianOf(positions_m);
-  };
-  return (middleFrom(i) - middleFrom(i - kBeside)).norm();
+  Sides sides;
+  for (std::size_t k = i - kBeside; k < i + kBeside; ++k) {
+    std::vector<Eigen::Vector2d>& side_m = k < i ? sides.before_m : sides.behind_m;
+    side_m.emplace_back(samples[k].position_m - (samples[k].time_s - samples[i].time_s) * velocity_mps);
+  }
+  return sides;
+}
+
+/// Whether all but one are nearer than `most_m` to their median: others are spikes.
+bool agree(const std::vector<Eigen::Vector2d>& positions_m, double most_m) {
+  const Eigen::Vector2d middle_m = medianOf(positions_m);
+  return std::count_if(positions_m.begin(), positions_m.end(), [&](const Eigen::Vector2d& position_m) {
+           return (position_m - middle_m).norm() >= most_m;
+         }) <= 1;
 }
 
 /// Medians see a step also from a fix or two beside it: the fix that is farthest from the one before.
@@ -69,18 +82,20 @@ std::vector<std::size_t> stepsIn(const UsableFixes& usable) {
   for (std::size_t i = kBeside; i + kBeside <= samples.size(); ++i) {
     const bool is_fast = samples[i].time_s - samples[i - kBeside].time_s <= kLongest_s &&
                          samples[i + kBeside - 1].time_s - samples[i - 1].time_s <= kLongest_s;
-    if (is_fast) aside_m[i] = asideAt(samples, i);
+    if (is_fast) aside_m[i] = sidesOf(samples, i).apart_m();
   }
   std::vector<std::size_t> steps;
-  const double usual_m = median(aside_m);
+  const double usual_m = std::max(median(aside_m), kMedianOfPlane * roundingOf(samples));
   for (std::size_t i = kBeside; i + kBeside <= samples.size(); ++i) {
-    const double promised_m = usable.sigmas_m[i] > 0.0 ? usable.sigmas_m[i] : kUsualError_m;
+    const double promised_m = usable.sigmas_m[i];
     const double half_s = 0.25 * (samples[i + kBeside - 1].time_s - samples[i - kBeside].time_s);
     const double driven_m = 0.5 * kMost_mps2 * half_s * half_s;
     if (aside_m[i] <= std::max({promised_m, driven_m, kMost * usual_m})) continue;
     const std::vector<double> beside_m = around(aside_m, i, kBeside);
     if (*std::max_element(beside_m.begin(), beside_m.end()) > aside_m[i]) continue;
     if (aside_m[i] <= kMost * median(around(aside_m, i, kAround))) continue;
+    const Sides sides = sidesOf(samples, i);
+    if (!agree(sides.before_m, 0.5 * aside_m[i]) || !agree(sides.behind_m, 0.5 * aside_m[i])) continue;
     const std::size_t step = exactly(samples, i);
     if (steps.empty() || step > steps.back()) steps.push_back(step);
   }

@@ -48,6 +48,12 @@ TEST(LearnScales, FindsTheScalesOfASimulatedRecording) {
   }
 }
 
+TEST(LearnScales, RoundingLeavesNoise) {
+  const std::vector<PathSample> nodes = simulated(0.01, 0.0, 200);
+  EXPECT_LT(learnScales(nodes, {}, 0.0).noise_m, 0.1);
+  EXPECT_GE(learnScales(nodes, {}, 0.0, {}, 0.3).noise_m, 0.3);
+}
+
 TEST(LearnScales, OutliersDecideLittle) {
   std::vector<PathSample> nodes = simulated(0.01, 0.1, 600);
   for (std::size_t i = 10; i < nodes.size(); i += 20) nodes[i].position_m.y() += 1e5;

@@ -56,6 +56,7 @@ TEST(StepsIn, AreNeitherSpikesNorWhatARobotDrives) {
   const UsableFixes fixes = fixesOf(road, 5.0, 0.05);
   EXPECT_THAT(stepsIn(fixes), IsEmpty());
   EXPECT_THAT(stepsIn(shifted(fixes, 200, 201, {0.0, 40.0})), IsEmpty());
+  EXPECT_THAT(stepsIn(shifted(shifted(fixes, 200, 201, {0.0, 40.0}), 202, 203, {5.0, 40.0})), IsEmpty());
   const Path brakes = [](double time_s) {  // from 20 m/s, with 9 m/s^2, and drives off again at once
     const double braked_s = std::clamp(time_s - 60.0, 0.0, 20.0 / 9.0);
     const double stood_s = std::max(0.0, time_s - 60.0 - 20.0 / 9.0);
