@@ -7,27 +7,39 @@
 
 #include <Eigen/Cholesky>
 
-#include "base/numbers.h"
-#include "geo/motion_scales.h"
+#include "geo/lasting_errors.h"
 
 namespace visual_localization {
 namespace {
 
-/// Position, velocity and lasting error: one column an axis, and the covariance that both axes share.
+/// Position, velocity, lasting error and that of what is aside: one column an axis, and the covariance that both axes
+/// share.
 struct State {
-  Eigen::Matrix<double, 3, 2> mean = Eigen::Matrix<double, 3, 2>::Zero();
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 4, 2> mean = Eigen::Matrix<double, 4, 2>::Zero();
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
 };
 
 /// From one measurement to the next.
 struct Transition {
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  Eigen::Matrix4d noise = Eigen::Matrix4d::Zero();
+};
+
+/// What is known of the error of a measurement that is aside.
+struct Aside {
+  double sigma_m = 0.0;  ///< along one axis
+  double density = 0.0;  ///< of its change, m^2/s
 };
 
 double squareOf(double value) { return value * value; }
 
-Transition transition(const Measurement& from, const Measurement& to, double density) {
+/// Of the change of an error of this size: of multipath, which is another one after about a minute.
+double densityOf(double sigma_m) {
+  constexpr double kLasts_s = 60.0;
+  return 2.0 / kLasts_s * squareOf(sigma_m);
+}
+
+Transition transition(const Measurement& from, const Measurement& to, const Aside& aside, double density) {
   const double elapsed_s = to.sample.time_s - from.sample.time_s;
   Transition found;
   found.matrix(0, 1) = elapsed_s;
@@ -38,6 +50,8 @@ Transition transition(const Measurement& from, const Measurement& to, double den
     found.matrix(2, 2) = 0.0;
     found.noise(2, 2) = squareOf(to.offset_m);
   }
+  if (!to.aside || !from.aside) found.matrix(3, 3) = 0.0;
+  if (to.aside) found.noise(3, 3) = from.aside ? aside.density * elapsed_s : squareOf(aside.sigma_m);
   return found;
 }
 
@@ -46,22 +60,22 @@ State startAt(const Measurement& first, double usual_mps) {
   State state;
   state.mean.row(0) = first.sample.position_m.transpose();
   state.covariance.diagonal() << squareOf(kAnywhere * (first.offset_m + first.white_m)), squareOf(usual_mps),
-      squareOf(first.offset_m);
+      squareOf(first.offset_m), 0.0;
   return state;
 }
 
 void update(const Measurement& measurement, State& state) {
-  const Eigen::RowVector3d seen(1.0, 0.0, 1.0);
-  const Eigen::Vector3d shared = state.covariance * seen.transpose();
-  const Eigen::Vector3d gain = shared / (seen * shared + squareOf(measurement.white_m));
+  const Eigen::RowVector4d seen(1.0, 0.0, 1.0, measurement.aside ? 1.0 : 0.0);
+  const Eigen::Vector4d shared = state.covariance * seen.transpose();
+  const Eigen::Vector4d gain = shared / (seen * shared + squareOf(measurement.white_m));
   state.mean += gain * (measurement.sample.position_m.transpose() - seen * state.mean);
-  const Eigen::Matrix3d rest = Eigen::Matrix3d::Identity() - gain * seen;
+  const Eigen::Matrix4d rest = Eigen::Matrix4d::Identity() - gain * seen;
   state.covariance =
       rest * state.covariance * rest.transpose() + squareOf(measurement.white_m) * gain * gain.transpose();
 }
 
 PathState pathState(double time_s, const State& state) {
-  const Eigen::Matrix3d& covariance = state.covariance;
+  const Eigen::Matrix4d& covariance = state.covariance;
   PathState at;
   at.time_s = time_s;
   at.position_m = state.mean.row(0);
@@ -73,7 +87,8 @@ PathState pathState(double time_s, const State& state) {
   return at;
 }
 
-std::vector<PathState> smooth(const std::vector<Measurement>& measurements, const Motion& motion) {
+std::vector<PathState> smooth(const std::vector<Measurement>& measurements, const std::vector<Aside>& asides,
+                              const Motion& motion) {
   const std::size_t count = measurements.size();
   std::vector<State> predicted(count);
   std::vector<State> filtered(count);
@@ -82,8 +97,8 @@ std::vector<PathState> smooth(const std::vector<Measurement>& measurements, cons
     if (i == 0) {
       predicted[0] = startAt(measurements[0], motion.usual_mps);
     } else {
-      transitions[i] = transition(measurements[i - 1], measurements[i], motion.acceleration_density);
-      const Eigen::Matrix3d& matrix = transitions[i].matrix;
+      transitions[i] = transition(measurements[i - 1], measurements[i], asides[i], motion.acceleration_density);
+      const Eigen::Matrix4d& matrix = transitions[i].matrix;
       predicted[i].mean = matrix * filtered[i - 1].mean;
       predicted[i].covariance = matrix * filtered[i - 1].covariance * matrix.transpose() + transitions[i].noise;
     }
@@ -95,7 +110,7 @@ std::vector<PathState> smooth(const std::vector<Measurement>& measurements, cons
   path.back() = pathState(measurements.back().sample.time_s, smoothed);
   for (std::size_t i = count - 1; i-- > 0;) {
     const State& next = predicted[i + 1];
-    const Eigen::Matrix3d gain =
+    const Eigen::Matrix4d gain =
         next.covariance.ldlt().solve(transitions[i + 1].matrix * filtered[i].covariance).transpose();
     smoothed.mean = filtered[i].mean + gain * (smoothed.mean - next.mean);
     smoothed.covariance = filtered[i].covariance + gain * (smoothed.covariance - next.covariance) * gain.transpose();
@@ -104,136 +119,39 @@ std::vector<PathState> smooth(const std::vector<Measurement>& measurements, cons
   return path;
 }
 
-std::size_t endOfStretch(const std::vector<Measurement>& measurements, std::size_t begin) {
-  std::size_t end = begin + 1;
-  while (end < measurements.size() && !measurements[end].steps) ++end;
-  return end;
+/// At first nothing is known of how far they are aside.
+std::vector<Aside> unknownAsides(const std::vector<Measurement>& said) {
+  constexpr double kAnywhere = 1e3;
+  std::vector<Aside> asides(said.size());
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    if (said[i].aside) asides[i].sigma_m = kAnywhere * (said[i].white_m + said[i].offset_m);
+    asides[i].density = densityOf(asides[i].sigma_m);
+  }
+  return asides;
 }
 
-/// What a receiver promises varies a little all the time; where it changes much its error is another one.
-void splitByPromises(std::vector<Measurement>& measurements) {
-  double promised_m = measurements.front().offset_m;
-  for (Measurement& measurement : measurements) {
-    const double ratio = measurement.offset_m / promised_m;
-    if (ratio > kOtherPromise || ratio < 1.0 / kOtherPromise) measurement.steps = true;
-    if (measurement.steps) promised_m = measurement.offset_m;
-  }
-  std::size_t end = 0;
-  for (std::size_t begin = 0; begin < measurements.size(); begin = end) {
-    end = endOfStretch(measurements, begin);
-    std::vector<double> promises_m;
-    for (std::size_t i = begin; i < end; ++i) promises_m.push_back(measurements[i].offset_m);
-    const double usual_m = median(std::move(promises_m));
-    for (std::size_t i = begin; i < end; ++i) measurements[i].offset_m = usual_m;
-  }
-}
-
-/// Measurements between two steps, which share one lasting error.
-struct Stretch {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-  double duration_s = 0.0;
-  Eigen::Vector2d offset_m = Eigen::Vector2d::Zero();  ///< the lasting error as the path has it
-};
-
-std::vector<Stretch> stretchesOf(const std::vector<Measurement>& said, const std::vector<PathState>& path) {
-  const double interval_s = (said.back().sample.time_s - said.front().sample.time_s) / static_cast<double>(said.size());
-  std::vector<Stretch> stretches;
-  for (std::size_t begin = 0; begin < said.size(); begin = stretches.back().end) {
-    Stretch stretch{begin, endOfStretch(said, begin)};
-    stretch.duration_s = said[stretch.end - 1].sample.time_s - said[begin].sample.time_s + interval_s;
-    if (!path.empty()) stretch.offset_m = path[begin].offset_m;
-    stretches.push_back(stretch);
-  }
-  return stretches;
-}
-
-/// Whether the receiver promises about the same in all of them, so that its promises do not tell which are good.
-bool arePromisedAlike(const std::vector<Stretch>& stretches, const std::vector<Measurement>& said) {
-  double least_m = said.front().offset_m;
-  double most_m = least_m;
-  for (const Stretch& stretch : stretches) {
-    least_m = std::min(least_m, said[stretch.begin].offset_m);
-    most_m = std::max(most_m, said[stretch.begin].offset_m);
-  }
-  return most_m <= kOtherPromise * least_m;
-}
-
-/// Whether the receiver comes back to an error that it left: then it is known which of its errors is aside.
-bool comesBack(const std::vector<Stretch>& stretches) {
-  constexpr double kNear = 0.5;  // of the smallest step in between
-  for (std::size_t i = 0; i + 2 < stretches.size(); ++i) {
-    double smallest_m = (stretches[i + 1].offset_m - stretches[i].offset_m).norm();
-    for (std::size_t k = i + 2; k < stretches.size(); ++k) {
-      smallest_m = std::min(smallest_m, (stretches[k].offset_m - stretches[k - 1].offset_m).norm());
-      if ((stretches[k].offset_m - stretches[i].offset_m).norm() < kNear * smallest_m) return true;
-    }
-  }
-  return false;
-}
-
-/// Whether it is known which of the errors are aside: by promises, as the receiver comes back, or by how long they
-/// last.
-bool tellsAside(const std::vector<Stretch>& stretches, const std::vector<Measurement>& said) {
-  constexpr double kMostOfTheTime = 0.75;
-  double longest_s = 0.0;
-  double all_s = 0.0;
-  for (const Stretch& stretch : stretches) {
-    longest_s = std::max(longest_s, stretch.duration_s);
-    all_s += stretch.duration_s;
-  }
-  return longest_s > kMostOfTheTime * all_s || !arePromisedAlike(stretches, said) || comesBack(stretches);
-}
-
-/// That whose error lies in the middle of all (geometric median), by how long they last.
-const Stretch& middleOf(const std::vector<Stretch>& stretches) {
-  const auto distances = [&](const Stretch& stretch) {
-    double sum = 0.0;
-    for (const Stretch& other : stretches) sum += other.duration_s * (other.offset_m - stretch.offset_m).norm();
-    return sum;
+/// Measurements in a row that are aside are as good as they are near to the path, and their error changes as they show:
+/// that of spikes all the time, that of a receiver that jumps never.
+void learnAsides(const std::vector<Measurement>& said, const std::vector<PathState>& path, std::vector<Aside>& asides) {
+  const auto error_m = [&](std::size_t i) -> Eigen::Vector2d {
+    return said[i].sample.position_m - path[i].position_m - path[i].offset_m;
   };
-  return *std::min_element(stretches.begin(), stretches.end(),
-                           [&](const Stretch& one, const Stretch& other) { return distances(one) < distances(other); });
-}
-
-/// The standard deviation of the lasting errors that half of the time of all but `middle` shows, per axis.
-double deviationFrom(const Stretch& middle, const std::vector<Stretch>& stretches) {
-  std::vector<std::pair<double, double>> away_m;  // with how long each lasts
-  double all_s = 0.0;
-  for (const Stretch& stretch : stretches) {
-    if (&stretch == &middle) continue;
-    away_m.emplace_back((stretch.offset_m - middle.offset_m).norm(), stretch.duration_s);
-    all_s += stretch.duration_s;
-  }
-  std::sort(away_m.begin(), away_m.end());
-  std::size_t half = 0;
-  for (double until_s = away_m[0].second; until_s < 0.5 * all_s; until_s += away_m[half].second) ++half;
-  return away_m[half].first / kMedianOfPlane;
-}
-
-/// A receiver that steps aside for a while is worse for that while: the shorter a stretch between two steps and the
-/// farther off it came out, the less it says about where the path is. One that promises the same throughout is believed
-/// as far as it comes back to the same error: an RTK receiver that declares nothing, or 30 m, has centimetres most of
-/// the time. `path`: as it came out; empty at first.
-void weighStretches(const std::vector<Measurement>& said, const std::vector<PathState>& path,
-                    std::vector<Measurement>& measurements) {
-  constexpr double kLeastWeight = 0.1;  // or else one stretch after the other could lose its say
-  constexpr double kLeastAlike = 0.01;  // half of the time is near the middle, and keeps it
-  const std::vector<Stretch> stretches = stretchesOf(said, path);
-  const bool alike = !path.empty() && arePromisedAlike(stretches, said);
-  const Stretch& middle = middleOf(stretches);
-  const Eigen::Vector2d usual_m = alike ? middle.offset_m : Eigen::Vector2d::Zero();
-  const double shown_m = alike ? deviationFrom(middle, stretches) : 0.0;
-  double longest_s = 0.0;
-  for (const Stretch& stretch : stretches) longest_s = std::max(longest_s, stretch.duration_s);
-  for (const Stretch& stretch : stretches) {
-    const Measurement& first = said[stretch.begin];
-    double expected_m = first.offset_m;
-    if (alike) expected_m = std::min(expected_m, std::max(first.white_m, shown_m));
-    const double squared = (stretch.offset_m - usual_m).squaredNorm() / squareOf(expected_m);
-    const double weight = std::max(alike ? kLeastAlike : kLeastWeight, studentWeight(squared));
-    const double offset_m = expected_m * std::sqrt(longest_s / stretch.duration_s / weight);
-    for (std::size_t i = stretch.begin; i < stretch.end; ++i) measurements[i].offset_m = offset_m;
+  std::size_t end = 0;
+  for (std::size_t begin = 0; begin < said.size(); begin = std::max(end, begin + 1)) {
+    double squares = 0.0;
+    double changes = 0.0;
+    for (end = begin; end < said.size() && said[end].aside; ++end) {
+      squares += error_m(end).squaredNorm() / 2.0;
+      if (end == begin) continue;
+      const double elapsed_s = said[end].sample.time_s - said[end - 1].sample.time_s;
+      changes += (error_m(end) - error_m(end - 1)).squaredNorm() / 2.0 / elapsed_s;
+    }
+    if (end == begin) continue;
+    const auto count = static_cast<double>(end - begin);
+    const double sigma_m = std::max(said[begin].offset_m, std::sqrt(squares / count));
+    const double density = std::max(densityOf(sigma_m), changes / std::max(1.0, count - 1.0));
+    std::fill(asides.begin() + static_cast<std::ptrdiff_t>(begin), asides.begin() + static_cast<std::ptrdiff_t>(end),
+              Aside{sigma_m, density});
   }
 }
 
@@ -248,34 +166,23 @@ Eigen::Vector2d limited(const Eigen::Vector2d& velocity_mps, double mean_mps) {
 
 std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const Motion& motion) {
   constexpr int kIterations = 4;
-  constexpr double kNoWeight = 1e3;
   splitByPromises(measurements);
   std::vector<Measurement> said = measurements;
-  bool steps = endOfStretch(said, 0) < said.size();
-  bool doubts = false;
-  for (Measurement& measurement : measurements) {
-    if (!measurement.doubtful) continue;
-    doubts = true;
-    measurement.white_m = kNoWeight * (measurement.white_m + measurement.offset_m);
-  }
-  if (steps) weighStretches(said, {}, measurements);
-  std::vector<PathState> path = smooth(measurements, motion);
-  if (steps && !tellsAside(stretchesOf(said, path), said)) {
-    steps = false;
-    for (std::size_t i = 0; i < said.size(); ++i) {
-      said[i].steps = measurements[i].steps = false;
-      measurements[i].offset_m = said[i].offset_m;
-    }
-    path = smooth(measurements, motion);
-  }
+  std::vector<Aside> asides = unknownAsides(said);
+  bool steps = false;
+  std::vector<PathState> path;
+  do {
+    measurements = said;
+    steps = hasSteps(said);
+    if (steps) weighStretches(said, {}, measurements);
+    path = smooth(measurements, asides, motion);
+  } while (steps && dropUntold(path, said));
+  const bool doubts =
+      std::any_of(said.begin(), said.end(), [](const Measurement& measurement) { return measurement.aside; });
   for (int iteration = 0; (doubts || steps) && iteration < kIterations; ++iteration) {
     if (steps) weighStretches(said, path, measurements);
-    for (std::size_t i = 0; i < said.size(); ++i) {
-      if (!said[i].doubtful) continue;
-      const double away_m = (said[i].sample.position_m - path[i].position_m).norm() / std::sqrt(2.0);
-      measurements[i].white_m = std::max(said[i].white_m, away_m);
-    }
-    path = smooth(measurements, motion);
+    learnAsides(said, path, asides);
+    path = smooth(measurements, asides, motion);
   }
   return path;
 }

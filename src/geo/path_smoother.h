@@ -12,8 +12,9 @@ struct Measurement {
   double white_m = 1.0;   ///< error along one axis that differs from one measurement to the next
   double offset_m = 1.0;  ///< and one that lasts
   bool steps = false;     ///< the lasting error has nothing to do with the one before
-  /// Nobody believes it: where the path is not known otherwise it is as good as its own distance from the path.
-  bool doubtful = false;
+  /// Nobody believes it: beside the other errors it has one that it shares with those that follow it, as long as they
+  /// are aside as well. Where the path is not known otherwise they are as good as their own distance from it.
+  bool aside = false;
 };
 
 /// By such a ratio of what it promises a receiver's error is another one.
@@ -36,11 +37,11 @@ struct PathState {
   double reading_var = 0.0;                            ///< of position and offset together, m^2
 };
 
-/// Fixed-interval smoother (Rauch, Tung, Striebel) over position, velocity and an error of the receiver that lasts; the
-/// acceleration is white. The lasting error is another one behind a step, and where the receiver comes to promise much
-/// more or less. Steps of one that promises alike throughout, and neither comes back to an error nor keeps one most of
-/// the time, do not count: nothing tells which of its errors is aside. `measurements`: at least one, in strictly
-/// increasing order of time.
+/// Fixed-interval smoother (Rauch, Tung, Striebel) over position, velocity, an error of the receiver that lasts and one
+/// of measurements that are aside; the acceleration is white. The lasting error is another one behind a step, and where
+/// the receiver comes to promise much more or less. Steps of one that promises alike throughout count only where it
+/// has one error most of the time or comes back to it: otherwise nothing tells which of its errors are aside.
+/// `measurements`: at least one, in strictly increasing order of time.
 std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const Motion& motion);
 
 /// Between two states the path of least acceleration; where the way is much shorter than their velocities ask for, it

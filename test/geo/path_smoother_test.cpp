@@ -1,5 +1,6 @@
 #include "geo/path_smoother.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -87,9 +88,44 @@ TEST(PathSmoother, AStepThatNothingTellsAsideIsBelieved) {
   }
 }
 
-TEST(PathSmoother, ADoubtfulMeasurementOnlyBoundsWhatIsNotKnown) {
+TEST(PathSmoother, AWayAsideThatDoesNotComeBackIsBelieved) {
+  std::vector<Measurement> measurements = eastward(120, 0.02);
+  for (const std::size_t begin : {20U, 60U}) {
+    for (std::size_t i = begin; i < begin + 6; ++i) measurements[i].sample.position_m.y() = 6.0;
+    measurements[begin].steps = measurements[begin + 6].steps = true;
+  }
+  for (std::size_t i = 100; i < 120; ++i) measurements[i].sample.position_m.y() = 6.0;
+  measurements[100].steps = true;
+  const std::vector<PathState> path = smoothPath(measurements, {0.1, 1.0});
+  for (const std::size_t i : {10U, 23U, 40U, 63U, 80U, 95U}) EXPECT_LT(std::abs(path[i].position_m.y()), 0.3) << i;
+  for (const std::size_t i : {105U, 110U, 119U}) EXPECT_NEAR(path[i].position_m.y(), 6.0, 0.3) << i;
+}
+
+TEST(PathSmoother, WhatIsAsideShapesTheWayBetween) {
+  const auto truth = [](double time_s) { return Eigen::Vector2d(10.0 * time_s, 15.0 * std::sin(time_s / 5.0)); };
+  std::vector<Measurement> measurements;
+  for (int i = 0; i < 60; ++i) {
+    measurements.push_back({{1.0 * i, truth(i)}, 0.05, 1.0});
+    if (i < 20 || i >= 35) continue;
+    measurements.back().aside = true;
+    measurements.back().sample.position_m += Eigen::Vector2d(-4.0, 8.0);
+  }
+  const auto largestOf = [&](const std::vector<PathState>& path) {
+    double largest_m = 0.0;
+    for (double time_s = 20.0; time_s < 35.0; time_s += 1.0) {
+      const auto behind = std::find_if(path.begin(), path.end(), [&](const PathState& s) { return s.time_s > time_s; });
+      largest_m = std::max(largest_m, (between(*(behind - 1), *behind, time_s).position_m - truth(time_s)).norm());
+    }
+    return largest_m;
+  };
+  EXPECT_LT(largestOf(smoothPath(measurements, {1.0, 10.0})), 1.0);
+  measurements.erase(measurements.begin() + 20, measurements.begin() + 35);
+  EXPECT_GT(largestOf(smoothPath(measurements, {1.0, 10.0})), 2.5);
+}
+
+TEST(PathSmoother, WhatIsAsideOnlyBoundsWhatIsNotKnown) {
   std::vector<Measurement> known = eastward(30);
-  known[15].doubtful = true;
+  known[15].aside = true;
   known[15].sample.position_m.y() = 20.0;
   EXPECT_LT(std::abs(smoothPath(known, kWalk)[15].position_m.y()), 0.1) << "beside good ones it says nothing";
   std::vector<Measurement> gap{known.begin(), known.begin() + 5};  // its ends lead apart
