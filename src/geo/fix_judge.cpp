@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "base/numbers.h"
@@ -39,6 +40,23 @@ std::size_t largestJump(const std::vector<PathSample>& samples, const std::vecto
   return at;
 }
 
+/// Speed from one sample to another by errors that come and go: usual over about kSpeedLag_s, where noise and steps are
+/// no motion, or all the way, where an error leads back against the drive. None: too short.
+std::optional<double> speedBetween(const std::vector<PathSample>& samples, std::size_t first, std::size_t last) {
+  const auto speed_mps = [&](std::size_t from, std::size_t to) {
+    return (samples[to].position_m - samples[from].position_m).norm() / (samples[to].time_s - samples[from].time_s);
+  };
+  std::vector<double> speeds_mps;
+  std::size_t to = first;
+  for (std::size_t from = first; from < last; ++from) {
+    while (to < last && samples[to].time_s - samples[from].time_s < kSpeedLag_s) ++to;
+    if (samples[to].time_s - samples[from].time_s < kSpeedLag_s) break;
+    speeds_mps.push_back(speed_mps(from, to));
+  }
+  if (speeds_mps.empty()) return std::nullopt;
+  return std::max(speed_mps(first, last), median(std::move(speeds_mps)));
+}
+
 }  // namespace
 
 FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& config)
@@ -53,7 +71,11 @@ FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& con
   for (std::size_t n = 0; n < nodes_.size(); ++n) believed.push_back(!isLeftOut(n));
   // Believed nodes may hold few bends: learnt from them alone, the acceleration would make the next one improbable.
   constexpr double kLeastShare = 0.25;
-  constant_speed_ = select(kLeastShare * scales_.acceleration_density, believed).isConstant();
+  const double least_density = kLeastShare * scales_.acceleration_density;
+  const double constant_mps = select(least_density, believed).constant_mps();
+  const bool varies = config.speed_tolerance == 0.0 && isSlowerSomewhere(constant_mps);
+  if (varies) select(least_density, believed, varies);
+  constant_speed_ = constant_mps > 0.0 && !varies;
   splitAtSteps();
   findDoubts(constant_speed_);
   for (const Part& part : parts()) {
@@ -65,12 +87,26 @@ FixJudge::FixJudge(const UsableFixes& usable, const TrajectoryCleanerConfig& con
   judgeLeftOut();
 }
 
-SpeedPrior FixJudge::select(double least_density, const std::vector<bool>& believed) {
+/// Whether the robot drove more slowly where nodes are left out.
+bool FixJudge::isSlowerSomewhere(double constant_mps) const {
+  constexpr double kSlower = 0.8;
+  std::size_t end = 0;
+  for (std::size_t begin = 0; begin < nodes_.size(); begin = std::max(end, begin + 1)) {
+    end = endOfStretch(begin);
+    if (end == begin) continue;
+    const std::size_t first = begin > 0 ? begin - 1 : begin;
+    const std::size_t last = std::min(end, nodes_.size() - 1);
+    if (speedBetween(samples_, first, last).value_or(constant_mps) < kSlower * constant_mps) return true;
+  }
+  return false;
+}
+
+SpeedPrior FixJudge::select(double least_density, const std::vector<bool>& believed, bool varies) {
   std::vector<bool> steps;
   for (const Node& node : nodes_) steps.push_back(node.is_behind_step);
-  scales_ = learnScales(samples_, believed, least_density, steps);
+  scales_ = learnScales(samples_, believed, least_density, steps, roundingOf(usable_.samples));
   motion_ = {scales_.acceleration_density, scales_.usual_mps};
-  const SpeedPrior speeds(samples_, scales_, config_.speed_tolerance);
+  const SpeedPrior speeds(samples_, scales_, config_.speed_tolerance, varies);
   chosen_ = selectNodes(samples_, scales_, speeds, config_.max_bridge_s, steps);
   return speeds;
 }
@@ -153,14 +189,11 @@ void FixJudge::addFixes(std::size_t node, std::vector<Measurement>& into) const 
   for (const std::size_t i : kept) into.push_back({usable_.samples[i], white_m, offsetOf(usable_.sigmas_m[i])});
 }
 
-/// One measurement for nodes [begin, end), which are left out: a bad bridge stays bounded.
+/// Nodes [begin, end), which are left out: their way from one to the next shapes the bridge, and bounds it.
 void FixJudge::addStretch(std::size_t begin, std::size_t end, std::vector<Measurement>& into) const {
   if (constant_speed_ || into.empty()) return;  // a constant speed bounds it
-  std::vector<std::size_t> members;
-  for (std::size_t n = begin; n < end; ++n) {
-    members.insert(members.end(), nodes_[n].members.begin(), nodes_[n].members.end());
-  }
-  into.push_back({medianOf(usable_.samples, members), scales_.noise_m, into.back().offset_m, false, true});
+  const double offset_m = into.back().offset_m;
+  for (std::size_t n = begin; n < end; ++n) into.push_back({samples_[n], scales_.noise_m, offset_m, false, true});
 }
 
 std::vector<Measurement> FixJudge::measurementsOf(const Part& part, bool of_fixes) const {

@@ -29,7 +29,8 @@ class FixJudge {
     std::size_t end = 0;
   };
 
-  SpeedPrior select(double least_density, const std::vector<bool>& believed);
+  SpeedPrior select(double least_density, const std::vector<bool>& believed, bool varies = false);
+  bool isSlowerSomewhere(double constant_mps) const;
   void splitAtSteps();
   void findDoubts(bool constant_speed);
   std::vector<Part> parts() const;

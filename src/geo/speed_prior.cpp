@@ -53,12 +53,13 @@ std::vector<double> smoothed(const std::vector<double>& histogram, double bins) 
 
 }  // namespace
 
-SpeedPrior::SpeedPrior(const std::vector<PathSample>& nodes, const MotionScales& scales, double tolerance) {
+SpeedPrior::SpeedPrior(const std::vector<PathSample>& nodes, const MotionScales& scales, double tolerance,
+                       bool varies) {
   constexpr double kStanding = 0.2;  // of the usual speed
   constexpr double kHardlyStops = 0.95;
   constexpr double kMostWhoStops = 4.0;     // slows down and sets off
-  constexpr double kSlowest = 0.2;          // share of the speeds
-  constexpr double kOfMiddle = 0.9;         // of a robot of constant speed at least, that of the slowest
+  constexpr double kSlowest = 0.1;          // share of the speeds
+  constexpr double kOfMiddle = 0.85;        // of a robot of constant speed at least, that of the slowest
   constexpr double kLeastTolerance = 0.05;  // the papers' robot in its bends
   standing_mps_ = kStanding * scales.usual_mps;
   std::vector<double> speeds_mps = speedsOver(nodes, kSpeedLag_s);
@@ -72,7 +73,7 @@ SpeedPrior::SpeedPrior(const std::vector<PathSample>& nodes, const MotionScales&
   if (tolerance > 0.0) {
     constant_mps_ = middle_mps;
     sigma_mps_ = std::hypot(noise_mps, tolerance * middle_mps);
-  } else if (quantile(speeds_mps, kSlowest) > kOfMiddle * middle_mps) {
+  } else if (!varies && quantile(speeds_mps, kSlowest) > kOfMiddle * middle_mps) {
     constant_mps_ = middle_mps;
     sigma_mps_ = std::max(kLeastTolerance * middle_mps, spreadAround(speeds_mps, middle_mps));
   } else {

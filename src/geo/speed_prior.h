@@ -12,10 +12,12 @@ namespace visual_localization {
 class SpeedPrior {
  public:
   /// `tolerance`: standard deviation of a constant speed, as a share of it; 0: the nodes say whether it is constant,
-  /// and how well.
-  SpeedPrior(const std::vector<PathSample>& nodes, const MotionScales& scales, double tolerance);
+  /// and how well, unless it is known that it varies.
+  SpeedPrior(const std::vector<PathSample>& nodes, const MotionScales& scales, double tolerance, bool varies = false);
 
   bool isConstant() const { return constant_mps_ > 0.0; }
+  /// 0: it varies.
+  double constant_mps() const { return constant_mps_; }
   /// In nats. Usual speeds cost nothing.
   double cost(double speed_mps) const;
 

@@ -50,6 +50,12 @@ TEST(SpeedPrior, AFewBendsOfTheReceiverDoNotHideAConstantSpeed) {
 
 TEST(SpeedPrior, ACarIsNot) { EXPECT_FALSE(SpeedPrior(atSpeeds(carAt(300)), scales(8.0), 0.0).isConstant()); }
 
+TEST(SpeedPrior, WhoVariesIsNot) {
+  const std::vector<PathSample> nodes = atSpeeds(std::vector<double>(100, 0.65));
+  EXPECT_FALSE(SpeedPrior(nodes, scales(0.65), 0.0, true).isConstant());
+  EXPECT_TRUE(SpeedPrior(nodes, scales(0.65), 0.05, true).isConstant()) << "who says so is believed";
+}
+
 TEST(SpeedPrior, WhoStopsMayDriveAtConstantSpeed) {
   std::vector<double> speeds_mps(200, 0.65);
   for (std::size_t i = 60; i < 140; ++i) speeds_mps[i] = 0.0;
