@@ -379,10 +379,6 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                1.0);
   visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},
                fix_sigma_m, 0.001, 100.0);
-  visitor.integer(
-      {"geometry/window", "1",
-       "images adjusted at a time: more of them, alone or tied, one stretch after the other; limits memory"},
-      window, 200, 1000000);
   visitor.real(
       {"geometry/spacing", "m",
        "of a session with landmarks keep, after all images were adjusted, only those at least this far from the "

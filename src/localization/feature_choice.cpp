@@ -10,7 +10,6 @@ void HybridConfig::declare(ParameterVisitor& visitor) {
       sift_below_m, 0.0, 10000.0);
   visitor.real({"hybrid/global_above", "m", "after global features, SIFT follows when a sigma is above (d_global)"},
                global_above_m, 0.0, 10000.0);
-  visitor.flag({"hybrid/sift_in_doubt", "", "SIFT also while the images look more like another place"}, sift_in_doubt);
   visitor.integer(
       {"hybrid/sift_every", "1",
        "SIFT at least once in this number of images, and until an image confirms the position; 0: no such check"},
@@ -40,7 +39,7 @@ void FeatureChoice::reset() {
 void FeatureChoice::update(const Eigen::Vector2d& spread_m, bool confirmed, bool doubtful) {
   if (!hybrid_) return;
   since_local_ = next_ == FeatureKind::kLocal ? 0 : since_local_ + 1;
-  if (isLocalDue(confirmed) || (doubtful && config_.sift_in_doubt)) {
+  if (isLocalDue(confirmed) || doubtful) {
     next_ = FeatureKind::kLocal;
     return;
   }

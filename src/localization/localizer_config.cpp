@@ -42,10 +42,6 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
   visitor.flag({"prune", "", "keep only features that the image before showed as well"}, prune);
   visitor.flag({"choose_session", "", "in a map of several sessions, compare with the one that matches best lately"},
                choose_session);
-  visitor.real({"min_position_std", "m", "no position without landmarks claims to be more accurate than this"},
-               min_position_std_m, 0.0, 1000.0);
-  visitor.real({"min_yaw_std", "rad", "no heading without landmarks claims to be more accurate than this"},
-               min_yaw_std_rad, 0.0, 3.2);
   visitor.integer(
       {"sweep_images", "1",
        "of a larger map, guided recovery, place check and proposals for poses compare about this number per image"},

@@ -56,16 +56,16 @@ PoseEstimate Localizer::poseOf(const MetricPose& metric) const {
 /// While the images confirm the position the covariance is that of its mode; otherwise that of the whole cloud
 /// about it, so that nothing downstream trusts a guess.
 PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) {
-  const double floor_m2 = config_.min_position_std_m * config_.min_position_std_m;
+  constexpr double kFloor_m2 = LocalizerConfig::kMinPositionStd_m * LocalizerConfig::kMinPositionStd_m;
   const bool recognised = tracked.best.recognised && tracked.best_distance_m <= config_.state.max_distance_m;
   PoseEstimate pose;
   pose.position_m = positionOf_m(tracked, recognised);
   pose.covariance_m2 = state == LocalizationState::kTracking ? tracked.mode_covariance_m2 : tracked.cloud_covariance_m2;
-  pose.covariance_m2 += (floor_m2 + mapVariance_m2(*map_, tracked.best_image)) * Eigen::Matrix2d::Identity();
+  pose.covariance_m2 += (kFloor_m2 + mapVariance_m2(*map_, tracked.best_image)) * Eigen::Matrix2d::Identity();
   const Heading heading =
       headingAt(*map_, pose.position_m, recognised ? std::optional(tracked.best_image) : std::nullopt, neighbours_);
   pose.yaw_rad = heading.yaw_rad;
-  pose.yaw_variance_rad2 = heading.variance_rad2 + config_.min_yaw_std_rad * config_.min_yaw_std_rad;
+  pose.yaw_variance_rad2 = heading.variance_rad2 + LocalizerConfig::kMinYawStd_rad * LocalizerConfig::kMinYawStd_rad;
   pose.geodetic = map_->frame().toGeodetic(pose.position_m);
   return pose;
 }

@@ -18,7 +18,6 @@ void MetricConfig::declare(ParameterVisitor& visitor) {
                   "metric: solve the pose from landmarks where the map has them; place: that of "
                   "training images, as in the papers"},
                  pose_source, {"metric", "place"});
-  visitor.integer({"metric/min_inliers", "1", "a pose on fewer landmarks is not believed"}, min_inliers, 6, 10000);
   visitor.integer({"metric/min_inliers_tracking", "1",
                    "TRACKING needs so many inliers, those of the poses before that this one follows included"},
                   min_inliers_tracking, 6, 1000000);

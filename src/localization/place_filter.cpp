@@ -12,11 +12,6 @@ void BayesConfig::declare(ParameterVisitor& visitor) {
                 "probability that the next image is from anywhere in the map (kidnapping); less where images follow "
                 "each other more closely than training images"},
                anywhere, 1e-6, 0.5);
-  visitor.real(
-      {"bayes/exponent", "1",
-       "matches plus one are raised to this to become a likelihood; 0: what suits the kind of features (SIFT 3, "
-       "learned 2)"},
-      exponent, 0.0, 20.0);
 }
 
 PlaceFilter::PlaceFilter(const TrainingMap& map, const BayesConfig& config)
@@ -54,7 +49,7 @@ void PlaceFilter::reset(const std::vector<Eigen::Vector2d>& positions_m) {
 double PlaceFilter::likelihoodOf(const Score& score) const {
   constexpr double kLeast = 1e-9;
   if (score.matches == 0 && score.weight > 0.0) return std::pow(std::max(kLeast, score.weight), independence_);
-  const double exponent = config_.exponent > 0.0 ? config_.exponent : map_.header().kind->likelihoodExponent();
+  const double exponent = map_.header().kind->likelihoodExponent();
   return std::pow(static_cast<double>(score.matches) + 1.0, independence_ * exponent);
 }
 

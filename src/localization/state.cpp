@@ -82,35 +82,21 @@ void StateConfig::declare(ParameterVisitor& visitor) {
       witness, {"probability", "similarity"});
   visitor.real({"state/min_probability", "1", "a lower probability around the estimate does not confirm it"},
                min_probability, 0.5, 1.0);
-  visitor.real({"state/min_similarity", "1", "a weaker best match by local features does not confirm a position"},
-               min_similarity, 0.0, 1.0);
   visitor.real(
       {"state/max_scale", "1",
        "a median size ratio of the matched local features above this, or below its inverse, does not confirm a "
        "position"},
       max_scale, 1.0, 100.0);
-  visitor.real({"state/max_distance", "m", "a best match farther from the estimate does not confirm it"},
-               max_distance_m, 0.1, 10000.0);
-  visitor.integer({"state/window", "1", "how many of the last images decide about the state"}, window, 1, 1000);
-  visitor.integer({"state/images_to_confirm", "1", "how many of them must confirm the position for TRACKING"},
-                  images_to_confirm, 1, 1000);
   visitor.flag({"state/place_check", "", "ask the global features whether another place of the map looks more alike"},
                place_check);
-  visitor.real({"state/min_place_ratio", "1",
-                "global similarity here over the best anywhere, mean over the window; below, the position is in doubt"},
-               min_place_ratio, 0.0, 1.0);
   visitor.real({"state/max_motion_residual", "m",
                 "up to this root mean square distance the last ten estimates must follow a steady motion"},
                max_motion_residual_m, 0.0, 10000.0);
-  visitor.integer({"state/off_map_images", "1",
-                   "this number of images that confirm nothing, with no TRACKING in between, means OFF_MAP"},
-                  off_map_images, 1, 100000);
   visitor.integer(
       {"state/frozen_images", "1",
        "this number of repetitions of an image to the last bit, over a second, ends TRACKING; 0: never, for a "
        "simulated camera without noise"},
       frozen_images, 0, 100000);
-  visitor.atMost("state/images_to_confirm", images_to_confirm, "state/window", window);
   visitor.renamed("state/max_course_residual", "state/max_motion_residual");
 }
 

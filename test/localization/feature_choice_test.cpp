@@ -88,11 +88,6 @@ TEST(FeatureChoice, InDoubtASmallCloudIsNoReasonForGlobalFeatures) {
     EXPECT_EQ(choice.next(), kSift);
     EXPECT_EQ(after(choice, 1.0, 1.0), kGlobal) << "no longer in doubt";
   }
-  HybridConfig paper;
-  paper.sift_in_doubt = false;
-  FeatureChoice choice = hybridAt(kGlobal, paper);
-  choice.update({1.0, 1.0}, true, true);
-  EXPECT_EQ(choice.next(), kGlobal);
 }
 
 /// The kinds of features of the next images, whose evidence is `confirmed`.

@@ -123,9 +123,9 @@ TEST_F(LocalizerRules, OnlyWhatIsRecognisedIsAPlace) {
 }
 
 TEST_F(LocalizerRules, ATrackedPlaceHasTheCovarianceOfItsMode) {
-  const double floor_m2 = config_.min_position_std_m * config_.min_position_std_m;
+  constexpr double kFloor_m2 = LocalizerConfig::kMinPositionStd_m * LocalizerConfig::kMinPositionStd_m;
   const Estimate tracked = settle();
-  EXPECT_LT((tracked.pose.covariance_m2 - tracked.tracked.mode_covariance_m2 - floor_m2 * Eigen::Matrix2d::Identity())
+  EXPECT_LT((tracked.pose.covariance_m2 - tracked.tracked.mode_covariance_m2 - kFloor_m2 * Eigen::Matrix2d::Identity())
                 .cwiseAbs()
                 .maxCoeff(),
             1e-12);
@@ -133,7 +133,7 @@ TEST_F(LocalizerRules, ATrackedPlaceHasTheCovarianceOfItsMode) {
   Estimate lost;
   for (int i = 0; i < 5; ++i) lost = see(20.0);
   ASSERT_NE(lost.state, LocalizationState::kTracking);
-  EXPECT_LT((lost.pose.covariance_m2 - lost.tracked.cloud_covariance_m2 - floor_m2 * Eigen::Matrix2d::Identity())
+  EXPECT_LT((lost.pose.covariance_m2 - lost.tracked.cloud_covariance_m2 - kFloor_m2 * Eigen::Matrix2d::Identity())
                 .cwiseAbs()
                 .maxCoeff(),
             1e-12);

@@ -324,19 +324,21 @@ TEST_F(MetricEstimate, OdometryIsJudgedByThePresentParameters) {
 TEST_F(MetricEstimate, APlaceIsNeverSurerThanItsFloor) {
   LocalizerConfig config = test::swarmConfig();
   config.metric.pose_source = "place";
-  config.min_position_std_m = 3.0;
-  config.min_yaw_std_rad = 0.4;
   make(config);
   Estimate estimate;
   for (std::size_t i = 5; i < 30; ++i) estimate = see(i);
   EXPECT_EQ(estimate.source, PoseSource::kPlace);
   EXPECT_FALSE(estimate.metric);
   EXPECT_FALSE(estimate.evidence.verified);
-  EXPECT_GE(estimate.pose.covariance_m2(0, 0), 9.0);
-  EXPECT_GE(estimate.pose.covariance_m2(1, 1), 9.0);
-  EXPECT_LT(estimate.pose.covariance_m2(0, 0), 40.0);
-  EXPECT_GE(estimate.pose.yaw_variance_rad2, 0.16);
-  EXPECT_LT(estimate.pose.yaw_variance_rad2, 0.2);
+  constexpr double kFloor_m2 = LocalizerConfig::kMinPositionStd_m * LocalizerConfig::kMinPositionStd_m;
+  constexpr double kYawFloor_rad2 = LocalizerConfig::kMinYawStd_rad * LocalizerConfig::kMinYawStd_rad;
+  for (const int axis : {0, 1}) {
+    const double spread_m2 = estimate.tracked.mode_covariance_m2(axis, axis);
+    EXPECT_GE(estimate.pose.covariance_m2(axis, axis), kFloor_m2 + spread_m2) << axis;
+    EXPECT_LT(estimate.pose.covariance_m2(axis, axis), 40.0) << axis;
+  }
+  EXPECT_GE(estimate.pose.yaw_variance_rad2, kYawFloor_rad2);
+  EXPECT_LT(estimate.pose.yaw_variance_rad2, kYawFloor_rad2 + 0.04);
   EXPECT_GT(estimate.motion_residual_m, 0.0);
 }
 

@@ -121,7 +121,6 @@ TEST(PlaceFilter, FindsARobotThatWasCarriedAway) {
 TEST(PlaceFilter, FollowsARobotThatDrivesBackwards) {
   const auto map = mapOf(streetSession(200));
   BayesConfig config;
-  config.exponent = 3.0;
   PlaceFilter filter(*map, config);
   double east_m = 160.0;
   for (int i = 0; i < 60; ++i, east_m -= 1.0) {
@@ -179,7 +178,6 @@ TEST(PlaceFilter, ALargeMapCostsWhatIsProbable) {
 TEST(PlaceFilter, ManyImagesOfARobotThatStandsAreNotManyChancesToBeCarriedAway) {
   const auto map = mapOf(streetSession(200));
   BayesConfig config;
-  config.exponent = 3.0;
   PlaceFilter filter(*map, config);
   const auto look = [&](double east_m) {  // in bad light
     PlaceLikelihood likelihood;
@@ -279,14 +277,13 @@ TEST(PlaceFilter, WhatWasNotComparedIsAsLikelyAsIsSaid) {
 TEST(PlaceFilter, TheLikelihoodGrowsWithTheMatches) {
   const auto map = mapOf(streetSession(10));
   BayesConfig config;
-  config.exponent = 2.0;
   const PlaceFilter filter(*map, config);
   Score none;
   Score some;
   some.matches = 9;
   some.weight = some.similarity = 0.1;
   EXPECT_DOUBLE_EQ(filter.likelihoodOf(none), 1.0);
-  EXPECT_DOUBLE_EQ(filter.likelihoodOf(some), 100.0);
+  EXPECT_DOUBLE_EQ(filter.likelihoodOf(some), 1000.0) << "SIFT: to the third";
   some.matches = 0;  // by global features
   EXPECT_DOUBLE_EQ(filter.likelihoodOf(some), 0.1);
 }

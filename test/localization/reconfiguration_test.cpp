@@ -85,7 +85,7 @@ TEST_F(Reconfiguration, ThresholdsLeaveTheCloudAlone) {
   const std::vector<Particle> before = localizer_.particles();
   assignParameters(config_, {{"similarity/sift_recognised", 0.04},
                              {"hybrid/sift_below", 8.0},
-                             {"state/window", std::int64_t{6}},
+                             {"state/max_scale", 1.3},
                              {"fitness/distance_sigma", 9.0},
                              {"sweep_images", std::int64_t{10}}});
   localizer_.configure(config_);
@@ -123,6 +123,7 @@ TEST(FormerParameters, HaveTheValuesThatAreUsed) {
   const LocalizerConfig config;
   const std::map<std::string, double> in_use{
       {"bayes/comparisons", config.bayes.comparisons},
+      {"bayes/exponent", 0.0},  // what suits the kind of features
       {"bayes/first_comparisons", config.bayes.first_comparisons},
       {"bayes/uniform", config.bayes.uniform},
       {"dpso/best_particles", config.dpso.best_particles},
@@ -138,6 +139,7 @@ TEST(FormerParameters, HaveTheValuesThatAreUsed) {
       {"geometry/max_residual", Reconstruction::kMaxResidual},
       {"geometry/min_landmarks", Reconstruction::kMinLandmarks},
       {"geometry/min_pair_inliers", PairRule::kMinInliers},
+      {"geometry/window", static_cast<double>(GeometryConfig().window)},
       {"max_image_gap", kMaxImageGap_s},
       {"metric/keypoint_sigma", kKeypointSigma_px},
       {"metric/match_ratio", PoseVerifier::kMatchRatio},
@@ -145,10 +147,13 @@ TEST(FormerParameters, HaveTheValuesThatAreUsed) {
       {"metric/max_gap", PosePredictor::kMaxGap_s},
       {"metric/max_prediction_error", config.metric.max_prediction_error_m},
       {"metric/max_sigma", config.metric.max_sigma_m},
+      {"metric/min_inliers", config.metric.min_inliers},
       {"metric/min_inliers_predicted", config.metric.min_inliers_predicted},
       {"metric/sigma_factor", config.metric.sigma_factor},
       {"metric/tolerance", PoseVerifier::kTolerance_px},
       {"metric/training_images", config.metric.training_images},
+      {"min_position_std", LocalizerConfig::kMinPositionStd_m},
+      {"min_yaw_std", LocalizerConfig::kMinYawStd_rad},
       {"odometry/max_distance", config.odometry.max_distance_m},
       {"odometry/max_gap", config.odometry.max_gap_s},
       {"odometry/max_speed", config.odometry.max_speed_mps},
@@ -158,19 +163,25 @@ TEST(FormerParameters, HaveTheValuesThatAreUsed) {
       {"similarity/votes_exponent", config.similarity.votes_exponent},
       {"similarity/votes_recognised", config.similarity.votes_recognised},
       {"state/frozen_time", config.state.frozen_time_s},
+      {"state/images_to_confirm", config.state.images_to_confirm},
+      {"state/max_distance", config.state.max_distance_m},
       {"state/max_step", config.state.max_step_m},
       {"state/min_features", config.state.min_features},
       {"state/min_global_similarity", config.state.min_global_similarity},
       {"state/min_matches", config.state.min_matches},
+      {"state/min_place_ratio", config.state.min_place_ratio},
+      {"state/min_similarity", config.state.min_similarity},
+      {"state/off_map_images", config.state.off_map_images},
+      {"state/window", config.state.window},
       {"sift/edge_threshold", SiftConfig().edge_threshold},
       {"sift/octave_layers", SiftConfig().octave_layers},
       {"sift/sigma", SiftConfig().sigma_px},
       {"state/motion_length", StateAssessor::kMotionLength},
       {"state/sure_similarity", config.state.sure_similarity},
   };
-  const std::set<std::string> seen_by_one_file_alone{"few_features",      "geometry/pair_span", "learned/min_score",
-                                                     "map/preview_width", "map/sift_backend",   "max_fix_age",
-                                                     "sift_backend",      "tf_smoothing"};
+  const std::set<std::string> seen_by_one_file_alone{"few_features",      "geometry/pair_span", "hybrid/sift_in_doubt",
+                                                     "learned/min_score", "map/preview_width",  "map/sift_backend",
+                                                     "max_fix_age",       "sift_backend",       "tf_smoothing"};
   for (const auto& [name, value] : formerParameters()) {
     if (seen_by_one_file_alone.count(name) > 0) continue;
     ASSERT_EQ(in_use.count(name), 1U) << name;

@@ -204,14 +204,6 @@ TEST(StateAssessor, OtherThresholdsKeepWhatTheLastImagesSaid) {
   EXPECT_EQ(assess(assessor, kGood, sift()), LocalizationState::kTracking);
 }
 
-TEST(StateAssessor, AnImpossibleWindowIsNamedWithBothValues) {
-  StateConfig config;
-  config.window = 3;
-  ASSERT_EQ(violationsOf(config).size(), 1U);
-  EXPECT_EQ(violationsOf(config).front(),
-            "parameter 'state/images_to_confirm' = 4 is not allowed: must not exceed 'state/window' = 3");
-}
-
 TEST(StateAssessor, NamesOfTheStates) {
   EXPECT_EQ(toString(LocalizationState::kOffMap), "OFF_MAP");
   EXPECT_EQ(toString(LocalizationState::kNoMap), "NO_MAP");

@@ -107,7 +107,6 @@ class ReconfigureTest(unittest.TestCase):
         self.assert_refused({'dpso/phi2': float('nan')}, "'dpso/phi2' = nan", '[0, 4]')
         self.assert_refused({'tracker': 'crystal_ball', 'dpso/phi2': 0.5}, "'tracker' = crystal_ball", 'pf_linear')
         self.assert_refused({'dpso/v0': 0.5}, "'dpso/v0' = 0.5", "'dpso/v0_max' = 0.1")
-        self.assert_refused({'state/window': 2}, "'state/images_to_confirm' = 4", "'state/window' = 2")
 
     def test_3_dynparam(self):
         self.assertIn('/localizer', run(*DYNPARAM, 'list').split())
@@ -121,7 +120,7 @@ class ReconfigureTest(unittest.TestCase):
             make_plain(path)
             before = self.values()
             self.client.update_configuration({'tracker': 'pf_linear', 'dpso/particles': 80, 'prune': False,
-                                              'state/max_distance': 12.5})
+                                              'state/max_scale': 12.5})
             run(*DYNPARAM, 'load', 'localizer', path)
         self.assertEqual(self.values(), before)
         self.assertIn("'dpso/particles': 50", run(*DYNPARAM, 'get', 'localizer'))

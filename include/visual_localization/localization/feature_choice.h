@@ -13,7 +13,6 @@ namespace visual_localization {
 struct HybridConfig {
   double sift_below_m = 7.0;
   double global_above_m = 5.5;
-  bool sift_in_doubt = true;
   int sift_every = 10;
 
   void declare(ParameterVisitor& visitor);

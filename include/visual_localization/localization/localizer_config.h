@@ -20,6 +20,10 @@ namespace visual_localization {
 /// Everything a user can set about localisation. With which parameters features are extracted is not here: the map
 /// says it.
 struct LocalizerConfig : TrackerConfig {
+  /// No position and no heading without landmarks claims a smaller standard deviation.
+  static constexpr double kMinPositionStd_m = 0.5;
+  static constexpr double kMinYawStd_rad = 0.1;
+
   LocalizerConfig() { tracker = "bayes"; }
 
   std::string features = "sift";
@@ -28,8 +32,6 @@ struct LocalizerConfig : TrackerConfig {
   int seed = 1;
   bool prune = false;
   bool choose_session = true;
-  double min_position_std_m = 0.5;
-  double min_yaw_std_rad = 0.1;
   int sweep_images = 20000;
   std::string proposals = "vlad";
   MatchConfig match{MatchConfig().max_angle_ratio, "votes"};

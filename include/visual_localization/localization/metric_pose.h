@@ -38,8 +38,8 @@ struct MatchedLandmarks {
 /// When a pose solved from landmarks counts. What has a comment is no parameter.
 struct MetricConfig {
   std::string pose_source = "metric";
-  int training_images = 5;  ///< whose landmarks are matched: more of them cost more and show the same
-  int min_inliers = 20;
+  int training_images = 5;         ///< whose landmarks are matched: more of them cost more and show the same
+  int min_inliers = 20;            ///< a pose on fewer landmarks is not believed
   int min_inliers_predicted = 12;  ///< where the motion leads: fewer agree there by chance than anywhere
   int min_inliers_tracking = 80;
   double sigma_factor = 1.4;            ///< of the covariance, as if one by one: landmarks of one image err alike

@@ -31,20 +31,20 @@ std::string toString(LocalizationState state);
 struct StateConfig {
   std::string witness = "probability";
   double min_probability = 0.97;
-  double min_similarity = 0.08;
-  int min_matches = 5;  ///< of few features a large share matches by chance
+  double min_similarity = 0.08;  ///< of a best match by local features
+  int min_matches = 5;           ///< of few features a large share matches by chance
   double max_scale = 1.2;
   double min_global_similarity = 0.65;  ///< of a best match by global features
-  double max_distance_m = 5.0;
-  int window = 5;
-  int images_to_confirm = 4;
-  double max_step_m = 10.0;  ///< a larger jump of the estimate voids earlier confirmations
+  double max_distance_m = 5.0;          ///< between a best match that confirms the estimate and it
+  int window = 5;                       ///< how many of the last images decide
+  int images_to_confirm = 4;            ///< how many of them must confirm
+  double max_step_m = 10.0;             ///< a larger jump of the estimate voids earlier confirmations
   bool place_check = true;
-  double sure_similarity = 0.2;  ///< a stronger match of local features needs no place check
-  double min_place_ratio = 0.985;
+  double sure_similarity = 0.2;    ///< a stronger match of local features needs no place check
+  double min_place_ratio = 0.985;  ///< mean over the window; below, the images look more like another place
   double max_motion_residual_m = 2.5;
-  int off_map_images = 10;
-  int min_features = 10;  ///< an image with fewer is blind and says nothing about OFF_MAP
+  int off_map_images = 10;  ///< that confirm nothing
+  int min_features = 10;    ///< an image with fewer is blind and says nothing about OFF_MAP
   int frozen_images = 3;
   double frozen_time_s = 1.0;  ///< a stream may repeat each image to reach its rate
 

@@ -67,7 +67,6 @@ struct ParticleFilterConfig {
 /// Parameters of the discrete Bayes filter over the training images.
 struct BayesConfig {
   double anywhere = 0.02;
-  double exponent = 0.0;
   double uniform = 0.03;        ///< share of the likelihood that is the same everywhere; no parameter
   int comparisons = 60;         ///< of an image while the position is known; no parameter
   int first_comparisons = 400;  ///< while it is not; no parameter
