@@ -156,6 +156,28 @@ TEST(Receivers, RoundedCoordinatesAreNeitherStepsNorMultipath) {
   }
 }
 
+TEST(Receivers, LateStampsAreNoSteps) {
+  const Path drive = car();
+  const Path parked = [drive](double time_s) { return drive(std::max(0.0, time_s - 350.0)); };
+  for (const double rate_hz : {5.0, 10.0}) {
+    for (const double sigma_m : {0.0, 0.05}) {
+      std::vector<Fix> fixes = recordedBy(parked, {"exact", rate_hz, 0.01, 0.0, 1.0, sigma_m});
+      std::mt19937 engine(3);
+      std::exponential_distribution<double> late(1.0 / 0.02);
+      std::uniform_real_distribution<double> uniform;
+      std::int64_t before_ns = 0;
+      for (Fix& fix : fixes) {  // a busy driver: what waits is stamped behind what came before
+        const double stuck_s = uniform(engine) < 0.03 ? 0.1 + 0.3 * uniform(engine) : 0.0;
+        fix.stamp_ns += static_cast<std::int64_t>(1e9 * (late(engine) + stuck_s));
+        fix.stamp_ns = std::max(fix.stamp_ns, before_ns + 1000);
+        before_ns = fix.stamp_ns;
+      }
+      EXPECT_LE(meanOf(errorsOf(clean(fixes), parked, kDrive_s)), 1.1 * rawError_m(fixes, parked) + 0.01)
+          << rate_hz << " Hz, " << sigma_m << " m";
+    }
+  }
+}
+
 TEST(Receivers, ARobotThatDrivesMoreSlowlyForAWhileIsBelieved) {
   const Path path = slowForAWhile();
   for (const double rate_hz : {1.0, 5.0}) {
