@@ -145,6 +145,7 @@ double roundingOf(const std::vector<PathSample>& samples) {
   constexpr double kNothing_m = 0.01;   // the frame of a large map is not quite straight
   constexpr double kSmall = 0.1;        // of the changes
   constexpr double kLeastShare = 0.05;  // fewer changes are steps and turns
+  constexpr double kFewest = 20.0;
   constexpr double kOfUniform = 1.0 / 12.0;
   double variance = 0.0;
   for (const int axis : {0, 1}) {
@@ -154,8 +155,8 @@ double roundingOf(const std::vector<PathSample>& samples) {
           samples[i].position_m[axis] - 2.0 * samples[i - 1].position_m[axis] + samples[i - 2].position_m[axis];
       if (std::abs(change_m) > kNothing_m) changes_m.push_back(std::abs(change_m));
     }
-    if (changes_m.empty() || static_cast<double>(changes_m.size()) < kLeastShare * static_cast<double>(samples.size()))
-      continue;
+    const double least = std::max(kFewest, kLeastShare * static_cast<double>(samples.size()));
+    if (static_cast<double>(changes_m.size()) < least) continue;
     variance += kOfUniform * std::pow(nearestRank(changes_m, kSmall), 2) / 2.0;
   }
   return std::sqrt(variance);

@@ -166,17 +166,19 @@ Eigen::Vector2d limited(const Eigen::Vector2d& velocity_mps, double mean_mps) {
 
 std::vector<PathState> smoothPath(std::vector<Measurement> measurements, const Motion& motion) {
   constexpr int kIterations = 4;
+  constexpr int kMostDrops = 10;  // an hour of hostile steps takes seconds
   splitByPromises(measurements);
   std::vector<Measurement> said = measurements;
   std::vector<Aside> asides = unknownAsides(said);
   bool steps = false;
+  int drops = 0;
   std::vector<PathState> path;
   do {
     measurements = said;
     steps = hasSteps(said);
     if (steps) weighStretches(said, {}, measurements);
     path = smooth(measurements, asides, motion);
-  } while (steps && dropUntold(path, said));
+  } while (steps && drops++ < kMostDrops && dropUntold(path, said));
   const bool doubts =
       std::any_of(said.begin(), said.end(), [](const Measurement& measurement) { return measurement.aside; });
   for (int iteration = 0; (doubts || steps) && iteration < kIterations; ++iteration) {
