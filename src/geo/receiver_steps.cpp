@@ -32,16 +32,17 @@ Eigen::Vector2d velocityAround(const std::vector<PathSample>& samples, std::size
 struct Sides {
   std::vector<Eigen::Vector2d> before_m;
   std::vector<Eigen::Vector2d> behind_m;
-
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();
 
-  /// Without what stamps explain that are a little late from here on.
+  /// What is left of it where stamps that are a little late from here on explain most.
   double apart_m() const {
     constexpr double kLate_s = 0.1;
+    constexpr double kMost = 0.5;
     const Eigen::Vector2d apart_m = medianOf(behind_m) - medianOf(before_m);
     const double squared = std::max(velocity_mps.squaredNorm(), 1e-12);
     const double late_s = std::clamp(apart_m.dot(velocity_mps) / squared, -kLate_s, kLate_s);
-    return (apart_m - late_s * velocity_mps).norm();
+    const double left_m = (apart_m - late_s * velocity_mps).norm();
+    return left_m < kMost * apart_m.norm() ? left_m : apart_m.norm();
   }
 };
 
