@@ -40,8 +40,8 @@ std::size_t largestJump(const std::vector<PathSample>& samples, const std::vecto
   return at;
 }
 
-/// Speed from one sample to another by errors that come and go: usual over about kSpeedLag_s, where noise and steps are
-/// no motion, or all the way, where an error leads back against the drive. None: too short.
+/// Speed from one sample to another. The median over about kSpeedLag_s is not made faster by noise and steps, that of
+/// the whole way not slower by an error that moves against the drive: the larger of the two. None: too short.
 std::optional<double> speedBetween(const std::vector<PathSample>& samples, std::size_t first, std::size_t last) {
   const auto speed_mps = [&](std::size_t from, std::size_t to) {
     return (samples[to].position_m - samples[from].position_m).norm() / (samples[to].time_s - samples[from].time_s);
@@ -104,7 +104,7 @@ bool FixJudge::isSlowerSomewhere(double constant_mps) const {
 SpeedPrior FixJudge::select(double least_density, const std::vector<bool>& believed, bool varies) {
   std::vector<bool> steps;
   for (const Node& node : nodes_) steps.push_back(node.is_behind_step);
-  scales_ = learnScales(samples_, believed, least_density, steps, roundingOf(usable_.samples));
+  scales_ = learnScales(samples_, believed, least_density, steps, usable_.rounding_m);
   motion_ = {scales_.acceleration_density, scales_.usual_mps};
   const SpeedPrior speeds(samples_, scales_, config_.speed_tolerance, varies);
   chosen_ = selectNodes(samples_, scales_, speeds, config_.max_bridge_s, steps);

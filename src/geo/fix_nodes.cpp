@@ -106,6 +106,28 @@ std::vector<std::size_t> withoutRepeated(const std::vector<Fix>& fixes, const st
   return kept;
 }
 
+/// What rounding of the coordinates leaves along one axis: a standard deviation. Next to nothing for exact ones.
+double roundingOf(const std::vector<PathSample>& samples) {
+  constexpr double kNothing_m = 0.01;   // the frame of a large map is not quite straight
+  constexpr double kSmall = 0.1;        // of the changes
+  constexpr double kLeastShare = 0.05;  // fewer changes are steps and turns
+  constexpr double kFewest = 20.0;
+  constexpr double kOfUniform = 1.0 / 12.0;
+  double variance = 0.0;
+  for (const int axis : {0, 1}) {
+    std::vector<double> changes_m;  // of the way from fix to fix
+    for (std::size_t i = 2; i < samples.size(); ++i) {
+      const double change_m =
+          samples[i].position_m[axis] - 2.0 * samples[i - 1].position_m[axis] + samples[i - 2].position_m[axis];
+      if (std::abs(change_m) > kNothing_m) changes_m.push_back(std::abs(change_m));
+    }
+    const double least = std::max(kFewest, kLeastShare * static_cast<double>(samples.size()));
+    if (static_cast<double>(changes_m.size()) < least) continue;
+    variance += kOfUniform * std::pow(nearestRank(changes_m, kSmall), 2) / 2.0;
+  }
+  return std::sqrt(variance);
+}
+
 }  // namespace
 
 UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, std::vector<FixVerdict>& verdicts) {
@@ -132,6 +154,7 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
     const double sigma_m = fixes[i].sigma_m;
     usable.sigmas_m.push_back(sigma_m > 0.0 && std::isfinite(sigma_m) ? sigma_m : 0.0);
   }
+  usable.rounding_m = roundingOf(usable.samples);
   return usable;
 }
 
@@ -139,27 +162,6 @@ double typicalInterval(const std::vector<PathSample>& samples) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < samples.size(); ++i) intervals.push_back(samples[i].time_s - samples[i - 1].time_s);
   return median(std::move(intervals));
-}
-
-double roundingOf(const std::vector<PathSample>& samples) {
-  constexpr double kNothing_m = 0.01;   // the frame of a large map is not quite straight
-  constexpr double kSmall = 0.1;        // of the changes
-  constexpr double kLeastShare = 0.05;  // fewer changes are steps and turns
-  constexpr double kFewest = 20.0;
-  constexpr double kOfUniform = 1.0 / 12.0;
-  double variance = 0.0;
-  for (const int axis : {0, 1}) {
-    std::vector<double> changes_m;  // of the way from fix to fix
-    for (std::size_t i = 2; i < samples.size(); ++i) {
-      const double change_m =
-          samples[i].position_m[axis] - 2.0 * samples[i - 1].position_m[axis] + samples[i - 2].position_m[axis];
-      if (std::abs(change_m) > kNothing_m) changes_m.push_back(std::abs(change_m));
-    }
-    const double least = std::max(kFewest, kLeastShare * static_cast<double>(samples.size()));
-    if (static_cast<double>(changes_m.size()) < least) continue;
-    variance += kOfUniform * std::pow(nearestRank(changes_m, kSmall), 2) / 2.0;
-  }
-  return std::sqrt(variance);
 }
 
 std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::vector<std::size_t>& steps) {

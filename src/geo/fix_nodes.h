@@ -17,6 +17,7 @@ struct UsableFixes {
   std::vector<PathSample> samples;   ///< time since the first of them
   std::vector<std::size_t> indices;  ///< of the fixes as given
   std::vector<double> sigmas_m;      ///< by the receiver's own claim; 0: none
+  double rounding_m = 0.0;           ///< standard deviation along one axis by the rounding of the coordinates
 };
 
 /// Fixes that follow each other, summarised by their median.
@@ -32,9 +33,6 @@ UsableFixes usableFixes(const std::vector<Fix>& fixes, const LocalFrame& frame, 
 
 /// Median of the times between fixes.
 double typicalInterval(const std::vector<PathSample>& samples);
-
-/// What rounding of the coordinates leaves along one axis: a standard deviation. Next to nothing for exact ones.
-double roundingOf(const std::vector<PathSample>& samples);
 
 /// Nodes of about `node_s` seconds, none across one of `steps`.
 std::vector<Node> nodesOf(const UsableFixes& usable, double node_s, const std::vector<std::size_t>& steps);

@@ -102,7 +102,7 @@ std::vector<std::size_t> stepsIn(const UsableFixes& usable) {
     if (is_fast) aside_m[i] = sidesOf(samples, i, beside).apart_m();
   }
   std::vector<std::size_t> steps;
-  const double usual_m = std::max(median(aside_m), kMedianOfPlane * roundingOf(samples));
+  const double usual_m = std::max(median(aside_m), kMedianOfPlane * usable.rounding_m);
   for (std::size_t i = beside; i + beside <= samples.size(); ++i) {
     const double promised_m = usable.sigmas_m[i];
     const double half_s = 0.25 * (samples[i + beside - 1].time_s - samples[i - beside].time_s);
