@@ -23,6 +23,14 @@ LensProjection BundleProblem::lensOf(std::size_t camera) const {
   return {lens.published, lens.correction};
 }
 
+std::optional<Eigen::Vector3d> wayAt(const BundleProblem& problem, std::size_t camera) {
+  constexpr double kShortest_m = 0.2;
+  constexpr double kLongest_m = 20.0;
+  const Eigen::Vector3d way_m = problem.cameras[camera + 1].position_m - problem.cameras[camera - 1].position_m;
+  if (way_m.norm() < kShortest_m || way_m.norm() > kLongest_m) return std::nullopt;
+  return way_m;
+}
+
 double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark,
                             const LandmarkObservation& observation) {
   const Eigen::Vector3d point = problem.cameras[observation.image].toCamera(landmark.position_m);

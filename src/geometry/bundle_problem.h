@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -85,6 +86,10 @@ struct BundleProblem {
   const BundleSession& sessionOf(std::size_t camera) const;
   LensProjection lensOf(std::size_t camera) const;
 };
+
+/// From the camera before to the one behind it, metres; nothing where it hardly moves, since its direction of travel
+/// says little there. There must be both, in one session.
+std::optional<Eigen::Vector3d> wayAt(const BundleProblem& problem, std::size_t camera);
 
 /// Distance of where a landmark is seen from where it projects to, pixels; infinite behind the camera.
 double reprojectionError_px(const BundleProblem& problem, const Landmark& landmark,

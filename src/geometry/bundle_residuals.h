@@ -273,16 +273,13 @@ inline SlopeResidual slopeOf(const BundleProblem& problem, const BundleConfig& c
   return {problem.road[camera].slope * run_m, config.slope_sigma * correlated_m + kRoughness_m};
 }
 
-/// Of a camera with one of its session before and one behind it; nothing where it hardly moves, since its direction of
-/// travel says little there.
+/// Of a camera that has a way.
 inline std::optional<TravelResidual> travelOf(const BundleProblem& problem, const BundleConfig& config,
                                               std::size_t camera) {
-  constexpr double kShortestWay_m = 0.2;
-  constexpr double kLongestWay_m = 20.0;
   constexpr double kWayNoise_m = 0.05;
-  const Eigen::Vector3d way_m = problem.cameras[camera + 1].position_m - problem.cameras[camera - 1].position_m;
-  if (way_m.norm() < kShortestWay_m || way_m.norm() > kLongestWay_m) return std::nullopt;
-  const double noise_rad = kWayNoise_m / way_m.norm();
+  const std::optional<Eigen::Vector3d> way_m = wayAt(problem, camera);
+  if (!way_m) return std::nullopt;
+  const double noise_rad = kWayNoise_m / way_m->norm();
   return TravelResidual{
       RobotAttitude(problem.cameras[camera].rotation, problem.sessionOf(camera).mounting),
       problem.road[camera].direction,

@@ -12,6 +12,7 @@
 #include "geometry/bundle_adjustment.h"
 #include "geometry/feature_tracks.h"
 #include "geometry/fix_budget.h"
+#include "geometry/heading_offset.h"
 #include "geometry/pose_solver.h"
 #include "geometry/rays.h"
 #include "geometry/relative_rotation.h"
@@ -124,6 +125,8 @@ class Reconstruction {
   const SharedSigmas& sigmas() const { return shared_; }
   /// Finds what errors of the receiver may have left in a single session, which has been adjusted.
   void findBudget();
+  /// Headings of the robot of a single session, by the mounting as it was adjusted, at images that it drives between.
+  std::vector<DrivenHeading> drivenHeadings() const;
   /// What it came to, session by session; landmark ids begin with `first_id`.
   std::vector<SessionGeometry> results(std::uint32_t first_id) const;
 

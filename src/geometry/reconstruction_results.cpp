@@ -75,6 +75,25 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   return geometries;
 }
 
+std::vector<DrivenHeading> Reconstruction::drivenHeadings() const {
+  const BundleSession& session = problem_.sessions.front();
+  const Eigen::Quaterniond camera_from_robot =
+      (levelCamera(0.0) * session.mounting * Eigen::Quaterniond(exponential(session.mounting_rad))).conjugate();
+  const auto yaw_rad = [&](std::size_t i) {
+    const Eigen::Vector3d ahead = problem_.cameras[i].rotation * camera_from_robot * Eigen::Vector3d::UnitX();
+    return std::atan2(ahead.y(), ahead.x());
+  };
+  std::vector<DrivenHeading> driven;
+  for (std::size_t i = 1; i + 1 < problem_.cameras.size(); ++i) {
+    const std::optional<Eigen::Vector3d> way_m = wayAt(problem_, i);
+    if (!way_m) continue;
+    const double direction = problem_.road[i].direction;
+    driven.push_back({angleDifference(std::atan2(direction * way_m->y(), direction * way_m->x()), yaw_rad(i)),
+                      direction * angleDifference(yaw_rad(i - 1), yaw_rad(i + 1)) / way_m->norm()});
+  }
+  return driven;
+}
+
 /// The sessions that show landmarks of each image, its own included.
 std::vector<Reconstruction::TiedSessions> Reconstruction::tiedSessions() const {
   const std::vector<double> away_m = distancesFromFixes_m();

@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kMaxTurn_rad = 0.6;  ///< from one image to the next
 constexpr double kMaxRevisitTurn_rad = 0.8;
+constexpr double kTurned_rad = 0.17;  ///< of a camera that nobody described: beyond that it is not level and ahead
 constexpr std::uint32_t kRotationSpan = 3;  ///< images farther apart say little about each other's rotation
 constexpr double kContradiction = 3.0;      ///< sigmas of a calibration, beyond which it is none of this camera
 constexpr double kAllFixes_m = std::numeric_limits<double>::infinity();
@@ -116,10 +117,7 @@ class SessionAdjuster {
   /// Of a single session; landmark ids begin with `first_id`.
   SessionGeometry result(std::uint32_t first_id) const {
     SessionGeometry geometry = std::move(reconstruction_.results(first_id).front());
-    if (found_mounting_) {
-      geometry.found_camera =
-          CameraPose{levelCamera(0.0) * Eigen::Quaterniond(exponential(geometry.mounting_rad)), {0.0, 0.0, 0.0}};
-    }
+    if (tells_mounting_) geometry.found_camera = foundCamera(geometry.mounting_rad);
     const LensCorrection& lens = reconstruction_.lensCorrection(0);
     LensCorrection known = lens_sigma_;
     known[kAspect] = kStretchedAspect;
@@ -172,11 +170,30 @@ class SessionAdjuster {
   /// What is nearly level and ahead the adjustment finds by itself.
   void findMounting(const std::vector<double>& headings_rad, const std::vector<double>& directions,
                     const std::vector<RelativeRotation>& relative) {
-    constexpr double kTurned_rad = 0.17;
     const Eigen::Quaterniond level = levelCamera(0.0);
     const auto found = mountingByImages(headings_rad, directions, relative);
-    found_mounting_ = found && found->angularDistance(level) > kTurned_rad;
-    session_.mount.camera.rotation = found_mounting_ ? *found : level;
+    tells_mounting_ = found.has_value();
+    is_turned_ = found && found->angularDistance(level) > kTurned_rad;
+    session_.mount.camera.rotation = is_turned_ ? *found : level;
+  }
+
+  /// Its yaw by where the robot drives. Who mounts a camera wants it to look ahead, aside or back: that is its yaw
+  /// unless the drive says significantly otherwise. Nothing for one that is level and ahead as far as can be told.
+  std::optional<CameraPose> foundCamera(const Eigen::Vector3d& mounting_rad) const {
+    constexpr double kSignificant = 3.0;  // sigmas
+    constexpr double kRightAngle_rad = 0.5 * kPi;
+    CameraPose camera{levelCamera(0.0) * Eigen::Quaterniond(exponential(mounting_rad)), {0.0, 0.0, 0.0}};
+    const HeadingOffset offset = headingOffset(reconstruction_.drivenHeadings());
+    const double yaw_rad = camera.yaw_rad() + offset.yaw_rad;
+    const double off_rad = std::remainder(yaw_rad, kRightAngle_rad);
+    const bool is_significant = std::abs(off_rad) > std::min(kSignificant * offset.sigma_rad, kTurned_rad);
+    if (is_turned_) {
+      const double correction_rad = offset.yaw_rad - (is_significant ? 0.0 : off_rad);
+      camera.rotation = Eigen::AngleAxisd(correction_rad, Eigen::Vector3d::UnitZ()) * camera.rotation;
+      return camera;
+    }
+    if (!is_significant) return std::nullopt;
+    return CameraPose{levelCamera(yaw_rad), {0.0, 0.0, 0.0}};
   }
 
   /// Coarse positions first, so the first landmarks are off by many pixels; then again from what that came to.
@@ -206,7 +223,8 @@ class SessionAdjuster {
   const LensCorrection lens_sigma_;
   PairMatcher matcher_;
   Reconstruction reconstruction_;
-  bool found_mounting_ = false;
+  bool tells_mounting_ = false;  ///< the drive does
+  bool is_turned_ = false;       ///< far from a level camera that looks ahead
 };
 
 /// Sessions that were adjusted on their own, tied to each other where they overlap.

@@ -1,5 +1,8 @@
 // Cameras that are mounted in any attitude, and robots that reverse.
 
+#include <cmath>
+#include <optional>
+
 #include <gtest/gtest.h>
 
 #include "base/numbers.h"
@@ -61,14 +64,33 @@ TEST_P(UnknownMounting, IsFoundByTheImages) {
   EXPECT_GT(imagesIn(geometry), drive.truth.size() * 2 / 3);
   EXPECT_LT(pathError_m(geometry, drive.truth), kTimes * kPathError_m);
   ASSERT_TRUE(geometry.found_camera);
-  EXPECT_LT(geometry.found_camera->rotation.angularDistance(levelCamera(0.0) * test::mountingOf(street)),
-            toRadians(2.0));
+  const Eigen::Quaterniond truth = levelCamera(0.0) * test::mountingOf(street);
+  EXPECT_LT(geometry.found_camera->rotation.angularDistance(truth), toRadians(2.0));
+  if (std::remainder(GetParam().x(), 90.0) != 0.0) return;
+  const CameraPose looks{truth, {0.0, 0.0, 0.0}};
+  EXPECT_NEAR(std::remainder(geometry.found_camera->yaw_rad() - looks.yaw_rad(), 2.0 * kPi), 0.0, 1e-6)
+      << "nothing significant against ahead, aside or back";
 }
 
 INSTANTIATE_TEST_SUITE_P(Mountings, UnknownMounting,
                          testing::Values(Eigen::Vector3d(0.0, 0.0, 20.0), Eigen::Vector3d(0.0, 0.0, 90.0),
                                          Eigen::Vector3d(0.0, 0.0, 180.0), Eigen::Vector3d(90.0, 0.0, 0.0),
                                          Eigen::Vector3d(180.0, 0.0, 0.0), Eigen::Vector3d(-45.0, -10.0, 90.0)));
+
+/// How a camera is mounted that looks ahead but for `yaw_deg` to the right, by the drive.
+std::optional<CameraPose> foundMounting(double yaw_deg) {
+  const RecordedDrive drive = recorded(streetWith({yaw_deg, 0.0, 0.0}), 61);
+  UnadjustedSession session = drive.unadjusted();
+  session.finds_mount = true;
+  return adjustSessions({session}, {}, 1).front().found_camera;
+}
+
+TEST(UnknownMountingOfALevelCamera, IsTurnedAsFarAsTheDriveSaysSignificantly) {
+  const std::optional<CameraPose> camera = foundMounting(5.0);
+  ASSERT_TRUE(camera);
+  EXPECT_LT(camera->rotation.angularDistance(levelCamera(toRadians(-5.0))), toRadians(1.0));
+  EXPECT_NEAR(camera->ahead().z(), 0.0, 1e-9) << "the drive says nothing about its pitch";
+}
 
 TEST(UnknownMountingOfALevelCamera, IsLeftToTheAdjustment) {
   const RecordedDrive drive = recorded({}, 61);
