@@ -182,11 +182,14 @@ class SessionAdjuster {
   std::optional<CameraPose> foundCamera(const Eigen::Vector3d& mounting_rad) const {
     constexpr double kSignificant = 3.0;  // sigmas
     constexpr double kRightAngle_rad = 0.5 * kPi;
+    constexpr double kLevel = 0.7;
     CameraPose camera{levelCamera(0.0) * Eigen::Quaterniond(exponential(mounting_rad)), {0.0, 0.0, 0.0}};
     const HeadingOffset offset = headingOffset(reconstruction_.drivenHeadings());
     const double yaw_rad = camera.yaw_rad() + offset.yaw_rad;
     const double off_rad = std::remainder(yaw_rad, kRightAngle_rad);
-    const bool is_significant = std::abs(off_rad) > std::min(kSignificant * offset.sigma_rad, kTurned_rad);
+    const bool looks_down = camera.ahead().head<2>().norm() < kLevel;  // or up, and has no yaw to speak of
+    const bool is_significant =
+        looks_down || std::abs(off_rad) > std::min(kSignificant * offset.sigma_rad, kTurned_rad);
     if (is_turned_) {
       const double correction_rad = offset.yaw_rad - (is_significant ? 0.0 : off_rad);
       camera.rotation = Eigen::AngleAxisd(correction_rad, Eigen::Vector3d::UnitZ()) * camera.rotation;
