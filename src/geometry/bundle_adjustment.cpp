@@ -268,7 +268,8 @@ class Adjustment {
     options.max_num_iterations = config_.max_iterations;
     options.logging_type = ceres::SILENT;
     options.function_tolerance = config_.tolerance;
-    options.use_nonmonotonic_steps = true;  // along a flat valley it takes a third fewer
+    options.max_num_consecutive_invalid_steps = 20;  // each damps more; one too many and the whole adjustment is lost
+    options.use_nonmonotonic_steps = true;           // along a flat valley it takes a third fewer
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     const auto add = [&](double* block, int group) {
       if (ceres_.HasParameterBlock(block)) options.linear_solver_ordering->AddElementToGroup(block, group);
