@@ -17,27 +17,23 @@ constexpr std::size_t kStretches = 12;
 constexpr std::size_t kLeast = 3 * kStretches;
 constexpr double kLeastScatter_rad = 1e-5;
 
-/// The offset of the headings outside [begin, end).
-double offsetWithout(const std::vector<DrivenHeading>& driven, std::size_t begin, std::size_t end) {
+double offsetOf(const std::vector<DrivenHeading>& driven) {
   constexpr int kSteps = 20;
   constexpr double kNormal = 1.4826;
   constexpr double kLoss = 2.0;      // sigmas
   constexpr double kDamping = 1e-9;  // where all is straight, no distance is told
   Eigen::Vector2d solution = Eigen::Vector2d::Zero();
+  std::vector<double> residuals(driven.size());
   for (int step = 0; step < kSteps; ++step) {
-    std::vector<double> residuals;
-    for (std::size_t i = 0; i < driven.size(); ++i) {
-      if (i >= begin && i < end) continue;
-      residuals.push_back(std::abs(driven[i].beside_rad - solution.dot(Eigen::Vector2d(1.0, driven[i].curvature_1_m))));
-    }
+    std::transform(driven.begin(), driven.end(), residuals.begin(), [&](const DrivenHeading& heading) {
+      return std::abs(heading.beside_rad - solution.dot(Eigen::Vector2d(1.0, heading.curvature_1_m)));
+    });
     const double scale = kLoss * std::max(kNormal * median(residuals), kLeastScatter_rad);
     Eigen::Matrix2d normal = kDamping * Eigen::Matrix2d::Identity();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
-    std::size_t next = 0;
     for (std::size_t i = 0; i < driven.size(); ++i) {
-      if (i >= begin && i < end) continue;
       const Eigen::Vector2d row(1.0, driven[i].curvature_1_m);
-      const double in_scale = residuals[next++] / scale;
+      const double in_scale = residuals[i] / scale;
       const double weight = 1.0 / (1.0 + in_scale * in_scale);
       normal += weight * row * row.transpose();
       right += weight * driven[i].beside_rad * row;
@@ -47,17 +43,25 @@ double offsetWithout(const std::vector<DrivenHeading>& driven, std::size_t begin
   return solution[0];
 }
 
+/// All but the k-th of the stretches.
+std::vector<DrivenHeading> without(std::size_t k, std::vector<DrivenHeading> driven) {
+  const auto at = [&](std::size_t stretch) {
+    return driven.begin() + static_cast<std::ptrdiff_t>(stretch * driven.size() / kStretches);
+  };
+  driven.erase(at(k), at(k + 1));
+  return driven;
+}
+
 }  // namespace
 
 HeadingOffset headingOffset(const std::vector<DrivenHeading>& driven) {
   if (driven.size() < kLeast) return {0.0, std::numeric_limits<double>::infinity()};
-  Eigen::Array<double, kStretches, 1> without;
+  Eigen::Array<double, kStretches, 1> offsets_rad;
   for (std::size_t k = 0; k < kStretches; ++k) {
-    without[static_cast<Eigen::Index>(k)] =
-        offsetWithout(driven, k * driven.size() / kStretches, (k + 1) * driven.size() / kStretches);
+    offsets_rad[static_cast<Eigen::Index>(k)] = offsetOf(without(k, driven));
   }
   const double share = (kStretches - 1.0) / kStretches;
-  return {offsetWithout(driven, 0, 0), std::sqrt(share * (without - without.mean()).square().sum())};
+  return {offsetOf(driven), std::sqrt(share * (offsets_rad - offsets_rad.mean()).square().sum())};
 }
 
 }  // namespace visual_localization

@@ -77,16 +77,11 @@ INSTANTIATE_TEST_SUITE_P(Mountings, UnknownMounting,
                                          Eigen::Vector3d(0.0, 0.0, 180.0), Eigen::Vector3d(90.0, 0.0, 0.0),
                                          Eigen::Vector3d(180.0, 0.0, 0.0), Eigen::Vector3d(-45.0, -10.0, 90.0)));
 
-/// How a camera is mounted that looks ahead but for `yaw_deg` to the right, by the drive.
-std::optional<CameraPose> foundMounting(double yaw_deg) {
-  const RecordedDrive drive = recorded(streetWith({yaw_deg, 0.0, 0.0}), 61);
+TEST(UnknownMountingOfALevelCamera, IsTurnedAsFarAsTheDriveSaysSignificantly) {
+  const RecordedDrive drive = recorded(streetWith({5.0, 0.0, 0.0}), 61);
   UnadjustedSession session = drive.unadjusted();
   session.finds_mount = true;
-  return adjustSessions({session}, {}, 1).front().found_camera;
-}
-
-TEST(UnknownMountingOfALevelCamera, IsTurnedAsFarAsTheDriveSaysSignificantly) {
-  const std::optional<CameraPose> camera = foundMounting(5.0);
+  const std::optional<CameraPose> camera = adjustSessions({session}, {}, 1).front().found_camera;
   ASSERT_TRUE(camera);
   EXPECT_LT(camera->rotation.angularDistance(levelCamera(toRadians(-5.0))), toRadians(1.0));
   EXPECT_NEAR(camera->ahead().z(), 0.0, 1e-9) << "the drive says nothing about its pitch";
