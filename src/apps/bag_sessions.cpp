@@ -30,14 +30,6 @@
 namespace visual_localization::apps {
 namespace {
 
-void overrideWith(MapBuilderConfig& config, const char* option, const char* parameter, const ParameterValue& value) {
-  try {
-    assignParameters(config, {{parameter, value}});
-  } catch (const ParameterError& error) {
-    throw UsageError(std::string(option) + ": " + error.what());
-  }
-}
-
 /// Bags of the same name in different folders get different session names.
 std::string sessionName(const std::string& bag, const std::vector<PlottedSession>& sessions) {
   std::set<std::string> used;
@@ -152,25 +144,65 @@ void addTo(MapBuilder& builder, const BagReader& bag, const MapBuilderOptions& o
 
 }  // namespace
 
+namespace {
+
+struct GivenParameter {
+  const char* option;
+  const char* name;
+  ParameterValue value;
+};
+
+/// What the options set. Throws UsageError, naming the option, for what is out of range or contradicts a preset, even
+/// where it is a default.
+ParameterValues valuesOf(const MapBuilderOptions& options) {
+  std::vector<GivenParameter> all;
+  if (options.min_spacing_m) all.push_back({"--min-spacing", "map/min_spacing", *options.min_spacing_m});
+  if (options.spacing_m) {
+    all.push_back({"--spacing", "map/spacing", *options.spacing_m});
+    all.push_back({"--spacing", "geometry/spacing", *options.spacing_m});
+  }
+  if (options.self_calibrate) all.push_back({"--self-calibrate", "geometry/self_calibration", true});
+  if (!options.model.empty()) {
+    all.push_back({"--model", "map/features", std::string("learned")});
+    all.push_back({"--model", "map/model", options.model});
+  }
+  ParameterValues given;
+  if (!options.preset.empty()) given["preset"] = options.preset;
+  mapBuilderValues(given);
+  for (const GivenParameter& one : all) {
+    try {
+      MapBuilderConfig alone;
+      assignParameters(alone, {{one.name, one.value}});
+      given[one.name] = one.value;
+      mapBuilderValues(given);
+    } catch (const ParameterError& error) {
+      throw UsageError(std::string(one.option) + ": " + error.what());
+    }
+  }
+  return given;
+}
+
+}  // namespace
+
 MapBuilderConfig readConfig(const MapBuilderOptions& options) {
   MapBuilderConfig config;
+  const ParameterValues defaults = visual_localization::valuesOf(config);
+  ParameterValues of_file;
   if (!options.config.empty()) {
-    const ParameterValues values = parameters::readYaml(options.config);
     try {
-      assignParameters(config, values);
+      of_file = parameters::readYaml(options.config);
+      if (!options.preset.empty()) of_file["preset"] = options.preset;
+      assignParameters(config, mapBuilderValues(of_file, defaults));
     } catch (const ParameterError& error) {
       throw ParameterError(options.config + ": " + error.what());
     }
   }
-  if (options.min_spacing_m) overrideWith(config, "--min-spacing", "map/min_spacing", *options.min_spacing_m);
-  if (options.spacing_m) {
-    overrideWith(config, "--spacing", "map/spacing", *options.spacing_m);
-    overrideWith(config, "--spacing", "geometry/spacing", *options.spacing_m);
-  }
-  if (options.self_calibrate) overrideWith(config, "--self-calibrate", "geometry/self_calibration", true);
-  if (!options.model.empty()) {
-    overrideWith(config, "--model", "map/features", "learned");
-    overrideWith(config, "--model", "map/model", options.model);
+  try {
+    ParameterValues given = valuesOf(options);
+    given.insert(of_file.begin(), of_file.end());
+    assignParameters(config, mapBuilderValues(given, defaults));
+  } catch (const ParameterError& error) {
+    throw UsageError(error.what());
   }
   return config;
 }

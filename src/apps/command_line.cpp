@@ -67,6 +67,14 @@ void declareCamera(CLI::App& app, Options& options, const std::string& otherwise
   app.add_option("--mask", options.mask, "Grey PNG of the camera's size: features are used where it is white");
 }
 
+template <class Options>
+void declarePreset(CLI::App& app, Options& options) {
+  app.add_option(
+      "--preset", options.preset,
+      "'paper': the papers' text, 'paper_program': the authors' toolkit (parameter 'preset', config/paper.yaml "
+      "and paper_program.yaml)");
+}
+
 void declareRecordings(CLI::App& app, MapBuilderOptions& options) {
   app.add_option("--bag", options.bags, "Recording; repeat it for more sessions in one map")
       ->required()
@@ -95,6 +103,7 @@ void declareThreads(CLI::App& app, std::size_t& threads) {
 
 void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   declareRecordings(app, options);
+  declarePreset(app, options);
   app.add_option("--output", options.output, "Map file to write")->required();
   declareThreads(app, options.threads);
   app.add_flag("--self-calibrate", options.self_calibrate,
@@ -167,9 +176,7 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
   app.add_option("--bag", options.bag, "Recording of the drive")->required();
   app.add_option("--output", options.output, "Track to write, CSV")->required();
   app.add_option("--config", options.config, "Parameters, YAML (see config/localizer.yaml)");
-  app.add_option(
-      "--preset", options.preset,
-      "'paper': parameters to the letter of the papers, in place of the configuration's (config/paper.yaml)");
+  declarePreset(app, options);
   app.add_option("--tracker", options.tracker, "Tracker (parameter 'tracker')");
   app.add_option("--features", options.features, "Features (parameter 'features')");
   app.add_option("--model", options.model, "ONNX file of learned features (parameter 'model')");
@@ -200,6 +207,7 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
 
 void declareOptions(CLI::App& app, EvaluateOptions& options) {
   app.add_option("--config", options.config, "Experiment, YAML (see config/evaluation)")->required();
+  declarePreset(app, options);
   app.add_option("--rounds", options.rounds, "Folder of the bags; default: the one of the YAML file");
   app.add_option("--output", options.output, "Folder for results, report and figures; work found there is not repeated")
       ->required()

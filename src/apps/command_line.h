@@ -29,6 +29,7 @@ struct MapBuilderOptions {
   std::size_t threads = allCores();
   std::string model;
   bool self_calibrate = false;
+  std::string preset;
 };
 
 struct MapEditOptions {
@@ -82,6 +83,7 @@ struct LocalizeOptions {
 
 struct EvaluateOptions {
   std::string config;
+  std::string preset;
   std::string rounds;
   std::string output;
   std::optional<Shard> shard;

@@ -1,8 +1,12 @@
 // Repeats the papers' experiments on recordings: every method on every pair of recordings, from every start image.
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -12,11 +16,13 @@
 
 #include "apps/app_support.h"
 #include "apps/command_line.h"
+#include "apps/commit.h"
 #include "base/files.h"
 #include "base/text.h"
 #include "evaluation/evaluator.h"
 #include "evaluation/experiment.h"
 #include "evaluation/round_recorder.h"
+#include "features/vector_target.h"
 #include "parameters/yaml_map.h"
 
 namespace visual_localization::apps {
@@ -31,18 +37,20 @@ std::string bagPath(const EvaluateOptions& options, const RoundSpec& round) {
 
 constexpr std::size_t kLargestBeside_bytes = std::size_t{64} << 20U;  ///< a calibration, or poses
 
-/// To notice that a small file was edited (FNV-1a, 64 bits).
-std::string fingerprintOf(const std::string& path) {
+/// FNV-1a, 64 bits.
+std::string hashOf(const std::string& text) {
   std::uint64_t hash = 14695981039346656037U;
-  for (const char c : readFile(path, kLargestBeside_bytes))
-    hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
   return std::to_string(hash);
 }
+
+/// To notice that a small file was edited.
+std::string fingerprintOf(const std::string& path) { return hashOf(readFile(path, kLargestBeside_bytes)); }
 
 /// What besides the configuration decides about the results: sizes of the bags, the files beside them, this version.
 std::string provenanceOf(const Experiment& experiment, const EvaluateOptions& options) {
   std::string text = std::string("what,value\npackage_version,") + VISUAL_LOCALIZATION_VERSION + "\nunit_format," +
-                     std::to_string(kUnitFormat) + "\n";
+                     std::to_string(kUnitFormat) + "\npreset," + experiment.front_end.preset + "\n";
   for (const RoundSpec& round : experiment.rounds) {
     std::error_code error;
     const auto size = fs::file_size(bagPath(options, round), error);
@@ -56,6 +64,36 @@ std::string provenanceOf(const Experiment& experiment, const EvaluateOptions& op
     }
   }
   return text;
+}
+
+std::string processorName() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("model name", 0) == 0) return line.substr(std::min(line.size(), line.find(':') + 2));
+  }
+  return "unknown";
+}
+
+/// Every parameter of every method.
+std::string configurationOf(const Experiment& experiment) {
+  std::string text;
+  const auto add = [&text](const ParameterValues& values) {
+    for (const auto& [name, value] : values) text += name + "=" + parameters::toString(value) + "\n";
+  };
+  add(valuesOf(experiment.map));
+  for (const MethodSpec& method : experiment.methods) add(valuesOf(method.localizer));
+  return text;
+}
+
+/// Where the results come from, for people: what decides about them is in provenance.csv.
+void writeOrigin(const Experiment& experiment, const EvaluateOptions& options) {
+  const std::time_t now = std::time(nullptr);
+  std::array<char, 32> date{};
+  std::strftime(date.data(), date.size(), "%Y-%m-%d", std::gmtime(&now));
+  writeFile(options.output + "/origin.csv", std::string("what,value\ncommit,") + kCommit + "\ndate," + date.data() +
+                                                "\nprocessor," + csvField(processorName()) + "\nvector_target," +
+                                                vectorTarget() + "\nconfiguration," +
+                                                hashOf(configurationOf(experiment)) + "\n");
 }
 
 /// One bar for each stage of the work.
@@ -108,7 +146,7 @@ void report(const std::string& folder) {
 
 void run(const EvaluateOptions& options) {
   const std::string yaml = readFile(options.config, parameters::kLargestYaml_bytes);  // once: it may be a pipe
-  const Experiment experiment = parseExperiment(yaml, options.config);
+  const Experiment experiment = parseExperiment(yaml, options.config, options.preset);
   const std::string provenance = provenanceOf(experiment, options);
   const ResultFolder results(options.output, yaml, provenance);
   mergeFolders(experiment, results, options, yaml, provenance);
@@ -120,6 +158,7 @@ void run(const EvaluateOptions& options) {
     return;
   }
   writeResultTables(experiment, results);
+  writeOrigin(experiment, options);
   if (!options.no_report) report(options.output);
   std::printf("%s: %zu pairs, %zu methods, results in %s\n", experiment.name.c_str(), experiment.pairs.size(),
               experiment.methods.size(), options.output.c_str());

@@ -61,22 +61,10 @@ class OdometryFeed {
   std::size_t next_ = 0;
 };
 
-NodeParameters configOf(const LocalizeOptions& options) {
-  // The file is the node's: parameters of the node alone are checked, but not used.
-  NodeParameters config;
-  if (!options.config.empty()) {
-    try {
-      assignParameters(config, parameters::readYaml(options.config));
-    } catch (const ParameterError& error) {
-      throw ParameterError(options.config + ": " + error.what());
-    }
-  }
+/// What the options set.
+ParameterValues valuesOf(const LocalizeOptions& options) {
   ParameterValues given;
-  try {
-    if (!options.preset.empty()) assignParameters(config, presetValues(options.preset));
-  } catch (const ParameterError& error) {
-    throw UsageError("--preset: " + std::string(error.what()));
-  }
+  if (!options.preset.empty()) given["preset"] = options.preset;
   if (!options.tracker.empty()) given["tracker"] = options.tracker;
   if (!options.features.empty()) given["features"] = options.features;
   if (!options.model.empty()) given["model"] = options.model;
@@ -84,10 +72,32 @@ NodeParameters configOf(const LocalizeOptions& options) {
   if (!options.pose_source.empty()) given["pose_source"] = options.pose_source;
   if (options.seed) given["seed"] = *options.seed;
   if (options.map_cache_mb) given["map_cache_mb"] = *options.map_cache_mb;
-  const std::string tracker = options.tracker.empty() ? config.localizer.tracker : options.tracker;
+  localizerValues(given);  // what contradicts a preset is refused, even where it is a default
+  return given;
+}
+
+/// The file is the node's: parameters of the node alone are checked, but not used. The number of particles is the
+/// user's under a preset too: the papers try several.
+NodeParameters configOf(const LocalizeOptions& options) {
+  NodeParameters config;
+  const ParameterValues defaults = visual_localization::valuesOf(config);
+  ParameterValues of_file;
+  if (!options.config.empty()) {
+    try {
+      of_file = parameters::readYaml(options.config);
+      if (!options.preset.empty()) of_file["preset"] = options.preset;
+      assignParameters(config, localizerValues(of_file, defaults));
+    } catch (const ParameterError& error) {
+      throw ParameterError(options.config + ": " + error.what());
+    }
+  }
   try {
-    if (options.particles) given[trackerKind(tracker).particles] = *options.particles;
-    assignParameters(config, given);
+    ParameterValues given = valuesOf(options);
+    given.insert(of_file.begin(), of_file.end());
+    assignParameters(config, localizerValues(given, defaults));
+    if (options.particles) {
+      assignParameters(config, {{trackerKind(config.localizer.tracker).particles, *options.particles}});
+    }
   } catch (const ParameterError& error) {
     throw UsageError(error.what());
   }

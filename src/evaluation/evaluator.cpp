@@ -242,7 +242,7 @@ class Evaluation {
     }
     return startImages(drive.images.size(), experiment_.closed, experiment_.starts);
   }
-  std::size_t runsOf(std::size_t pair) const { return startsOf(pair).size(); }
+  std::size_t runsOf(std::size_t pair) const { return startsOf(pair).size() * experiment_.seeds; }
 
   void runPair(std::size_t pair) {
     const PairSpec& spec = experiment_.pairs[pair];
@@ -273,17 +273,21 @@ class Evaluation {
 
   std::vector<RunRecord> runMethod(const RunContext& context, const MethodSpec& method,
                                    const std::vector<std::size_t>& starts) {
-    std::vector<RunRecord> runs(starts.size());
+    std::vector<RunRecord> runs(starts.size() * experiment_.seeds);
     const std::size_t traced = std::min(experiment_.trace_start, context.drive.images.size() - 1);
     const auto nearest = std::min_element(starts.begin(), starts.end(), [traced](std::size_t a, std::size_t b) {
       const auto distance = [traced](std::size_t start) { return start > traced ? start - traced : traced - start; };
       return distance(a) < distance(b);
     });
     parallelFor(
-        starts.size(), threads_,
-        [&](std::size_t i) { runs[i] = visual_localization::run(context, method, starts[i], starts[i] == *nearest); },
+        runs.size(), threads_,
+        [&](std::size_t i) {
+          const std::size_t start = starts[i % starts.size()];
+          const std::size_t repetition = i / starts.size();
+          runs[i] = visual_localization::run(context, method, start, start == *nearest && repetition == 0, repetition);
+        },
         [&](std::size_t done, std::size_t) { progress_("running", done_ + done, total_); });
-    done_ += starts.size();
+    done_ += runs.size();
     progress_("running", done_, total_);
     return runs;
   }

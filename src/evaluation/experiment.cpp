@@ -9,6 +9,8 @@
 #include "base/text.h"
 #include "parameters/yaml_map.h"
 #include "visual_localization/localization/localizer_config.h"
+#include "visual_localization/localization/tracker.h"
+#include "visual_localization/parameters/presets.h"
 
 namespace visual_localization {
 namespace {
@@ -102,6 +104,10 @@ struct MethodEntry {
 void applyParameters(MethodEntry& entry, const YamlMap& yaml) {
   for (const auto& [key, value] : entry.parameters) {
     if (concernsFrontEnd(key)) yaml.refuse("parameters", "'" + key + "' holds for all methods: set it at the top");
+    if (isOfOtherTrackers(key, entry.method.tracker)) {
+      yaml.refuse("parameters", "of '" + entry.method.name + "': '" + key + "' changes nothing with tracker '" +
+                                    entry.method.tracker + "'");
+    }
     entry.method.settings.emplace_back(key, parameters::toString(value));
   }
   try {
@@ -151,16 +157,30 @@ MethodSpec completed(MethodEntry entry, const std::vector<Setting>& swept, const
   return method;
 }
 
-std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
+/// What methods have in common: the preset, if there is one, and the parameters at the top.
+struct CommonParameters {
+  const Preset* preset = nullptr;
+  ParameterValues given;
+
+  /// For a method with this tracker. Throws ParameterError.
+  LocalizerConfig configFor(const std::string& tracker) const {
+    LocalizerConfig config;
+    if (preset != nullptr) assignParameters(config, {{"preset", preset->name}});
+    assignParameters(config, preset == nullptr ? given : withPreset(*preset, preset->localizerWith(tracker), given));
+    return config;
+  }
+};
+
+std::vector<MethodSpec> readMethod(YamlMap& yaml, const CommonParameters& common) {
   MethodEntry entry;
   entry.name = readName(yaml, "name");
-  entry.method.localizer = base;
-  entry.method.tracker = yaml.text("tracker", base.tracker);
+  entry.method.tracker = yaml.text("tracker");
   const std::vector<std::string>& recognisers = placeRecogniserNames();
   const bool is_recogniser =
       std::find(recognisers.begin(), recognisers.end(), entry.method.tracker) != recognisers.end();
   try {
-    ParameterValues chosen{{"features", yaml.text("features", base.features)}};
+    entry.method.localizer = common.configFor(entry.method.tracker);
+    ParameterValues chosen{{"features", yaml.text("features", entry.method.localizer.features)}};
     if (!is_recogniser) chosen["tracker"] = entry.method.tracker;
     assignParameters(entry.method.localizer, chosen);
   } catch (const ParameterError& error) {
@@ -184,12 +204,12 @@ std::vector<MethodSpec> readMethod(YamlMap& yaml, const LocalizerConfig& base) {
   return methods;
 }
 
-/// Those that sweeps stand for included. `base`: what they have in common. Throws ParameterError that names the key.
-std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) {
+/// Those that sweeps stand for included. Throws ParameterError that names the key.
+std::vector<MethodSpec> readMethods(YamlMap& yaml, const CommonParameters& common) {
   std::vector<MethodSpec> methods;
   std::set<std::string> names;
   for (YamlMap& entry : yaml.maps("methods")) {
-    for (MethodSpec& method : readMethod(entry, base)) {
+    for (MethodSpec& method : readMethod(entry, common)) {
       if (!names.insert(method.name).second) entry.refuse("name", "= '" + method.name + "' appears twice");
       methods.push_back(std::move(method));
     }
@@ -201,6 +221,7 @@ std::vector<MethodSpec> readMethods(YamlMap& yaml, const LocalizerConfig& base) 
 }
 
 constexpr std::size_t kMostStarts = 1000000;
+constexpr std::size_t kMostSeeds = 1000;
 
 Pruning readPruning(YamlMap& yaml) {
   const std::string name = yaml.text("pruning", "previous");
@@ -286,41 +307,43 @@ std::vector<PairSpec> readPairs(YamlMap& yaml, const std::vector<RoundSpec>& rou
   return pairs;
 }
 
-/// As in the papers, unless the experiment says otherwise.
-MapBuilderConfig placesOnly() {
-  MapBuilderConfig config;
-  config.geometry.enabled = false;
-  config.local.choose(Sift());
-  config.prune = true;
-  return config;
+/// Throws ParameterError unless some method's tracker uses each of the parameters at the top.
+void requireUsed(const YamlMap& yaml, const ParameterValues& given, const std::vector<MethodSpec>& methods) {
+  for (const auto& [key, value] : given) {
+    const auto ignores = [&key = key](const MethodSpec& method) { return isOfOtherTrackers(key, method.tracker); };
+    if (!std::all_of(methods.begin(), methods.end(), ignores)) continue;
+    yaml.refuse("parameters", "'" + key + "' changes nothing: no method has a tracker that uses it");
+  }
 }
 
-template <class Config>
-Config configured(YamlMap& yaml, const std::string& key, Config config = {}) {
+/// Landmarks only where the experiment says so.
+MapBuilderConfig mapConfig(YamlMap& yaml, const Preset* preset) {
+  MapBuilderConfig config;
+  config.geometry.enabled = false;
   try {
-    assignParameters(config, yaml.parameters(key));
+    ParameterValues values = yaml.parameters("map_parameters");
+    if (preset != nullptr) {
+      values["preset"] = preset->name;
+      values = withPreset(*preset, preset->map_builder, values);
+    }
+    assignParameters(config, values);
   } catch (const ParameterError& error) {
-    yaml.refuse(key, error.what());
+    yaml.refuse("map_parameters", error.what());
   }
   return config;
 }
 
-/// Defaults with the papers' similarity, then the preset, then what the experiment says.
-LocalizerConfig localizerConfig(YamlMap& yaml) {
-  LocalizerConfig config;
-  config.match = MatchConfig();
-  config.prune = true;
-  config.state.witness = "similarity";
-  const std::string preset = yaml.text("preset", "");
+const Preset* readPreset(YamlMap& yaml, const std::string& instead) {
+  const std::string name = yaml.text("preset", "");
   try {
-    if (!preset.empty()) assignParameters(config, presetValues(preset));
+    const std::string& chosen = instead.empty() ? name : instead;
+    return chosen.empty() ? nullptr : &presetNamed(chosen);
   } catch (const ParameterError& error) {
     yaml.refuse("preset", error.what());
   }
-  return configured(yaml, "parameters", config);
 }
 
-Experiment parse(YamlMap yaml) {
+Experiment parse(YamlMap yaml, const std::string& preset_instead) {
   Experiment experiment;
   experiment.name = readName(yaml, "experiment");
   for (const char* for_the_report : {"title", "source"}) yaml.text(for_the_report, "");
@@ -336,9 +359,16 @@ Experiment parse(YamlMap yaml) {
   experiment.judge_from = yaml.count("judge_from", 0, 0, kMostStarts);
   experiment.found_within_m = yaml.real("found_within", experiment.found_within_m, 0.001, 1000.0);
   experiment.trace_start = yaml.count("trace_start", 0, 0, kMostStarts);
-  experiment.map = configured(yaml, "map_parameters", placesOnly());
-  experiment.front_end = localizerConfig(yaml);
-  experiment.methods = readMethods(yaml, experiment.front_end);
+  experiment.seeds = yaml.count("seeds", 1, 1, kMostSeeds);
+  const CommonParameters common{readPreset(yaml, preset_instead), yaml.parameters("parameters")};
+  experiment.map = mapConfig(yaml, common.preset);
+  try {
+    experiment.front_end = common.configFor("");
+  } catch (const ParameterError& error) {
+    yaml.refuse("parameters", error.what());
+  }
+  experiment.methods = readMethods(yaml, common);
+  requireUsed(yaml, common.given, experiment.methods);
   yaml.requireNoMore();
   return experiment;
 }
@@ -356,8 +386,8 @@ bool Experiment::solvesPoses() const {
          });
 }
 
-Experiment parseExperiment(const std::string& yaml, const std::string& path) {
-  return parse(YamlMap::parse(yaml, path));
+Experiment parseExperiment(const std::string& yaml, const std::string& path, const std::string& preset) {
+  return parse(YamlMap::parse(yaml, path), preset);
 }
 
 }  // namespace visual_localization

@@ -67,6 +67,7 @@ struct Experiment {
   std::vector<RoundSpec> rounds;
   std::vector<PairSpec> pairs;
   std::size_t starts = 0;       ///< runs per pair, spread evenly over the start images; 0 = one for every image
+  std::size_t seeds = 1;        ///< each start is run with so many seeds
   std::size_t start_every = 0;  ///< instead: a run from every so many images; 0: no
   std::size_t run_images = 0;   ///< the longest run; 0: to the end of an open drive, once around a closed one
   std::size_t judge_from = 0;   ///< image of a run from which on estimates are judged
@@ -80,8 +81,8 @@ struct Experiment {
   bool solvesPoses() const;
 };
 
-/// `path` is for messages. Throws ParameterError, in one line that names the file and the key, for anything unknown,
-/// missing or contradictory.
-Experiment parseExperiment(const std::string& yaml, const std::string& path);
+/// `path` is for messages; `preset`: in place of the one that the experiment names. Throws ParameterError, in one line
+/// that names the file and the key, for anything unknown, missing or contradictory.
+Experiment parseExperiment(const std::string& yaml, const std::string& path, const std::string& preset = "");
 
 }  // namespace visual_localization

@@ -188,9 +188,11 @@ TraceRecord traced(std::size_t index, const DriveImage& image, const TrainingMap
 }
 
 /// Different for every run, the same when repeated; not negative.
-std::uint32_t seedOf(const MethodSpec& method, std::size_t start) {
+std::uint32_t seedOf(const MethodSpec& method, std::size_t start, std::size_t repetition) {
   constexpr std::uint32_t kLargest = 0x7FFFFFFF;
-  return (static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start)) & kLargest;
+  constexpr std::size_t kPrime = 1000003;  // more than a drive has images
+  return (static_cast<std::uint32_t>(method.localizer.seed) + static_cast<std::uint32_t>(start + kPrime * repetition)) &
+         kLargest;
 }
 
 std::unique_ptr<TestedMethod> makeTestedMethod(const MethodSpec& method, std::uint32_t seed, const RunContext& context,
@@ -204,10 +206,11 @@ std::unique_ptr<TestedMethod> makeTestedMethod(const MethodSpec& method, std::ui
 
 }  // namespace
 
-RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace) {
+RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace,
+              std::size_t repetition) {
   const auto image = std::make_shared<RecordedImage>(context.table, context.map.images, method.localizer.match,
                                                      method.localizer.similarity);
-  const auto tested = makeTestedMethod(method, seedOf(method, start), context, image);
+  const auto tested = makeTestedMethod(method, seedOf(method, start, repetition), context, image);
   const std::vector<std::size_t> order = imageOrder(
       context.drive.images.size(), start, RunShape{context.closed, method.speed, method.kidnapped, context.longest});
   RunRecord record;

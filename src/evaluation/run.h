@@ -135,7 +135,8 @@ struct RunContext {
   std::size_t judge_from = 0;                            ///< estimates before are not judged, but count as found
 };
 
-/// From image `start` on (Kronfeld et al. (journal), section 6).
-RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace);
+/// From image `start` on (Kronfeld et al. (journal), section 6). `repetition`: each has another seed.
+RunRecord run(const RunContext& context, const MethodSpec& method, std::size_t start, bool trace,
+              std::size_t repetition = 0);
 
 }  // namespace visual_localization

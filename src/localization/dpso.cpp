@@ -11,17 +11,6 @@
 namespace visual_localization {
 namespace {
 
-/// Length of a displacement in shares of the area's range; an axis without range cannot be travelled.
-double relativeLength(const Eigen::Vector2d& displacement_m, const Eigen::Vector2d& range_m) {
-  double squared = 0.0;
-  for (int axis = 0; axis < 2; ++axis) {
-    if (range_m[axis] <= 0.0) continue;
-    const double share = displacement_m[axis] / range_m[axis];
-    squared += share * share;
-  }
-  return std::sqrt(squared);
-}
-
 double approach(double from, double to, double start, double share) {
   const double step = std::abs(to - start) * share;
   return from < to ? std::min(to, from + step) : std::max(to, from - step);
@@ -41,7 +30,7 @@ void Dpso::reset(const Prior& prior) {
   attractor_m_.reset();
   centre_of_mass_m_.reset();
   last_centre_m_.reset();
-  speed_known_ = false;
+  speeds_known_ = 0;
   ground_speed_known_ = false;
   seen_an_image_ = false;
   position_unknown_ = prior.isUnknown();
@@ -146,9 +135,10 @@ void Dpso::assignKinds() {
 /// Kronfeld et al. (journal), Eq. 4 and 5, with r0 in [-1, 1] so that the swarm does not drift one way.
 void Dpso::move(Particle& particle) {
   const double factor = particle.kind == ParticleKind::kHighEnergy ? config_.high_energy_factor : 1.0;
+  const double boost = config_.high_energy_perturbation ? factor : 1.0;
   Eigen::Vector2d wanted_m;
   for (int axis = 0; axis < 2; ++axis) {
-    const double perturbation = tuning_.phi0 * random_.uniform(-1.0, 1.0) * range_m()[axis] * tuning_.v0;
+    const double perturbation = boost * tuning_.phi0 * random_.uniform(-1.0, 1.0) * range_m()[axis] * tuning_.v0;
     const double attraction =
         attractor_m_ ? tuning_.phi2 * random_.uniform(0.0, 1.0) * ((*attractor_m_)[axis] - particle.position_m[axis])
                      : 0.0;
@@ -158,11 +148,20 @@ void Dpso::move(Particle& particle) {
   particle.position_m += particle.velocity_m;
 }
 
+/// Length of a displacement in shares of the area's range, or of its diagonal; an axis without range cannot be
+/// travelled.
+double Dpso::relativeLength(const Eigen::Vector2d& displacement_m) const {
+  const Eigen::Vector2d range = range_m();
+  const Eigen::Array2d possible_m = (range.array() > 0.0).select(displacement_m.array(), 0.0);
+  if (choices_.by_diagonal) return range.norm() > 0.0 ? possible_m.matrix().norm() / range.norm() : 0.0;
+  return (possible_m / (range.array() > 0.0).select(range.array(), 1.0)).matrix().norm();
+}
+
 /// `limit`: share of the range. The norm of Kronfeld et al. (journal), section 3, or each axis alone.
 Eigen::Vector2d Dpso::limited(const Eigen::Vector2d& velocity_m, double limit) const {
   const Eigen::Vector2d range = range_m();
   if (choices_.limit_of_axis) return velocity_m.cwiseMax(-limit * range).cwiseMin(limit * range);
-  const double length = relativeLength(velocity_m, range);
+  const double length = relativeLength(velocity_m);
   const Eigen::Vector2d possible_m = (range.array() > 0.0).select(velocity_m.array(), 0.0);
   return length > limit ? Eigen::Vector2d(limit / length * possible_m) : possible_m;
 }
@@ -268,26 +267,49 @@ void Dpso::adapt() {
   if (!last_centre_m_ || seconds_ > 0.0) last_centre_m_ = centre_of_mass_m_;
 }
 
+Eigen::Vector2d Dpso::meanVelocity_m() const {
+  Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
+  double count = 0.0;
+  for (const Particle& particle : particles_) {
+    if (particle.kind != ParticleKind::kStandard) continue;
+    sum_m += particle.velocity_m;
+    count += 1.0;
+  }
+  return count > 0.0 ? Eigen::Vector2d(sum_m / count) : sum_m;
+}
+
+/// Of the newest speed in the average.
+double Dpso::newestShare() const {
+  if (speeds_known_ == 0) return 1.0;
+  if (config_.ema_start == "first") return config_.ema_alpha;
+  return std::max(config_.ema_alpha, 2.0 / (static_cast<double>(speeds_known_) + 2.0));
+}
+
+void Dpso::learnSpeed() {
+  const Eigen::Vector2d centre = centreOfMass();
+  if (!centre_of_mass_m_) return;
+  const double share = newestShare();
+  if (choices_.speed_of_velocity) {
+    velocity_ema_m_ = (1.0 - share) * velocity_ema_m_ + share * meanVelocity_m();
+    tuning_.speed_ema = relativeLength(velocity_ema_m_);
+  } else {
+    tuning_.speed_ema = (1.0 - share) * tuning_.speed_ema + share * relativeLength(centre - *centre_of_mass_m_);
+  }
+  ++speeds_known_;
+  if (!(seconds_ > 0.0)) return;
+  const double speed_mps = (centre - *last_centre_m_).norm() / seconds_;
+  const double newest = ground_speed_known_ ? config_.ema_alpha : 1.0;
+  tuning_.speed_mps = (1.0 - newest) * tuning_.speed_mps + newest * speed_mps;
+  ground_speed_known_ = true;
+}
+
 /// Holds v0 at about twice the speed of the swarm (journal, section 5, "Self-adaptive parameters").
 void Dpso::adaptSpeed() {
-  const Eigen::Vector2d centre = centreOfMass();
-  if (centre_of_mass_m_) {
-    const auto smoothed = [this](bool known, double average, double speed) {
-      return known ? (1.0 - config_.ema_alpha) * average + config_.ema_alpha * speed : speed;
-    };
-    tuning_.speed_ema =
-        smoothed(speed_known_, tuning_.speed_ema, relativeLength(centre - *centre_of_mass_m_, range_m()));
-    speed_known_ = true;
-    if (seconds_ > 0.0) {
-      const double speed_mps = (centre - *last_centre_m_).norm() / seconds_;
-      tuning_.speed_mps = smoothed(ground_speed_known_, tuning_.speed_mps, speed_mps);
-      ground_speed_known_ = true;
-    }
-  }
-  if (!config_.adapt_speed || tuning_.recovering || !speed_known_) return;
+  learnSpeed();
+  if (!config_.adapt_speed || tuning_.recovering || speeds_known_ == 0) return;
   const double ratio = tuning_.speed_ema / tuning_.v0;
   if (ratio > 0.6) tuning_.v0 *= 1.1;
-  if (ratio < 0.4) tuning_.v0 *= 0.9;
+  if (ratio < 0.4) tuning_.v0 *= config_.v0_decrease;
   tuning_.v0 = std::clamp(tuning_.v0, config_.v0_min, config_.v0_max);
 }
 
@@ -320,7 +342,7 @@ void Dpso::report() {
 void Dpso::endRecovery() {
   tuning_ = {config_.v0, tuning_.speed_ema, config_.quantum_share, config_.phi2, config_.phi0,
              false,      tuning_.speed_mps};
-  speed_known_ = false;
+  speeds_known_ = 0;
   ground_speed_known_ = false;
   bad_images_ = 0;
 }
@@ -329,11 +351,11 @@ void Dpso::endRecovery() {
 
 namespace {
 
-/// Keeps a particle inside the area and stops the velocity that led out of it.
-void keepInside(Particle& particle, const Area& area) {
+/// Keeps a particle inside the area; the velocity that led out of it becomes this many times what it was.
+void keepInside(Particle& particle, const Area& area, double bounce = 0.0) {
   for (int axis = 0; axis < 2; ++axis) {
     const double inside = std::clamp(particle.position_m[axis], area.min_m[axis], area.max_m[axis]);
-    if (inside != particle.position_m[axis]) particle.velocity_m[axis] = 0.0;
+    if (inside != particle.position_m[axis]) particle.velocity_m[axis] *= bounce;
     particle.position_m[axis] = inside;
   }
 }
@@ -366,7 +388,7 @@ void Dpso::keepOut(Particle& particle) const {
 
 /// The papers let particles go where they will; nothing is known of positions outside of the map's frame.
 void Dpso::confine(Particle& particle) const {
-  if (choices_.in_box) return keepInside(particle, area_);
+  if (choices_.in_box) return keepInside(particle, area_, choices_.reflects ? -1.0 : 0.0);
   keepInside(particle, wholeFrame());
   if (!choices_.in_corridor) return;
   const std::size_t nearest = map_.nearest(particle.position_m).image;

@@ -49,16 +49,22 @@ class Dpso final : public Tracker {
   /// What parameters choose. Each particle needs it, and comparing their texts takes longer.
   struct Choices {
     explicit Choices(const DpsoConfig& config)
-        : in_box(config.confine == "box"),
-          in_corridor(config.confine != "box" && config.confine != "none"),
+        : in_box(config.confine == "box" || config.confine == "reflect"),
+          reflects(config.confine == "reflect"),
+          in_corridor(config.confine == "corridor"),
           limit_of_axis(config.speed_limit == "axis"),
+          by_diagonal(config.speed_limit == "diagonal"),
           speed_of_moving(config.speed_of == "moving"),
+          speed_of_velocity(config.speed_of == "velocity"),
           guided(config.recovery == "guided") {}
 
     bool in_box;
+    bool reflects;
     bool in_corridor;
     bool limit_of_axis;
+    bool by_diagonal;
     bool speed_of_moving;
+    bool speed_of_velocity;
     bool guided;
   };
 
@@ -68,6 +74,7 @@ class Dpso final : public Tracker {
   void fly(Likelihood& likelihood);
   void move(Particle& particle);
   Eigen::Vector2d limited(const Eigen::Vector2d& velocity_m, double limit) const;
+  double relativeLength(const Eigen::Vector2d& displacement_m) const;
   void moveQuantum(Particle& particle);
   bool isGuided() const;
   void weigh(Likelihood& likelihood);
@@ -81,6 +88,9 @@ class Dpso final : public Tracker {
   void endRecovery();
   void report();
   Eigen::Vector2d centreOfMass() const;
+  Eigen::Vector2d meanVelocity_m() const;
+  double newestShare() const;
+  void learnSpeed();
   /// What speeds and the reach of quantum particles are shares of.
   Eigen::Vector2d range_m() const { return area_.range().cwiseMin(config_.max_range_m); }
 
@@ -100,8 +110,9 @@ class Dpso final : public Tracker {
   std::optional<Eigen::Vector2d> centre_of_mass_m_;  ///< after the last image, shifted by the odometry since
   /// The same at the last image of another time, not shifted.
   std::optional<Eigen::Vector2d> last_centre_m_;
-  bool seen_an_image_ = false;  ///< since the last reset
-  bool speed_known_ = false;
+  bool seen_an_image_ = false;                                ///< since the last reset
+  Eigen::Vector2d velocity_ema_m_ = Eigen::Vector2d::Zero();  ///< of the swarm, metres per image
+  int speeds_known_ = 0;                                      ///< images that the average rests on
   bool ground_speed_known_ = false;
   bool position_unknown_ = true;  ///< nothing was recognised since a reset without a prior
   int bad_images_ = 0;

@@ -10,16 +10,18 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
   visitor.real({"dpso/phi2", "1", "weight of the attraction to the best particle"}, phi2, 0.0, 4.0);
   visitor.choice({"dpso/confine", "",
                   "where particles may be: anywhere, as in the papers (none), in the bounding box of the training "
-                  "images, or within 20 m of one of them (corridor)"},
-                 confine, {"none", "box", "corridor"});
+                  "images, stopped at its border (box) or turned back there (reflect), or within 20 m of an image "
+                  "(corridor)"},
+                 confine, {"none", "box", "reflect", "corridor"});
   visitor.choice({"dpso/speed_limit", "",
                   "what is limited: the speed along each axis, or its norm, as in the papers, with each axis in shares "
-                  "of its range"},
-                 speed_limit, {"axis", "norm"});
+                  "of its range (norm) or in shares of the area's diagonal (diagonal)"},
+                 speed_limit, {"axis", "norm", "diagonal"});
   visitor.choice({"dpso/speed_of", "",
-                  "whose centre of mass tells the speed of the swarm (v_sw): of all particles, as in the papers, or "
-                  "without those that do not travel, the quantum particles (moving)"},
-                 speed_of, {"moving", "all"});
+                  "what tells the speed of the swarm (v_sw): the centre of mass of all particles, as in the papers, or "
+                  "without those that do not travel, the quantum particles (moving); or the length of the averaged "
+                  "mean velocity of the standard particles (velocity)"},
+                 speed_of, {"moving", "all", "velocity"});
   visitor.choice({"dpso/position", "",
                   "estimate: the best particle, the centre of the best five, or the weighted centre of the swarm "
                   "(conference paper, section V)"},
@@ -31,11 +33,17 @@ void DpsoConfig::declare(ParameterVisitor& visitor) {
                0.0, 1.0);
   visitor.real({"dpso/high_energy_factor", "1", "their speed limit in multiples of v0"}, high_energy_factor, 1.0,
                100.0);
+  visitor.flag({"dpso/high_energy_perturbation", "", "their random perturbation is as many times as large"},
+               high_energy_perturbation);
   visitor.real({"dpso/v0", "1", "initial speed limit per image, share of the area's range"}, v0, 1e-6, 1.0);
   visitor.flag({"dpso/adapt_speed", "", "keep v0 at about twice the speed of the swarm"}, adapt_speed);
   visitor.real({"dpso/v0_min", "1", "lower limit of the speed adaptation"}, v0_min, 1e-6, 1.0);
+  visitor.real({"dpso/v0_decrease", "1", "what v0 is multiplied by where the swarm is slow"}, v0_decrease, 0.1, 1.0);
   visitor.real({"dpso/ema_alpha", "1", "weight of the newest speed in its moving average (alpha)"}, ema_alpha, 0.001,
                1.0);
+  visitor.choice({"dpso/ema_start", "",
+                  "the average begins with the first speed, or with a weight of 2 / (n + 1) for the n-th (growing)"},
+                 ema_start, {"first", "growing"});
   visitor.choice({"recovery", "",
                   "when the swarm is lost: search where the image looks alike, widen as in the papers, "
                   "or nothing"},

@@ -7,8 +7,8 @@
 
 #include "localization/session_choice.h"
 #include "visual_localization/localization/likelihood.h"
+#include "visual_localization/localization/localizer_config.h"
 #include "visual_localization/localization/scores.h"
-#include "visual_localization/localization/tracker_config.h"
 
 namespace visual_localization {
 
@@ -17,10 +17,12 @@ namespace visual_localization {
 class ImageLikelihood final : public Likelihood {
  public:
   /// All must outlive it. `sessions`: which training image stands for a position.
-  ImageLikelihood(Scores& scores, MapSweep& sweep, const SessionChoice& sessions, const FitnessConfig& config)
-      : scores_(scores), sweep_(sweep), sessions_(sessions), config_(config) {}
+  ImageLikelihood(Scores& scores, MapSweep& sweep, const SessionChoice& sessions, const LocalizerConfig& config)
+      : scores_(scores), sweep_(sweep), sessions_(sessions) {
+    configure(config);
+  }
 
-  void configure(const FitnessConfig& config) { config_ = config; }
+  void configure(const LocalizerConfig& config);
   Fitness at(const Eigen::Vector2d& position_m) override;
   Score of(std::size_t training_image) override { return scores_[training_image]; }
   std::size_t draw(Random& random) override { return sweep_.draw(scores_, random); }
@@ -30,7 +32,9 @@ class ImageLikelihood final : public Likelihood {
   Scores& scores_;
   MapSweep& sweep_;
   const SessionChoice& sessions_;
-  FitnessConfig config_;
+  double distance_sigma_m_ = 1.0;
+  double local_exponent_ = 1.0;  ///< of zeta, where particles are compared by local features
+  double global_exponent_ = 1.0;
 };
 
 }  // namespace visual_localization

@@ -41,8 +41,9 @@ Localizer::Localizer(std::shared_ptr<const TrainingMap> map, const LocalizerConf
       assessor_(config_.state),
       odometry_(config_.odometry),
       sessions_(std::make_unique<SessionChoice>(*map_, config_.choose_session)),
-      likelihood_(std::make_unique<ImageLikelihood>(scores_, sweep_, *sessions_, config_.fitness)),
+      likelihood_(std::make_unique<ImageLikelihood>(scores_, sweep_, *sessions_, config_)),
       verifier_(std::make_unique<PoseVerifier>(*map_, config_.metric, *sessions_)) {
+  requirePresetFits(config_, *map_);
   verifier_->predictor().useOdometry(odometry_, config_.odometry);
 }
 

@@ -33,7 +33,7 @@ void Localizer::configure(const LocalizerConfig& config) {
   assessor_.configure(config_.state);
   verifier_->configure(config_.metric);
   odometry_.configure(config_.odometry);
-  likelihood_->configure(config_.fitness);
+  likelihood_->configure(config_);
   witness_->configure(config_.bayes);
   verifier_->predictor().useOdometry(odometry_, config_.odometry);
   configureTracker(before.tracker);

@@ -4,10 +4,9 @@
 #include <limits>
 
 #include "base/text.h"
-#include "localization/paper_yaml.h"
-#include "parameters/yaml_map.h"
 #include "visual_localization/features/sift.h"
 #include "visual_localization/localization/tracker.h"
+#include "visual_localization/parameters/presets.h"
 
 namespace visual_localization {
 namespace {
@@ -17,6 +16,12 @@ constexpr bool kAtStartOnly = true;
 }  // namespace
 
 void LocalizerConfig::declare(ParameterVisitor& visitor) {
+  visitor.choice(
+      {"preset", "",
+       "parameters of the papers' text or of the authors' program in place of the defaults; a map built with "
+       "the same one is needed, and other values are refused beside it",
+       kAtStartOnly},
+      preset, presetChoices());
   visitor.choice({"tracker", "",
                   "dynamic particle swarm, several swarms, particle filter with Gaussian or linear motion, or discrete "
                   "Bayes filter "
@@ -81,16 +86,38 @@ FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& 
   return front_end;
 }
 
-const std::vector<std::string>& presetNames() {
-  static const std::vector<std::string> names{"paper"};
-  return names;
+ParameterValues localizerValues(const ParameterValues& given, const ParameterValues& defaults) {
+  const Preset* preset = parameters::presetOf(given);
+  if (preset == nullptr) return given;
+  ParameterValues chosen = withPreset(*preset, {{"tracker", preset->localizer.at("tracker")}}, given, defaults);
+  const std::string tracker = parameters::toString(chosen["tracker"]);
+  return withPreset(*preset, preset->localizerWith(tracker), given, defaults);
 }
 
-ParameterValues presetValues(const std::string& name) {
-  if (name != presetNames().front()) {
-    throw ParameterError("preset '" + oneLine(name, 60) + "' is not allowed: must be one of " + joined(presetNames()));
+namespace {
+
+/// Where its local features are others, in words.
+std::string otherFeatures(const ParameterValues& wanted, const LocalFeatureKind& kind) {
+  std::string differences;
+  for (const auto& [name, value] : kind.parameters()) {
+    const auto pinned = wanted.find(name);
+    if (pinned == wanted.end() || parameters::toString(pinned->second) == parameters::toString(value)) continue;
+    differences +=
+        ", '" + name + "' = " + parameters::toString(value) + " instead of " + parameters::toString(pinned->second);
   }
-  return parameters::YamlMap::parse(kPaperYaml, "config/paper.yaml").parameters();
+  return differences;
+}
+
+}  // namespace
+
+void requirePresetFits(const LocalizerConfig& config, const TrainingMap& map) {
+  if (config.preset.empty()) return;
+  const ParameterValues& wanted = presetNamed(config.preset).map_builder;
+  const MapHeader& header = map.header();
+  if (!header.preset.empty() && presetNamed(header.preset).map_builder == wanted) return;
+  throw ParameterError("preset '" + config.preset + "' is not allowed with this map, which was not built with it" +
+                       otherFeatures(wanted, *header.kind) + (map.hasGeometry() ? ", adjusted positions" : "") +
+                       ": build one with map_builder --preset " + config.preset);
 }
 
 }  // namespace visual_localization

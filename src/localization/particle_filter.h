@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/tracker.h"
 #include "visual_localization/map/training_map.h"
@@ -38,8 +40,8 @@ class GaussianMotion final : public MotionModel {
 class LinearMotion final : public MotionModel {
  public:
   /// `rotation_std_rad`: sigma_rot; `acceleration_std`: sigma_acc, of the logarithm of the speed;
-  /// `initial_speed_m`: v_init, metres per image, in a random direction.
-  LinearMotion(double rotation_std_rad, double acceleration_std, double initial_speed_m)
+  /// `initial_speed_m`: v_init of each axis, metres per image, in a random direction.
+  LinearMotion(double rotation_std_rad, double acceleration_std, const Eigen::Vector2d& initial_speed_m)
       : rotation_std_rad_(rotation_std_rad), acceleration_std_(acceleration_std), initial_speed_m_(initial_speed_m) {}
   void start(Particle& particle, Random& random) const override;
   void move(Particle& particle, const Motion& motion, Random& random) const override;
@@ -47,7 +49,7 @@ class LinearMotion final : public MotionModel {
  private:
   double rotation_std_rad_;
   double acceleration_std_;
-  double initial_speed_m_;
+  Eigen::Vector2d initial_speed_m_;
 };
 
 /// Moves a particle a share of the way to its nearest training image (Weiss et al., section IV.A, step 2).
@@ -60,6 +62,16 @@ class PullToMap final : public MotionModel {
  private:
   const TrainingMap& map_;
   double share_;
+};
+
+/// Puts a particle that left the area on its border.
+class StayInArea final : public MotionModel {
+ public:
+  explicit StayInArea(const Area& area) : area_(area) {}
+  void move(Particle& particle, const Motion& motion, Random& random) const override;
+
+ private:
+  Area area_;
 };
 
 /// By odometry where there is any, along the direction of the nearest training image; otherwise as another model.
@@ -93,7 +105,8 @@ std::unique_ptr<MotionModel> makeMotionModel(const std::string& tracker, const P
                                              const TrainingMap& map);
 
 /// Particle filter without odometry (Weiss et al., section IV.A): resample, move, weigh, estimate the weighted
-/// mean, replace the worst by random particles.
+/// mean, replace the worst by random particles. How the toolkit of the authors of Kronfeld et al. selects is a
+/// parameter each.
 class ParticleFilter final : public Tracker {
  public:
   /// `map` must outlive the filter. Starts anywhere in the map's area.
@@ -109,10 +122,15 @@ class ParticleFilter final : public Tracker {
   const std::vector<Particle>& particles() const override { return particles_; }
 
  private:
-  void resample();
+  void select();
+  void scaleWeights();
+  void drawEvenly(std::size_t count);
+  void drawIndependently(std::size_t count);
   void weigh(Likelihood& likelihood);
   TrackerEstimate estimate() const;
-  void injectRandomParticles();
+  std::size_t randomCount() const;
+  void makeRandom(Particle& particle);
+  void replaceWorst();
 
   const TrainingMap& map_;
   std::unique_ptr<MotionModel> motion_;
@@ -121,6 +139,7 @@ class ParticleFilter final : public Tracker {
   Prior anywhere_;
   std::vector<Particle> particles_;
   std::vector<Particle> drawn_;     ///< of the last resampling; kept to save the allocation
+  std::vector<double> cumulated_;   ///< weights up to and including each particle; kept likewise
   std::vector<std::size_t> order_;  ///< of the particles by weight
   Fitness best_;                    ///< of the last image
   bool is_new_ = true;              ///< nothing is known of the image yet, or there was none

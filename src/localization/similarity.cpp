@@ -18,7 +18,7 @@ LocalSimilarity::LocalSimilarity(const MatchConfig& match, const SimilarityConfi
     : kind_(std::move(kind)),
       match_(match),
       recognised_(config.recognised(FeatureKind::kLocal, match)),
-      exponent_(match.isByVotes() ? config.votes_exponent : 1.0),
+      exponent_(config.exponent(FeatureKind::kLocal, match)),
       image_width_px_(image_width_px) {}
 
 Score LocalSimilarity::compare(const LocalFeatures& current, const LocalFeatures& training) const {

@@ -1,5 +1,6 @@
 #include "visual_localization/localization/tracker.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "base/text.h"
@@ -38,10 +39,10 @@ std::unique_ptr<Tracker> make(const TrainingMap& map, const TrackerConfig& confi
 
 std::vector<TrackerKind>& registry() {
   static std::vector<TrackerKind> kinds{
-      {"dpso", "dpso/particles", make<Dpso>},
-      {"dpso_multi", "dpso/particles", make<MultiSwarm>},
-      {"pf_gaussian", "pf/particles", make<ParticleFilter>},
-      {"pf_linear", "pf/particles", make<ParticleFilter>},
+      {"dpso", "dpso/particles", make<Dpso>, {"dpso/", "recovery"}},
+      {"dpso_multi", "dpso/particles", make<MultiSwarm>, {"dpso/", "recovery"}},
+      {"pf_gaussian", "pf/particles", make<ParticleFilter>, {"pf/"}},
+      {"pf_linear", "pf/particles", make<ParticleFilter>, {"pf/"}},
       {"bayes", "pf/particles", make<BayesTracker>},
   };
   return kinds;
@@ -70,6 +71,15 @@ std::vector<std::string> trackerNames() {
   std::vector<std::string> names;
   for (const TrackerKind& kind : registry()) names.push_back(kind.name);
   return names;
+}
+
+bool isOfOtherTrackers(const std::string& parameter, const std::string& tracker) {
+  const auto uses = [&parameter](const TrackerKind& kind) {
+    return std::any_of(kind.parameters.begin(), kind.parameters.end(),
+                       [&parameter](const std::string& start) { return parameter.rfind(start, 0) == 0; });
+  };
+  const TrackerKind* own = find(tracker);
+  return !(own != nullptr && uses(*own)) && std::any_of(registry().begin(), registry().end(), uses);
 }
 
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed) {

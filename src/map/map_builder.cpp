@@ -19,6 +19,7 @@
 #include "visual_localization/geometry/camera_pose.h"
 #include "visual_localization/map/map_file.h"
 #include "visual_localization/parameters/parameters.h"
+#include "visual_localization/parameters/presets.h"
 
 namespace visual_localization {
 namespace {
@@ -81,6 +82,7 @@ MapBuilder::MapBuilder(const MapBuilderConfig& config, const MapBuilderResources
       most_waiting_(resources.threads > 1 ? kWaitingPerThread * resources.threads : 1),
       spool_(std::make_unique<ImageSpool>(resources.spool_beside, config_.local.chosen().clone())) {
   header_.kind = config_.local.chosen().clone();
+  header_.preset = config_.preset;
   if (!base) return;
   frame_ = LocalFrame(base->datum);
   header_.image_size = report_.image_size = base->image_size;
@@ -320,7 +322,17 @@ void requireMountTexts(ParameterVisitor& visitor, const std::string& camera, con
 
 }  // namespace
 
+ParameterValues mapBuilderValues(const ParameterValues& given, const ParameterValues& defaults) {
+  const Preset* preset = parameters::presetOf(given);
+  return preset == nullptr ? given : withPreset(*preset, preset->map_builder, given, defaults);
+}
+
 void MapBuilderConfig::declare(ParameterVisitor& visitor) {
+  visitor.choice(
+      {"preset", "",
+       "parameters of the papers' text or of the authors' program in place of the defaults; other values are "
+       "refused beside it"},
+      preset, presetChoices());
   visitor.real({"map/min_spacing", "m", "skip an image closer than this to the last kept one of its session"},
                min_spacing_m, 0.0, 1000.0);
   visitor.real(

@@ -9,6 +9,7 @@
 
 #include "features/image_size.h"
 #include "map/map_schema.h"
+#include "visual_localization/parameters/presets.h"
 
 namespace visual_localization::map_schema {
 namespace {
@@ -23,6 +24,7 @@ constexpr const char* kDimension = "features/dimension";  ///< of a descriptor
 constexpr double kLargestBudget = 1e9;                    ///< metres or seconds
 constexpr const char* kGeometryCount = "geometry/images";
 constexpr const char* kVocabulary = "vocabulary";
+constexpr const char* kPreset = "preset";     ///< only of a map that was built with one
 constexpr const char* kHistory = "history/";  ///< before the number of the edit
 
 /// Removes `key` from `meta` and returns its value.
@@ -293,6 +295,7 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
     const std::vector<std::uint8_t> learnt = packVocabulary(*header.vocabulary);
     meta[kVocabulary] = crc32Of({learnt.data(), learnt.size()});
   }
+  if (!header.preset.empty()) meta[kPreset] = header.preset;
   for (std::size_t i = 0; i < header.history.size(); ++i) meta[kHistory + std::to_string(i)] = header.history[i];
   requireSessions(header.sessions.size());
   std::set<std::vector<std::uint8_t>> masks;
@@ -336,6 +339,7 @@ MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks,
   header.kind = takeKind(meta, version);
   header.sessions = takeSessions(meta, version, header.image_size, masks);
   if (version >= kSinceVlad) header.vocabulary = takeVocabulary(meta, header, vocabulary);
+  if (meta.count(kPreset) != 0) header.preset = presetNamed(take<std::string>(meta, kPreset)).name;
   if (version >= kSinceHistory) header.history = takeHistory(meta);
   if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");
   return header;

@@ -68,7 +68,7 @@ MapRecorder::MapRecorder(const ros::NodeHandle& node, const ros::NodeHandle& pri
       updater_(node, private_node, ros::this_node::getName()) {
   assignParameters(config_, privateParameters(private_node_));
   if (!config_.builder_config.empty()) {  // a wrong one would be found after the round
-    assignParameters(builder_, parameters::readYaml(config_.builder_config));
+    assignParameters(builder_, mapBuilderValues(parameters::readYaml(config_.builder_config), valuesOf(builder_)));
   }
   const auto map = config_.map.empty() ? nullptr : loadMap(config_.map);
   watch_.emplace(config_.watch, map);

@@ -259,7 +259,7 @@ ParameterValues privateParameters(const ros::NodeHandle& private_node) {
 
 NodeParameters loadParameters(const ros::NodeHandle& private_node) {
   NodeParameters parameters;
-  assignParameters(parameters, privateParameters(private_node));
+  assignParameters(parameters, localizerValues(privateParameters(private_node), valuesOf(parameters)));
   return parameters;
 }
 

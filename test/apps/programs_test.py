@@ -63,15 +63,33 @@ class ProgramsTest(ProgramTest):
         self.assert_refused(run('localize', '--map', MAP, '--bag', DRIVE, '--output', self.folder / 'no.csv',
                                 '--pose-source', 'gps'), 2, 'pose_source')
 
-    def test_the_preset_is_the_papers_to_the_letter(self):
+    def test_a_preset_is_complete_from_the_bag_to_the_table(self):
         config = self.folder / 'config.yaml'
-        config.write_text('dpso: {confine: corridor}\n', encoding='utf-8')
-        papers = positions(self.localize('--preset', 'paper', bag=self.short))
-        self.assertEqual(papers, positions(self.localize('--preset', 'paper', '--config', config, bag=self.short)))
-        self.assertNotEqual(papers, positions(self.localize('--pose-source', 'place', bag=self.short)))
-        self.assertEqual({row['source'] for row in papers} - {'PLACE', 'NONE'}, set())
+        built = self.folder / 'paper.map'
+        result = run('map_builder', '--bag', self.short, '--preset', 'paper', '--output', built)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertNotIn('landmarks:', result.stdout)
+        tracks = {}
+        for preset in ('paper', 'paper_program'):
+            track = self.folder / 'track.csv'
+            arguments = ('localize', '--map', built, '--bag', self.short, '--preset', preset, '--output', track)
+            result = run(*arguments)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            tracks[preset] = positions(read_track(track))
+            self.assertEqual({row['source'] for row in read_track(track)} - {'PLACE', 'NONE'}, set())
+            config.write_text('dpso: {phi0: 1.5}\n', encoding='utf-8')
+            self.assert_refused(run(*arguments, '--config', config), 1,
+                                f"'dpso/phi0' = 1.5 contradicts preset '{preset}': must be 0.3")
+            self.assert_refused(run(*arguments, '--match', 'votes'), 2,
+                                f"'match/mode' = votes contradicts preset '{preset}': must be one of symmetric, one_way")
+        self.assertNotEqual(tracks['paper'], tracks['paper_program'])
+        result = run('localize', '--map', MAP, '--bag', self.short, '--preset', 'paper', '--output', self.folder / 'out')
+        self.assert_refused(result, 1, "preset 'paper' is not allowed with this map", "'sift/upright' = true instead of",
+                            'adjusted positions', 'map_builder --preset paper')
         result = run('localize', '--map', MAP, '--bag', DRIVE, '--preset', 'thesis', '--output', self.folder / 'out')
-        self.assert_refused(result, 2, "--preset: preset 'thesis' is not allowed: must be one of paper")
+        self.assert_refused(result, 2, "preset 'thesis' is not allowed: must be one of paper, paper_program")
+        result = run('map_builder', '--bag', self.short, '--preset', 'paper', '--spacing', '2', '--output', built)
+        self.assert_refused(result, 2, "--spacing: parameter 'map/spacing' = 2 contradicts preset 'paper': must be 0")
 
     def test_same_seed_gives_the_same_track_another_seed_another_one(self):
         swarm = ('--tracker', 'dpso', '--pose-source', 'place')  # the Bayes filter draws nothing that moves its pose

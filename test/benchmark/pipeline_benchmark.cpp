@@ -19,18 +19,23 @@ constexpr std::size_t kImages = 100;
 constexpr const char* kTopic = "/stereo/left/image_raw";
 
 struct Scene {
-  std::shared_ptr<const TrainingMap> map;
+  std::shared_ptr<const TrainingMap> map;        ///< by the package's defaults
+  std::shared_ptr<const TrainingMap> paper_map;  ///< by the preset "paper"
   std::vector<cv::Mat> images;
 };
+
+std::shared_ptr<const TrainingMap> mapBy(const std::string& preset) {
+  const RoundSpec round{"map", "", "", kTopic, "/gps/fix", "/ground_truth/fix", "", ""};
+  MapBuilderConfig config;
+  assignParameters(config, mapBuilderValues({{"preset", preset}}));
+  return recordMap(TEST_DATA_DIR "/rounds/campus_sunny_1.bag", round, config);
+}
 
 const Scene& scene() {
   static const Scene recorded = [] {
     cv::setNumThreads(1);
-    const std::string folder = TEST_DATA_DIR "/rounds/";
-    const RoundSpec round{"map", "", "", kTopic, "/gps/fix", "/ground_truth/fix", "", ""};
-    Scene made;
-    made.map = recordMap(folder + "campus_sunny_1.bag", round, MapBuilderConfig());
-    const BagReader bag(folder + "campus_cloudy_1.bag");
+    Scene made{mapBy(""), mapBy("paper"), {}};
+    const BagReader bag(TEST_DATA_DIR "/rounds/campus_cloudy_1.bag");
     const BagImages images = bag.images(kTopic);
     for (std::size_t i = 0; i < kImages; ++i) made.images.push_back(images.read(i).decode());
     return made;
@@ -44,11 +49,10 @@ const cv::Mat& imageAt(std::size_t at) {
   return scene().images[place < kImages ? place : 2 * kImages - 1 - place];
 }
 
-void localize(benchmark::State& state, const std::string& features, const std::string& pose_source = "place") {
+void localize(benchmark::State& state, const ParameterValues& given) {
   LocalizerConfig config;
-  config.metric.pose_source = pose_source;
-  config.features = features;
-  Localizer localizer(scene().map, config);
+  assignParameters(config, localizerValues(given));
+  Localizer localizer(config.preset.empty() ? scene().map : scene().paper_map, config);
   std::size_t at = 0;
   double extract_ms = 0.0;
   double match_ms = 0.0;
@@ -67,10 +71,12 @@ void localize(benchmark::State& state, const std::string& features, const std::s
   state.counters["update_ms"] = benchmark::Counter(update_ms, mean);
 }
 
-void metricDpso80(benchmark::State& state) { localize(state, "sift", "metric"); }
-void siftDpso80(benchmark::State& state) { localize(state, "sift"); }
-void hybridDpso80(benchmark::State& state) { localize(state, "hybrid"); }
-void globalDpso80(benchmark::State& state) { localize(state, "global"); }
+void landmarks(benchmark::State& state) { localize(state, {}); }
+void places(benchmark::State& state) { localize(state, {{"pose_source", std::string("place")}}); }
+
+void paperDpso80(benchmark::State& state, const std::string& features) {
+  localize(state, {{"preset", std::string("paper")}, {"features", features}});
+}
 
 void opencvExtractionAlone(benchmark::State& state) {
   cv::setNumThreads(1);
@@ -85,10 +91,11 @@ void opencvExtractionAlone(benchmark::State& state) {
 }
 
 BENCHMARK(opencvExtractionAlone)->Unit(benchmark::kMillisecond);
-BENCHMARK(metricDpso80)->Unit(benchmark::kMillisecond);
-BENCHMARK(siftDpso80)->Unit(benchmark::kMillisecond);
-BENCHMARK(hybridDpso80)->Unit(benchmark::kMillisecond);
-BENCHMARK(globalDpso80)->Unit(benchmark::kMillisecond);
+BENCHMARK(landmarks)->Unit(benchmark::kMillisecond);
+BENCHMARK(places)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(paperDpso80, sift, std::string("sift"))->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(paperDpso80, hybrid, std::string("hybrid"))->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(paperDpso80, global, std::string("global"))->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace visual_localization

@@ -167,6 +167,68 @@ TEST(Experiment, EveryExperimentThatShipsIsValid) {
   EXPECT_GT(read, 5);
 }
 
+/// What a name says of its method.
+std::string trackerIn(const std::string& name) {
+  const std::vector<std::pair<std::string, std::string>> words{
+      {"DPSO", "dpso"}, {"PF-g", "pf_gaussian"}, {"PF-l", "pf_linear"}, {"Bayes filter", "bayes"}};
+  for (const auto& [word, tracker] : words) {
+    if (name.find(word) != std::string::npos) return tracker;
+  }
+  return "";
+}
+
+TEST(Experiment, TheMethodsOfExperimentsThatShipRunWhatTheirNamesSay) {
+  int named = 0;
+  for (const auto& file : std::filesystem::directory_iterator(TEST_DATA_DIR "/../../config/evaluation")) {
+    if (file.path().extension() != ".yaml") continue;
+    for (const MethodSpec& method : parseExperiment(readFile(file.path().string()), file.path().string()).methods) {
+      const std::string tracker = trackerIn(method.name);
+      if (tracker.empty() || method.name.rfind("topological", 0) == 0) continue;
+      EXPECT_EQ(method.tracker, tracker) << file.path() << ": " << method.name;
+      ++named;
+    }
+  }
+  EXPECT_GT(named, 50);
+}
+
+TEST(Experiment, AMethodNamesItsTracker) {
+  expectRefused({{"name: swarm, tracker: dpso,", "name: swarm,", "'methods[0]/tracker' is missing"}});
+}
+
+TEST(Experiment, RefusesParametersThatNoTrackerOfTheMethodUses) {
+  expectRefused(
+      {{kBestMethod, "{name: x, tracker: bayes, parameters: {dpso/phi0: 0.5}}",
+        "'methods[2]/parameters' of 'x': 'dpso/phi0' changes nothing with tracker 'bayes'"},
+       {kBestMethod, "{name: x, tracker: bayes, parameters: {recovery: none}}", "'recovery' changes nothing with"},
+       {kBestMethod, "{name: x, tracker: dpso, sweep: {pf/particles: [10]}}", "'pf/particles' changes nothing with"},
+       {"name: swarm, tracker: dpso, parameters: {dpso/particles: 20}", "name: swarm, tracker: bayes",
+        "'parameters' 'recovery' changes nothing: no method has a tracker that uses it"}});
+}
+
+TEST(Experiment, APresetIsForMapAndMethods) {
+  const std::string yaml = test::smallYamlWith("parameters: {recovery: paper}", "preset: paper_program");
+  const Experiment experiment = parseExperiment(yaml, "e.yaml");
+  EXPECT_EQ(experiment.map.preset, "paper_program");
+  EXPECT_TRUE(experiment.map.prune);
+  EXPECT_EQ(experiment.front_end.match.mode, "symmetric");
+  EXPECT_EQ(experiment.methods[0].localizer.dpso.speed_limit, "diagonal");
+  EXPECT_EQ(experiment.methods[0].localizer.dpso.particles, 20) << "what a method sets is what it tries";
+  EXPECT_EQ(experiment.methods[1].localizer.pf.selection, "weights") << "Gaussian motion is of the other paper";
+  EXPECT_EQ(parseExperiment(yaml, "e.yaml", "paper").methods[0].localizer.dpso.speed_limit, "norm");
+  const std::string beside = "preset: paper\nparameters: {dpso/phi0: 1.5}";
+  expectRefused({{"parameters: {recovery: paper}", "preset: thesis", "preset 'thesis' is not allowed"},
+                 {"parameters: {recovery: paper}", beside, "'dpso/phi0' = 1.5 contradicts preset 'paper': must be 0.3"},
+                 {"parameters: {recovery: paper}", "preset: paper\nmap_parameters: {map/prune: false}",
+                  "'map/prune' = false contradicts preset 'paper': must be true"}});
+}
+
+TEST(Experiment, WithoutAPresetItIsThePackage) {
+  const Experiment experiment = test::smallExperiment();
+  EXPECT_EQ(experiment.front_end.match.mode, "votes");
+  EXPECT_FALSE(experiment.map.prune);
+  EXPECT_EQ(experiment.methods[0].localizer.state.witness, "probability");
+}
+
 TEST(Experiment, RefusesAFileThatIsNoExperiment) {
   for (const char* text : {"", "# nothing", "[]", "words"}) EXPECT_EQ(refusalOfYaml(text), "e.yaml: must be a mapping");
   EXPECT_EQ(refusalOfYaml("{}"), "e.yaml: 'experiment' is missing");
@@ -210,50 +272,55 @@ TEST(Experiment, RefusesNumbersOutsideTheirRange) {
   for (const char* value : {"0", "-1", "99999999999999999999", "2.5", ".nan", "every"}) {
     expectRefused({{"starts: 3", std::string("starts: ") + value, "must be an integer in [1, 1000000]"}});
   }
-  expectRefused({{"starts: 3", "trace_start: -1", "'trace_start' = -1 must be an integer in [0, 1000000]"},
-                 {kBestMethod, "{name: x, speed: 0}", "'methods[2]/speed' = 0 must be a number in [0.015625, 64]"},
-                 {kBestMethod, "{name: x, speed: .nan}", "must be a number in [0.015625, 64]"},
-                 {kBestMethod, "{name: x, sweep: {speed: [1, 65]}}", "speed = 65 must be a number in [0.015625, 64]"},
-                 {"dpso/particles: 20", "dpso/particles: 1", "'dpso/particles' = 1 is not allowed: must be an integer"},
-                 {"dpso/particles: 20", "dpso/particles: many", "'dpso/particles' = many is not allowed"},
-                 {"recovery: paper", "match/ratio_angle: .nan", "e.yaml: 'parameters' parameter 'match/"}});
+  expectRefused(
+      {{"starts: 3", "trace_start: -1", "'trace_start' = -1 must be an integer in [0, 1000000]"},
+       {kBestMethod, "{name: x, tracker: dpso, speed: 0}", "'methods[2]/speed' = 0 must be a number in [0.015625, 64]"},
+       {kBestMethod, "{name: x, tracker: dpso, speed: .nan}", "must be a number in [0.015625, 64]"},
+       {kBestMethod, "{name: x, tracker: dpso, sweep: {speed: [1, 65]}}",
+        "speed = 65 must be a number in [0.015625, 64]"},
+       {"dpso/particles: 20", "dpso/particles: 1", "'dpso/particles' = 1 is not allowed: must be an integer"},
+       {"dpso/particles: 20", "dpso/particles: many", "'dpso/particles' = many is not allowed"},
+       {"recovery: paper", "match/ratio_angle: .nan", "e.yaml: 'parameters' parameter 'match/"}});
 }
 
 TEST(Experiment, RefusesMethodsThatCannotBeRun) {
-  expectRefused({{"name: swarm", "name: best", "'methods[2]/name' = 'best' appears twice"},
-                 {"name: swarm", "name: ''", "'methods[0]/name' must be a name of one line"},
-                 {"name: swarm", "name: \"a\\nb\"", "'methods[0]/name' must be a name of one line"},
-                 {"tracker: dpso", "tracker: crystal_ball", "(beside the trackers: exhaustive, sequence, topological)"},
-                 {kBestMethod, "{name: x, tracker: exhaustive, features: hybrid}", "hybrid needs a tracker's cloud"},
-                 {kBestMethod, "{name: x, features: smell}", "one of sift, learned, global, hybrid"},
-                 {kBestMethod, "{name: x, parameters: {prune: false}}", "'prune' holds for all methods"},
-                 {kBestMethod, "{name: x, parameters: {nonsense: 1}}", "'nonsense' = 1 is unknown"},
-                 {kBestMethod, "{name: x, parameters: 3}", "must be a mapping of parameter names to values"},
-                 {"recovery: paper", "nonsense: 1", "'nonsense' = 1 is unknown"},
-                 {"starts: 3", "map_parameters: {nonsense: 1}", "'nonsense' = 1 is unknown"}});
+  expectRefused(
+      {{"name: swarm", "name: best", "'methods[2]/name' = 'best' appears twice"},
+       {"name: swarm", "name: ''", "'methods[0]/name' must be a name of one line"},
+       {"name: swarm", "name: \"a\\nb\"", "'methods[0]/name' must be a name of one line"},
+       {"tracker: dpso", "tracker: crystal_ball", "(beside the trackers: exhaustive, sequence, topological)"},
+       {kBestMethod, "{name: x, tracker: exhaustive, features: hybrid}", "hybrid needs a tracker's cloud"},
+       {kBestMethod, "{name: x, tracker: dpso, features: smell}", "one of sift, learned, global, hybrid"},
+       {kBestMethod, "{name: x, tracker: dpso, parameters: {prune: false}}", "'prune' holds for all methods"},
+       {kBestMethod, "{name: x, tracker: dpso, parameters: {nonsense: 1}}", "'nonsense' = 1 is unknown"},
+       {kBestMethod, "{name: x, tracker: dpso, parameters: 3}", "must be a mapping of parameter names to values"},
+       {"recovery: paper", "nonsense: 1", "'nonsense' = 1 is unknown"},
+       {"starts: 3", "map_parameters: {nonsense: 1}", "'nonsense' = 1 is unknown"}});
 }
 
 TEST(Experiment, RefusesSweepsThatCannotBeMeant) {
-  std::string many = "{name: x, sweep: {";
+  std::string many = "{name: x, tracker: dpso, sweep: {";
   for (const char* key : {"a", "b", "c"}) {
     many += std::string(key) + ": [";
     for (int i = 0; i < 100; ++i) many += std::to_string(i) + ", ";
     many += "0], ";
   }
   expectRefused(
-      {{kBestMethod, "{name: x, sweep: {pf/particles: [10, 20]}}", "'x' appears twice"},
-       {kBestMethod, "{name: x, sweep: {pf/particles: []}}", "to lists of values"},
-       {kBestMethod, "{name: x, sweep: {nonsense: [1]}}", "'nonsense' = 1 is unknown"},
-       {kBestMethod, "{name: x, speed: 2, sweep: {speed: [1]}}", "'methods[2]/sweep/speed' is set for"},
-       {kBestMethod, "{name: x, parameters: {prune: true}, sweep: {prune: [true]}}", "is set for this method"},
-       {kBestMethod, "{name: '{speed}', sweep: {speed: ['{speed}']}}", "speed = {speed} must be a number"},
+      {{kBestMethod, "{name: x, tracker: pf_linear, sweep: {pf/particles: [10, 20]}}", "'x' appears twice"},
+       {kBestMethod, "{name: x, tracker: pf_linear, sweep: {pf/particles: []}}", "to lists of values"},
+       {kBestMethod, "{name: x, tracker: dpso, sweep: {nonsense: [1]}}", "'nonsense' = 1 is unknown"},
+       {kBestMethod, "{name: x, tracker: dpso, speed: 2, sweep: {speed: [1]}}", "'methods[2]/sweep/speed' is set for"},
+       {kBestMethod, "{name: x, tracker: dpso, parameters: {prune: true}, sweep: {prune: [true]}}",
+        "is set for this method"},
+       {kBestMethod, "{name: '{speed}', tracker: dpso, sweep: {speed: ['{speed}']}}",
+        "speed = {speed} must be a number"},
        {kBestMethod, many + "}}", "'methods[2]/sweep' has more than 10000 combinations"}});
 }
 
 TEST(Experiment, ANameThatASweepMakesTooLongIsRefused) {
   std::string name;
   for (int i = 0; i < 50; ++i) name += "{speed}";
-  const std::string swept = "{name: '" + name + "', sweep: {speed: [1." + std::string(50, '0') + "]}}";
+  const std::string swept = "{name: '" + name + "', tracker: dpso, sweep: {speed: [1." + std::string(50, '0') + "]}}";
   expectRefused({{kBestMethod, swept, "becomes too long"}});
 }
 

@@ -45,7 +45,7 @@ Particle standingAt(double x, double y) {
 TEST(MotionModel, LinearKeepsAndDisturbsTheVelocity) {
   Random random(1);
   Particle particle;
-  const LinearMotion straight(0.0, 0.0, 2.0);
+  const LinearMotion straight(0.0, 0.0, {2.0, 2.0});
   straight.start(particle, random);
   EXPECT_NEAR(particle.velocity_m.norm(), 2.0, 1e-12);
   const Eigen::Vector2d velocity = particle.velocity_m;
@@ -53,7 +53,7 @@ TEST(MotionModel, LinearKeepsAndDisturbsTheVelocity) {
   straight.move(particle, Motion(), random);
   EXPECT_LT((particle.position_m - 2.0 * velocity).norm(), 1e-12);
 
-  const LinearMotion disturbed(kPi / 3.0, 0.1, 2.0);
+  const LinearMotion disturbed(kPi / 3.0, 0.1, {2.0, 2.0});
   double turned_squared = 0.0;
   double scaled_squared = 0.0;
   for (int i = 0; i < 4000; ++i) {
@@ -108,7 +108,7 @@ TEST(MotionModel, PartsMoveOneAfterTheOther) {
 TEST(MotionModel, EveryPartStartsAParticle) {
   Random random(5);
   Particle particle;
-  combined(GaussianMotion(1.0), LinearMotion(0.0, 0.0, 1.8))->start(particle, random);
+  combined(GaussianMotion(1.0), LinearMotion(0.0, 0.0, {1.8, 1.8}))->start(particle, random);
   EXPECT_NEAR(particle.velocity_m.norm(), 1.8, 1e-12);
   EXPECT_EQ(particle.position_m, Eigen::Vector2d(0.0, 0.0));
 }
@@ -187,7 +187,7 @@ TEST(MotionModel, OfAFilterFollowsOdometryWithAShareOfItsParticles) {
 }
 
 TEST(MotionModel, ParticlesStartInAllDirections) {
-  const LinearMotion motion(0.0, 0.0, 2.0);
+  const LinearMotion motion(0.0, 0.0, {2.0, 2.0});
   Random random(10);
   int quadrants[4] = {};
   for (int i = 0; i < 4000; ++i) {

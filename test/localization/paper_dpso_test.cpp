@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "localization/dpso.h"
-#include "test/support/refusal.h"
 #include "test/support/swarm_config.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
@@ -18,7 +17,6 @@ namespace {
 using test::onCircle;
 using test::roundWorld;
 using test::World;
-using testing::HasSubstr;
 
 constexpr int kDrivenImages = 60;
 
@@ -175,21 +173,99 @@ TEST(PaperDpso, RecoveryLeavesAnyPerturbationAloneUnlessToldToRaiseIt) {
   }
 }
 
-TEST(PaperDpso, ThePresetIsAConfiguration) {
-  LocalizerConfig config = test::swarmConfig();
-  config.tracker = "bayes";
-  config.seed = 7;
-  assignParameters(config, presetValues("paper"));
-  EXPECT_EQ(config.tracker, "dpso") << "the papers have no Bayes filter";
-  EXPECT_EQ(config.seed, 7) << "what it does not name stays";
-  EXPECT_EQ(config.dpso.confine, "none");
-  EXPECT_EQ(config.dpso.speed_limit, "norm");
-  EXPECT_EQ(config.dpso.speed_of, "all");
-  EXPECT_EQ(config.dpso.recovery, "paper");
-  EXPECT_EQ(config.estimate, "image");
-  EXPECT_EQ(config.metric.pose_source, "place");
-  EXPECT_THAT(test::refusalOf<ParameterError>([&] { presetValues("papers\n"); }),
-              HasSubstr("'papers ' is not allowed: must be one of paper"));
+TEST(PaperDpso, AtTheBorderTheVelocityIsTurned) {
+  DpsoConfig config;
+  config.confine = "reflect";
+  config.v0 = config.v0_max;
+  config.phi2 = 0.02;  // hardly drawn to the best one, they fly to the border
+  config.adapt_speed = false;
+  config.recovery = "none";
+  int turned = 0;
+  drive(config, [&](const TrainingMap& map, const Dpso& swarm, const TrackerEstimate&) {
+    const Area area = map.area();
+    for (const Particle& particle : swarm.particles()) {
+      ASSERT_TRUE(isInside(area, particle.position_m));
+      for (int axis = 0; axis < 2; ++axis) {
+        const double position_m = particle.position_m[axis];
+        const bool at_min = position_m == area.min_m[axis];
+        const bool at_max = position_m == area.max_m[axis];
+        EXPECT_FALSE(at_min && particle.velocity_m[axis] < 0.0);
+        EXPECT_FALSE(at_max && particle.velocity_m[axis] > 0.0);
+        turned += (at_min || at_max) && particle.velocity_m[axis] != 0.0 ? 1 : 0;
+      }
+    }
+  });
+  EXPECT_GT(turned, 0);
+}
+
+TEST(PaperDpso, ByTheDiagonalTheLimitIsACircle) {
+  DpsoConfig config;
+  config.speed_limit = "diagonal";
+  config.adapt_speed = false;
+  config.recovery = "none";
+  double most = 0.0;
+  drive(config, [&](const TrainingMap& map, const Dpso& swarm, const TrackerEstimate&) {
+    const double limit_m = config.v0 * map.area().range().norm();
+    for (const Particle& particle : swarm.particles()) {
+      if (particle.kind == ParticleKind::kStandard) most = std::max(most, particle.velocity_m.norm() / limit_m);
+    }
+  });
+  EXPECT_LE(most, 1.0 + 1e-9);
+  EXPECT_GT(most, 0.95);
+}
+
+TEST(PaperDpso, ASlowSwarmLowersItsLimitByTheDecrease) {
+  DpsoConfig config;
+  config.v0_decrease = 0.97;
+  config.recovery = "none";
+  World world = roundWorld();
+  Dpso swarm(world.map(), config, 4);
+  std::vector<double> limits;
+  for (int image = 0; image < 60; ++image) {
+    see(swarm, world.from(onCircle(0.0)));
+    limits.push_back(swarm.tuning().v0);
+  }
+  int falls = 0;
+  for (std::size_t i = 1; i < limits.size(); ++i) {
+    if (limits[i] >= limits[i - 1]) continue;
+    EXPECT_NEAR(limits[i] / limits[i - 1], 0.97, 1e-9);
+    ++falls;
+  }
+  EXPECT_GT(falls, 5);
+}
+
+TEST(PaperDpso, ByTheMeanVelocityOppositeParticlesStandStill) {
+  const auto speedBy = [](const std::string& speed_of) {
+    DpsoConfig config;
+    config.speed_of = speed_of;
+    config.ema_start = "growing";
+    config.recovery = "none";
+    config.adapt_speed = false;
+    double sum = 0.0;
+    drive(config,
+          [&](const TrainingMap&, const Dpso& swarm, const TrackerEstimate&) { sum += swarm.tuning().speed_ema; });
+    return sum;
+  };
+  EXPECT_GT(speedBy("velocity"), 0.0);
+  EXPECT_LT(speedBy("velocity"), speedBy("all")) << "quantum particles jump and turns cancel";
+}
+
+TEST(PaperDpso, TheyMayPerturbParticlesOfHighEnergyMore) {
+  const auto spreadOfHighEnergy = [](bool more) {
+    DpsoConfig config;
+    config.high_energy_perturbation = more;
+    config.high_energy_factor = 10.0;
+    config.adapt_speed = false;
+    config.recovery = "none";
+    double sum = 0.0;
+    drive(config, [&](const TrainingMap&, const Dpso& swarm, const TrackerEstimate&) {
+      for (const Particle& particle : swarm.particles()) {
+        if (particle.kind == ParticleKind::kHighEnergy) sum += particle.velocity_m.norm();
+      }
+    });
+    return sum;
+  };
+  EXPECT_GT(spreadOfHighEnergy(true), 1.2 * spreadOfHighEnergy(false));
 }
 
 }  // namespace

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -266,6 +269,97 @@ TEST(ParticleFilter, AReconfigurationReachesTheMotion) {
     sum += fitness.back();
   }
   for (std::size_t i = 0; i < fitness.size(); ++i) EXPECT_NEAR(filter.particles()[i].weight, fitness[i] / sum, 1e-12);
+}
+
+/// A filter as the toolkit of the authors runs it.
+ParticleFilterConfig programConfig(int particles) {
+  ParticleFilterConfig config;
+  config.particles = particles;
+  config.selection = "scaled";
+  config.draws = "independent";
+  config.random_particles = "selection";
+  config.confine = "box";
+  config.position = "best";
+  config.pull = 0.0;
+  return config;
+}
+
+TEST(ParticleFilter, AsInTheProgramItFindsAndFollowsARobotInTheArea) {
+  World world = roundWorld();
+  ParticleFilter filter = makeFilter(world, "pf_linear", 3, programConfig(300));
+  const Area area = world.map().area();
+  double error_sum_m = 0.0;
+  for (int step = 0; step < 150; ++step) {
+    const Eigen::Vector2d robot = onCircle(0.6 * step);
+    const TrackerEstimate estimate = see(filter, world.from(robot));
+    const auto best = std::max_element(filter.particles().begin(), filter.particles().end(),
+                                       [](const Particle& a, const Particle& b) { return a.weight < b.weight; });
+    EXPECT_EQ(estimate.position_m, best->position_m);
+    for (const Particle& particle : filter.particles()) {
+      EXPECT_TRUE((particle.position_m.array() >= area.min_m.array()).all());
+      EXPECT_TRUE((particle.position_m.array() <= area.max_m.array()).all());
+    }
+    if (step >= 60) error_sum_m += (estimate.position_m - robot).norm();
+  }
+  EXPECT_LT(error_sum_m / 90.0, 3.0);
+}
+
+/// How often one selection draws a particle with at least 0.9 of the largest weight and one with next to none.
+std::pair<double, double> drawnOfBestAndWorst(const std::string& selection, const std::string& draws) {
+  World world = roundWorld();
+  ParticleFilterConfig config;
+  config.particles = 50000;
+  config.selection = selection;
+  config.draws = draws;
+  config.random_share = 0.0;
+  config.pull = 0.0;
+  config.gaussian_std_m = 0.0;  // a survivor stays where its ancestor was
+  ParticleFilter filter = makeFilter(world, "pf_gaussian", 3, config);
+  see(filter, world.from(onCircle(0.0)));
+  const std::vector<Particle> before = filter.particles();
+  see(filter, world.from(onCircle(0.0)));
+  std::map<std::pair<double, double>, double> offspring;
+  for (const Particle& particle : filter.particles()) ++offspring[{particle.position_m.x(), particle.position_m.y()}];
+  double most = 0.0;
+  for (const Particle& particle : before) most = std::max(most, particle.weight);
+  const auto meanWhere = [&](double from, double to) {
+    double sum = 0.0;
+    double count = 0.0;
+    for (const Particle& particle : before) {
+      if (particle.weight < from * most || particle.weight > to * most) continue;
+      sum += offspring[{particle.position_m.x(), particle.position_m.y()}];
+      count += 1.0;
+    }
+    return sum / count;
+  };
+  return {meanWhere(0.9, 1.0), meanWhere(0.0, 1e-3)};
+}
+
+TEST(ParticleFilter, ScaledTheBestAreDrawnThreeTimesAsOftenAsTheWorst) {
+  for (const char* draws : {"low_variance", "independent"}) {
+    const auto [best, worst] = drawnOfBestAndWorst("scaled", draws);
+    EXPECT_NEAR(best / worst, (0.95 + 0.5) / 0.5, 0.3) << draws;
+    const auto [best_by_weight, worst_by_weight] = drawnOfBestAndWorst("weights", draws);
+    EXPECT_GT(best_by_weight, 300.0 * worst_by_weight) << draws;
+  }
+}
+
+TEST(ParticleFilter, VInitByTheRangeIsFasterAlongTheLongerAxis) {
+  const auto map = test::mapAt({{0.0, 0.0}, {300.0, 0.0}, {300.0, 100.0}, {0.0, 100.0}});
+  ParticleFilterConfig config;
+  config.initial_speed_of = "range";
+  const auto motion = makeMotionModel("pf_linear", config, *map);
+  Random random(1);
+  Eigen::Vector2d fastest = Eigen::Vector2d::Zero();
+  double squares = 0.0;
+  for (int i = 0; i < 4000; ++i) {
+    Particle particle;
+    motion->start(particle, random);
+    fastest = fastest.cwiseMax(particle.velocity_m.cwiseAbs());
+    squares += particle.velocity_m.squaredNorm() / 4000.0;
+  }
+  EXPECT_NEAR(fastest.x() / fastest.y(), 3.0, 0.01);
+  EXPECT_NEAR(std::sqrt(squares), config.initial_speed_m, 0.05) << "on average as fast as in metres";
 }
 
 }  // namespace

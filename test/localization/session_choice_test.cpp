@@ -339,7 +339,7 @@ TEST(SessionChoice, ASwarmComparesWithOneSession) {
     SessionChoice sessions(map, choose);
     Scores scores(map.size());
     MapSweep sweep(map, 100000, 100000);
-    ImageLikelihood image(scores, sweep, sessions, FitnessConfig());
+    ImageLikelihood image(scores, sweep, sessions, LocalizerConfig());
     TrackerConfig config;
     Dpso swarm(map, config.dpso, 1);
     double sum = 0.0;

@@ -27,8 +27,8 @@ TEST(Fitness, IsTheWeightTimesAGaussianOfTheDistance) {
   scores.startImage(FeatureKind::kLocal, [](FeatureKind, std::size_t image) {
     return Score{1.0, image == 0 ? 0.4 : 0.8, 10, true};
   });
-  FitnessConfig config;
-  config.distance_sigma_m = 5.0;
+  LocalizerConfig config;
+  config.fitness.distance_sigma_m = 5.0;
   MapSweep sweep(*map, 100, 100);
   const SessionChoice sessions(*map, false);
   ImageLikelihood likelihood(scores, sweep, sessions, config);
@@ -37,6 +37,25 @@ TEST(Fitness, IsTheWeightTimesAGaussianOfTheDistance) {
   EXPECT_EQ(beside.training_image, 1u);
   EXPECT_DOUBLE_EQ(beside.value, 0.8 * std::exp(-0.5));
   EXPECT_EQ(scores.comparisons(), 2u);
+}
+
+TEST(Fitness, TheExponentOfGlobalFeaturesMayRaiseTheWholeProduct) {
+  const auto map = test::mapAt({{0.0, 0.0}, {100.0, 0.0}});
+  const double m = 0.9;
+  for (const FeatureKind kind : {FeatureKind::kGlobal, FeatureKind::kLocal}) {
+    Scores scores(2);
+    const double exponent = kind == FeatureKind::kGlobal ? 20.0 : 1.0;
+    scores.startImage(kind, [&](FeatureKind, std::size_t) { return Score{m, std::pow(m, exponent), 0, true}; });
+    LocalizerConfig config;
+    config.match.mode = "symmetric";
+    config.fitness.sharpen = "product";
+    config.fitness.distance_sigma_m = 5.0;
+    MapSweep sweep(*map, 100, 100);
+    const SessionChoice sessions(*map, false);
+    ImageLikelihood likelihood(scores, sweep, sessions, config);
+    const double zeta = std::exp(-0.5 * 4.0 * 4.0 / (5.0 * 5.0));
+    EXPECT_NEAR(likelihood.at({0.0, 4.0}).value, std::pow(m * zeta, exponent), 1e-12);
+  }
 }
 
 TEST(Cloud, MomentsOfAKnownCloud) {

@@ -69,7 +69,7 @@ class TwinStreet {
   Scores scores_;
   MapSweep sweep_;
   SessionChoice sessions_;
-  ImageLikelihood likelihood_{scores_, sweep_, sessions_, FitnessConfig()};
+  ImageLikelihood likelihood_{scores_, sweep_, sessions_, LocalizerConfig()};
 };
 
 inline TrackerConfig severalSwarms(int swarms = 3) {

@@ -82,7 +82,7 @@ class World {
   Scores scores_;
   MapSweep sweep_;
   SessionChoice sessions_;
-  ImageLikelihood likelihood_{scores_, sweep_, sessions_, FitnessConfig()};
+  ImageLikelihood likelihood_{scores_, sweep_, sessions_, LocalizerConfig()};
 };
 
 /// Radius 30 m, an image every 0.94 m.

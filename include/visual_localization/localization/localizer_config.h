@@ -26,6 +26,7 @@ struct LocalizerConfig : TrackerConfig {
 
   LocalizerConfig() { tracker = "bayes"; }
 
+  std::string preset;
   std::string features = "sift";
   std::string estimate = "interpolated";
   std::string model;
@@ -48,11 +49,11 @@ struct LocalizerConfig : TrackerConfig {
 /// How images are prepared for comparison with a map. Throws ParameterError when it has other local features.
 FrontEndConfig frontEndConfigOf(const LocalizerConfig& config, const MapHeader& map);
 
-/// Names of the presets: sets of parameters of a localizer that belong together.
-const std::vector<std::string>& presetNames();
+/// The parameters that `given` names, completed by the preset among them, if there is one. `defaults`: values that give
+/// way to it (see withPreset).
+ParameterValues localizerValues(const ParameterValues& given, const ParameterValues& defaults = {});
 
-/// The parameters of a preset; those that it does not name stay what they are. Throws ParameterError unless it is one
-/// of presetNames().
-ParameterValues presetValues(const std::string& name);
+/// Throws ParameterError, naming what differs, when the map was not built for the preset of `config`.
+void requirePresetFits(const LocalizerConfig& config, const TrainingMap& map);
 
 }  // namespace visual_localization

@@ -38,6 +38,11 @@ struct SimilarityConfig {
     if (features == FeatureKind::kGlobal) return global_recognised;
     return match.isByVotes() ? votes_recognised : sift_recognised;
   }
+  /// What a similarity is raised to, to become a weight.
+  double exponent(FeatureKind features, const MatchConfig& match) const {
+    if (features == FeatureKind::kGlobal) return global_exponent;
+    return match.isByVotes() ? votes_exponent : 1.0;
+  }
   void declare(ParameterVisitor& visitor);
 };
 

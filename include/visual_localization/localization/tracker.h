@@ -85,6 +85,7 @@ struct TrackerKind {
   std::string name;       ///< the value of the parameter `tracker`
   std::string particles;  ///< the parameter that says how many particles it has; empty: none
   MakeTracker make;
+  std::vector<std::string> parameters = {};  ///< how the names of those begin that it alone uses
 };
 
 /// Beside those of this library; before any localizer is made. Throws std::invalid_argument for a name that is taken.
@@ -92,6 +93,8 @@ void registerTracker(const TrackerKind& kind);
 /// Throws ParameterError for a name that nobody registered.
 const TrackerKind& trackerKind(const std::string& name);
 std::vector<std::string> trackerNames();
+/// Whether a parameter is one of other trackers only.
+bool isOfOtherTrackers(const std::string& parameter, const std::string& tracker);
 
 /// The chosen tracker. `map` must outlive it.
 std::unique_ptr<Tracker> makeTracker(const TrainingMap& map, const TrackerConfig& config, std::uint32_t seed);

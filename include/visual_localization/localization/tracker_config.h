@@ -9,6 +9,7 @@ namespace visual_localization {
 /// How fitness falls off beside the recorded path.
 struct FitnessConfig {
   double distance_sigma_m = 10.0;
+  std::string sharpen = "similarity";
 
   void declare(ParameterVisitor& visitor);
 };
@@ -29,10 +30,13 @@ struct DpsoConfig {
   double quantum_std = 0.15;
   double high_energy_share = 0.10;
   double high_energy_factor = 3.0;
+  bool high_energy_perturbation = false;
   double v0 = 0.015;
   bool adapt_speed = true;
   double v0_min = 0.002;
+  double v0_decrease = 0.9;
   double ema_alpha = 0.125;
+  std::string ema_start = "first";
   std::string recovery = "guided";
   bool guided_start = true;
   int recovery_patience = 2;
@@ -54,12 +58,19 @@ struct DpsoConfig {
 /// Parameters of the particle filters; defaults of Weiss et al., section IV.A, and Kronfeld et al. (journal), Table 3.
 struct ParticleFilterConfig {
   int particles = 300;
-  double pull = 0.2;
+  std::string selection = "weights";
+  double selection_floor = 0.5;
+  std::string draws = "low_variance";
+  std::string random_particles = "worst";
   double random_share = 0.05;
+  double pull = 0.2;
+  std::string confine = "none";
+  std::string position = "mean";
   double gaussian_std_m = 4.0;
   double rotation_std_deg = 60.0;
   double acceleration_std = 0.001;
   double initial_speed_m = 1.8;
+  std::string initial_speed_of = "metres";
 
   void declare(ParameterVisitor& visitor);
 };

@@ -32,6 +32,7 @@ struct RawImage;
 
 /// How a recording becomes training images.
 struct MapBuilderConfig {
+  std::string preset;
   double min_spacing_m = 0.0;
   double spacing_m = 0.0;
   bool prune = false;
@@ -47,6 +48,10 @@ struct MapBuilderConfig {
 
   void declare(ParameterVisitor& visitor);
 };
+
+/// The parameters that `given` names, completed by the preset among them, if there is one. `defaults`: values that give
+/// way to it (see withPreset).
+ParameterValues mapBuilderValues(const ParameterValues& given, const ParameterValues& defaults = {});
 
 /// The camera of a session, for images as they are recorded.
 struct SessionCamera {

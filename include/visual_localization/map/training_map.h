@@ -82,6 +82,7 @@ struct MapHeader {
   std::vector<std::string> history = {};  ///< what became of it after it was built: a line for each edit, oldest first
   /// By which its images are described for proposals; null: a map of an older version, or too small to learn one.
   std::shared_ptr<const VladVocabulary> vocabulary = {};
+  std::string preset = {};  ///< of the parameters that it was built with; empty: none
 };
 
 /// Axis-aligned rectangle in the map frame, metres. A range may be zero (a single straight street).

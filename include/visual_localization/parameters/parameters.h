@@ -95,6 +95,13 @@ std::vector<std::string> violationsOf(const Config& config) {
   return parameters::violations([&copy](ParameterVisitor& visitor) { copy.declare(visitor); });
 }
 
+/// The current value of every field of `config`.
+template <class Config>
+ParameterValues valuesOf(const Config& config) {
+  Config copy = config;
+  return parameters::values([&copy](ParameterVisitor& visitor) { copy.declare(visitor); });
+}
+
 /// `config` itself. Throws ParameterError with the first violation when there is one.
 template <class Config>
 const Config& requireValid(const Config& config) {
