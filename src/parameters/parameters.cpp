@@ -33,6 +33,14 @@ std::string range(double min, double max) { return "[" + number(min) + ", " + nu
 
 std::string oneOf(const std::vector<std::string>& options) { return "one of " + joined(options); }
 
+/// An option that is no name is the empty text.
+std::string shown(const std::string& option) { return option.empty() ? "\"\"" : option; }
+
+std::vector<std::string> shown(std::vector<std::string> options) {
+  for (std::string& option : options) option = shown(option);
+  return options;
+}
+
 bool contains(const std::vector<std::string>& options, const std::string& value) {
   for (const auto& option : options) {
     if (option == value) return true;
@@ -195,7 +203,7 @@ class TableWriter : public ParameterVisitor {
   }
   void flag(const ParameterInfo& info, bool& field) override { row(info, field ? "true" : "false", "true, false"); }
   void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) override {
-    row(info, field, oneOf(options));
+    row(info, shown(field), oneOf(shown(options)));
   }
   void text(const ParameterInfo& info, std::string& field) override { row(info, "\"" + field + "\"", "text"); }
 
@@ -226,7 +234,7 @@ class YamlWriter : public ParameterVisitor {
   }
   void flag(const ParameterInfo& info, bool& field) override { line(info, field ? "true" : "false", "true or false"); }
   void choice(const ParameterInfo& info, std::string& field, const std::vector<std::string>& options) override {
-    line(info, field, oneOf(options));
+    line(info, shown(field), oneOf(shown(options)));
   }
   void text(const ParameterInfo& info, std::string& field) override { line(info, "\"" + field + "\"", "text"); }
 

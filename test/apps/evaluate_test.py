@@ -121,6 +121,46 @@ class EvaluateTest(ProgramTest):
         self.assertIn('DPSO-80', (self.whole / 'report.md').read_text(encoding='utf-8'))
         self.assertTrue(list((self.whole / 'figures').glob('*.svg')))
 
+    def test_by_the_authors_program_the_methods_have_the_order_of_the_papers(self):
+        """The central claim of the swarm: half of the comparisons of PF-l-100, at a smaller error."""
+        text = SAMPLE.read_text(encoding='utf-8').replace('starts: 8', 'starts: 4')
+        keep = ('DPSO-80', 'PF-l-100', 'PF-l-300')
+        config = self.folder / 'order.yaml'
+        config.write_text('\n'.join(line for line in text.splitlines() if not line.startswith('  - {name: ') or
+                                    any(f'name: {name},' in line for name in keep)) + '\n', encoding='utf-8')
+        for preset in ('paper_program', 'paper'):
+            output = self.folder / preset
+            result = run('evaluate', '--config', config, '--rounds', SAMPLE.parent, '--output', output, '--no-report',
+                         '--preset', preset)
+            self.assertEqual((result.returncode, result.stderr), (0, ''))
+        by_group = {}
+        for row in tables(self.folder / 'paper_program')['summary.csv']:
+            by_group.setdefault((row['train_group'], row['test_group']), {})[row['method']] = row
+        self.assertEqual(len(by_group), 2)
+        for methods in by_group.values():
+            comparisons = {name: float(row['comparisons_per_image']) for name, row in methods.items()}
+            errors = {name: float(row['mean_err_m']) for name, row in methods.items()}
+            self.assertLess(comparisons['DPSO-80'], 0.6 * comparisons['PF-l-100'])
+            self.assertLess(comparisons['DPSO-80'], 0.35 * comparisons['PF-l-300'])
+            self.assertLess(errors['DPSO-80'], errors['PF-l-100'])
+        text_rows = {(row['train_group'], row['method']): row for row in
+                     tables(self.folder / 'paper')['summary.csv']}
+        self.assertGreater(float(text_rows['sunny', 'DPSO-80']['comparisons_per_image']),
+                           0.8 * float(text_rows['sunny', 'PF-l-100']['comparisons_per_image']),
+                           'plain weights: the claim needs the scaled selection')
+
+    def test_the_ellipse_that_is_published_holds_the_truth(self):
+        text = SAMPLE.read_text(encoding='utf-8').replace('starts: 8', 'starts: 2\nmap_parameters: {geometry/enabled: true}')
+        config = self.folder / 'ellipse.yaml'
+        config.write_text('\n'.join(line for line in text.splitlines() if not line.startswith('  - {name: ') or
+                                    'name: Bayes filter,' in line) + '\n', encoding='utf-8')
+        result = run('evaluate', '--config', config, '--rounds', SAMPLE.parent, '--output', self.output, '--no-report')
+        self.assertEqual((result.returncode, result.stderr), (0, ''))
+        for row in tables(self.output)['summary.csv']:
+            self.assertGreater(float(row['metric_share']), 0.95)
+            self.assertGreater(float(row['inside_95_share']), 0.9)
+            self.assertGreater(float(row['nees']), 0.5, 'not by a sigma that is far too large')
+
     def metric(self, camera_info: str = CALIBRATION, poses: Optional[str] = None) -> Path:
         """The short sample with landmarks, a calibration and true poses beside the bags, which are copied."""
         for bag in self.rounds.glob('*.bag'):
@@ -130,7 +170,7 @@ class EvaluateTest(ProgramTest):
         text = re.sub(r'bag: (\w+)\.bag', r'bag: \1.bag, poses: \1.csv', short_sample())
         text = text.replace('  bags:', '  camera_info: camera.yaml\n  bags:')
         text = text.replace('starts: 2', 'starts: 2\nmap_parameters: {geometry/enabled: true}')
-        text = text.replace('\nmethods:', '\nmethods:\n  - {name: places, parameters: {pose_source: place}}')
+        text = text.replace('\nmethods:', '\nmethods:\n  - {name: places, tracker: bayes, parameters: {pose_source: place}}')
         config = self.folder / 'metric.yaml'
         config.write_text(text, encoding='utf-8')
         return config

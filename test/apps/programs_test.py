@@ -52,10 +52,10 @@ class ProgramsTest(ProgramTest):
             for name in HEADER:
                 if name not in ('state', 'features', 'source'):
                     self.assertTrue(math.isfinite(float(row[name])), row)
-        self.assertGreater(sum(row['state'] == 'TRACKING' for row in rows), 0.8 * len(rows))
+        self.assertGreater(sum(row['state'] == 'TRACKING' for row in rows), 0.95 * len(rows))
         self.assertGreater(sum(row['source'] == 'METRIC' for row in rows), 0.9 * len(rows))
         error = float(self.output.split('mean ')[1].split(' m')[0])
-        self.assertLess(error, 0.5)
+        self.assertLess(error, 0.25)
 
     def test_pose_source_chooses_between_landmarks_and_places(self):
         rows = self.localize('--pose-source', 'place', '--config', CONFIG)

@@ -14,7 +14,7 @@ import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus
 from visual_localization.srv import Relocalize, RelocalizeRequest
 
-NEAR_M = 5.0
+NEAR_M = 1.0
 IN_A_ROW = 5
 BEFORE_S = (0.0, 80.0)    # start in the bag and length
 AFTER_S = (230.0, 120.0)

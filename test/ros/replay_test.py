@@ -23,9 +23,9 @@ import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus, Swarm
 
 PLOT_STATUS = pathlib.Path(__file__).resolve().parents[2] / 'scripts' / 'plot_status.py'
-NEAR_M = 5.0
-METRIC_M = 0.5  # twice the median error that 0.2 m per axis, the map's own, leave
-MOST = 0.8
+NEAR_M = 1.0
+METRIC_M = 0.3
+MOST = 0.95
 
 
 class ReplayTest(unittest.TestCase):
