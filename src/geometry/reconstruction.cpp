@@ -27,7 +27,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
                          const AveragedRotations& rotations, const std::vector<double>& directions,
                          const FeatureSets& sets) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
-  for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
+  for (PositionObservation fix : positionsAt(session.images, session.fixes, sigmaOfUndeclared_m(config_))) {
     fix.image += begin;
     fix.sigma_m *= kFixCorrelation;
     fixes_.push_back(fix);
@@ -122,7 +122,11 @@ void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d
 }
 
 void Reconstruction::tie(const std::vector<ImagePair>& ties) {
-  for (std::size_t k = 0; k < sessions(); ++k) problem_.sessions[k].fix_bias_sigma_m = budgets_[k].sigma_m;
+  for (std::size_t k = 0; k < sessions(); ++k) {
+    // What counts is how they compare: with large ones alone the common path slides along a flat valley of the cost.
+    const double most_m = budgets_[k].assumed ? sigmaOfUndeclared_m(config_) : budgets_[k].sigma_m;
+    problem_.sessions[k].fix_bias_sigma_m = std::min(budgets_[k].sigma_m, most_m);
+  }
   orderBy(ties);
   for (const ImagePair& pair : ties) sets_.join(pair);
 }

@@ -121,7 +121,7 @@ std::vector<FixResidual> Reconstruction::fixResiduals(std::size_t session) const
   const UnadjustedSession& of = *sessions_[session];
   const double delay_s = problem_.sessions[session].fix_delay_s;
   std::vector<FixResidual> residuals;
-  for (const FixAtImage& fix : fixesAtImages(of.images, of.fixes, config_.fix_sigma_m)) {
+  for (const FixAtImage& fix : fixesAtImages(of.images, of.fixes, sigmaOfUndeclared_m(config_))) {
     if (!fix.believed) continue;
     const std::size_t image = begin(session) + fix.image;
     const Eigen::Vector3d antenna_m = antennaInMap_m(problem_.cameras[image], image);
@@ -133,9 +133,8 @@ std::vector<FixResidual> Reconstruction::fixResiduals(std::size_t session) const
 
 void Reconstruction::findBudget() {
   FixBudget& budget = budgets_.front();
-  budget = fixBudget(fixResiduals(0), shared_.position_m);
-  budget.assumed = claimNothing(sessions_.front()->fixes);
-  if (budget.declared_m == 0.0) budget.sigma_m = budget.declared_m = config_.fix_sigma_m;  // no fixes
+  budget = withoutClaims(fixBudget(fixResiduals(0), shared_.position_m), sessions_.front()->fixes, config_);
+  if (budget.declared_m == 0.0) budget.sigma_m = budget.declared_m = sigmaOfUndeclared_m(config_);  // no fixes
   budget.sigma_m = std::max(budget.sigma_m, kLeastSigma_m);
 }
 

@@ -398,8 +398,10 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                principal_point_sigma, 1e-6, 1.0);
   visitor.real({"geometry/distortion_sigma", "1", "and the radial coefficients k1 and k2"}, distortion_sigma, 1e-6,
                1.0);
-  visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},
-               fix_sigma_m, 0.001, 100.0);
+  visitor.real({"geometry/fix_sigma", "m",
+                "standard deviation per axis of a fix that does not tell its own; 0: not known, so positions may be "
+                "off by metres"},
+               fix_sigma_m, 0.0, 100.0);
   visitor.real(
       {"geometry/spacing", "m",
        "of a session with landmarks keep, after all images were adjusted, only those at least this far from the "

@@ -208,7 +208,7 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   }
   for (std::size_t i = 0; i < geometries.size(); ++i) {
     FixBudget& budget = report_.session_images[i].fixes;
-    budget = fixBudget(report_.sessions[i].trajectory, fixes_[i], config_.geometry.fix_sigma_m);
+    budget = fixBudget(report_.sessions[i].trajectory, fixes_[i], config_.geometry);
     header_.sessions[i].fixes = budget;
     if (!geometries[i]) continue;
     report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks

@@ -8,7 +8,7 @@ namespace visual_localization {
 /// per horizontal axis.
 struct FixBudget {
   double declared_m = 0.0;     ///< one sigma of a usual fix, as the receiver claims it
-  bool assumed = false;        ///< it claims nothing: geometry/fix_sigma
+  bool assumed = false;        ///< it claims nothing: geometry/fix_sigma, or that of a usual receiver
   double residual_m = 0.0;     ///< root mean square of the believed fixes' distances from the path
   double correlation_s = 0.0;  ///< integral of the autocorrelation of these distances
   double duration_s = 0.0;     ///< for which there are fixes

@@ -19,7 +19,7 @@ struct GeometryConfig {
   double focal_sigma = 0.03;
   double principal_point_sigma = 0.01;
   double distortion_sigma = 0.05;
-  double fix_sigma_m = 0.3;
+  double fix_sigma_m = 0.0;
   int window = 2000;  ///< images adjusted at a time, which bounds the memory; no parameter
   double spacing_m = 2.0;
 
