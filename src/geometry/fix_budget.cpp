@@ -174,6 +174,20 @@ std::string describe(const FixBudget& budget) {
   return text.str();
 }
 
+std::string describe(const DoubtfulStretch& stretch) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(0) << stretch.from_m << " to " << stretch.to_m << " m ("
+       << std::setprecision(1) << secondsBetween(0, stretch.from_ns) << " to " << secondsBetween(0, stretch.to_ns)
+       << " s) may be off by " << stretch.sigma_m << " m per axis (one sigma): ";
+  if (stretch.off_turns_m > 0.0) {
+    text << "the images turn unlike the path, a path that turns as they do is " << stretch.off_turns_m
+         << " m per axis from it";
+    if (stretch.off_fixes_m > 0.0) text << ", ";
+  }
+  if (stretch.off_fixes_m > 0.0) text << "fixes lie up to " << stretch.off_fixes_m << " m beside it";
+  return text.str();
+}
+
 double receiverCorrelation_s(const FixBudget& budget) {
   const double share = std::pow(budget.sigma_m / budget.declared_m, 2);
   // Of the variance of the mean, 2 (x - 1 + exp(-x)) / x^2 with x = duration / correlation, the inverse to a few per

@@ -24,8 +24,8 @@ constexpr std::size_t kOverlap = 4;        ///< a window shares this part of its
 }  // namespace
 
 void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointRays> rays,
-                         const AveragedRotations& rotations, const std::vector<double>& directions,
-                         const FeatureSets& sets) {
+                         const AveragedRotations& rotations, const std::vector<RelativeRotation>& relative,
+                         const std::vector<double>& directions, const FeatureSets& sets) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
   for (PositionObservation fix : positionsAt(session.images, session.fixes, sigmaOfUndeclared_m(config_))) {
     fix.image += begin;
@@ -57,6 +57,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
     problem_.heights.push_back({begin + static_cast<std::uint32_t>(i), up_m, kFixCorrelation * heights.sigma_m});
   }
   sessions_.push_back(&session);
+  relative_ = relative;
   sets_.append(sets);
 }
 
@@ -71,6 +72,11 @@ void Reconstruction::append(const Reconstruction& other) {
   for (PositionObservation fix : other.fixes_) {
     fix.image += begin;
     fixes_.push_back(fix);
+  }
+  for (RelativeRotation relative : other.relative_) {
+    relative.a += begin;
+    relative.b += begin;
+    relative_.push_back(relative);
   }
   for (HeightObservation height : other.problem_.heights) {
     height.image += begin;

@@ -164,7 +164,7 @@ class SessionAdjuster {
     if (session_.finds_mount) findMounting(yaws_rad, directions, relative);
     // Level, whatever the altitudes say: a camera turned aside by much would explain how a robot leans across a slope.
     const AveragedRotations rotations = averageRotations(yaws_rad, relative, mountingOf(session_.mount));
-    reconstruction_.add(session_, std::move(rays), rotations, directions, sets);
+    reconstruction_.add(session_, std::move(rays), rotations, relative, directions, sets);
   }
 
   /// What is nearly level and ahead the adjustment finds by itself.

@@ -213,7 +213,9 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
     if (!geometries[i]) continue;
     report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks
     Session& session = header_.sessions[i];
+    session.doubtful = geometries[i]->doubtful;
     if (geometries[i]->contradicts_calibration || geometries[i]->contradicts_fixes) {
+      session.fixes->sigma_m = budget.sigma_m = std::max(budget.sigma_m, geometries[i]->fixes.sigma_m);
       geometries[i].reset();
       session.camera.reset();
       continue;
