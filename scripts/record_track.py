@@ -194,7 +194,8 @@ def row(stamp: rospy.Time, recorder: Recorder, truth: Truth) -> Dict[str, object
               'features': FEATURES.get(status.features, status.features), 'comparisons': status.comparisons,
               'extract_ms': status.extract_ms, 'match_ms': status.match_ms, 'update_ms': status.update_ms,
               'source': status.source_name, 'inliers': status.inliers, 'reprojection_px': status.reprojection,
-              'sigma_m': status.sigma_position, 'sigma_yaw_rad': status.sigma_heading,
+              'sigma_m': math.hypot(status.sigma_position, status.map_sigma_position),
+              'sigma_yaw_rad': math.hypot(status.sigma_heading, status.map_sigma_heading),
               'swept': status.swept}
     exact = truth.at(stamp.to_sec())
     if exact:

@@ -227,6 +227,7 @@ void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOp
   for (const Remark& pause : breaksOf(receiver.fixes, config.trajectory)) session.remarks.push_back(pause);
   const ClockCheck clock =
       checkClock(bag, bag.images(options.image_topic), receiver.fixes, config, camera.mount, options.threads);
+  if (clock.went_back) session.remarks.push_back(*clock.went_back);
   session.remarks.push_back(clock.remark);
   session.fixes = putRight(std::move(receiver.fixes), clock);
   camera.clock_sigma_s = std::max(camera.clock_sigma_s, clock.sigma_s);

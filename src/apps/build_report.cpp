@@ -250,6 +250,9 @@ std::vector<std::string> disagreementsOf(const MapBuildReport& report, const std
     }
   }
   for (const SessionImages& session : report.session_images) {
+    for (const DoubtfulStretch& stretch : session.geometry.doubtful) {
+      found.push_back(session.name + ": " + describe(stretch));
+    }
     if (session.geometry.contradicts_calibration) {
       found.push_back(session.name + ": images and calibration disagree, so it has places only");
     } else if (session.geometry.contradicts_fixes) {

@@ -60,6 +60,7 @@ struct MapFindings {
   SurveyConfig config;
   MapSurvey survey;
   LandmarkSurvey landmarks;
+  std::vector<ErrorStretch> errors;
   std::optional<AmbiguousPlaces> ambiguity;  ///< only if it was checked
 };
 

@@ -62,6 +62,7 @@ void showMap(const MapInfoOptions& options) {
   findings.config.few_features = options.few_features;
   findings.survey = survey(*map, findings.config);
   findings.landmarks = landmarkSurvey(*map, mostImages(options));
+  findings.errors = expectedErrors(*map, mostImages(options));
   if (options.ambiguity) findings.ambiguity = lookForAmbiguousPlaces(*map);
   printMapReport(std::cout, options.map, *map, findings);
   if (options.check) std::cout << "\ncheck:       ok\n";

@@ -180,13 +180,34 @@ void printCameras(std::ostream& out, const TrainingMap& map) {
   }
 }
 
-/// What the receivers leave in the positions.
-void printErrors(std::ostream& out, const TrainingMap& map) {
+/// The worst stretches of a session, in order.
+void printErrorStretches(std::ostream& out, std::vector<ErrorStretch> stretches) {
+  std::vector<double> errors_m;
+  for (const ErrorStretch& stretch : stretches) errors_m.push_back(stretch.most_m);
+  std::sort(errors_m.rbegin(), errors_m.rend());
+  const double least_m = errors_m.size() > kMostStretches ? errors_m[kMostStretches - 1] : 0.0;
+  for (const ErrorStretch& stretch : stretches) {
+    if (stretch.most_m < least_m) continue;
+    out << key("") << std::setw(8) << metres(stretch.from_m) << " to " << std::setw(8) << metres(stretch.to_m) << ": "
+        << metres(stretch.most_m, 2) << '\n';
+  }
+  if (least_m > 0.0) out << key("") << "and " << stretches.size() - kMostStretches << " better stretches\n";
+}
+
+/// What the receivers leave in the positions, and where recordings contradict themselves.
+void printErrors(std::ostream& out, const TrainingMap& map, const std::vector<ErrorStretch>& errors) {
   const std::vector<Session>& sessions = map.header().sessions;
   for (std::size_t s = 0; s < std::min(sessions.size(), kMostSessions); ++s) {
     out << key(s == 0 ? "errors" : "");
     if (sessions.size() > 1) out << s << ": ";
     out << (sessions[s].fixes ? describe(*sessions[s].fixes) : "not known: built before map version 8") << '\n';
+    std::vector<ErrorStretch> of_session;
+    std::copy_if(errors.begin(), errors.end(), std::back_inserter(of_session),
+                 [s](const ErrorStretch& stretch) { return stretch.session == static_cast<int>(s); });
+    printErrorStretches(out, of_session);
+    for (const DoubtfulStretch& stretch : sessions[s].doubtful) {
+      out << key("") << "check before use: " << describe(stretch) << '\n';
+    }
   }
 }
 
@@ -311,7 +332,7 @@ void printMapReport(std::ostream& out, const std::string& path, const TrainingMa
   printLandmarks(out, map, findings.landmarks);
   printSessions(out, map, findings.survey);
   printCameras(out, map);
-  printErrors(out, map);
+  printErrors(out, map, findings.errors);
   printCoverage(out, map, findings.survey);
   printDensity(out, map, findings);
   printHeadings(out, map, findings.survey);

@@ -175,6 +175,37 @@ std::optional<Remark> stepOf(const std::vector<PictureShift>& pictures, const Pa
 
 bool agrees(const std::optional<ClockOffset>& found) { return found && (!found->along_rows || found->width_rad > 0.0); }
 
+constexpr double kGoesBack_s = 1.0;  ///< of stamps; less is jitter
+constexpr std::size_t kMostSaid = 5;
+
+/// `of`: what they are stamps of.
+Remark goesBack(const std::string& of, double step_s, std::int64_t latest_ns) {
+  return {"the stamps of " + of + " go back by " + seconds(step_s, 1) + " after " + secondsText(latest_ns) +
+              " s: a clock was set, or two recordings are one; what is not later than before is left out",
+          true};
+}
+
+/// Stamps in the order of the recording, of which the first that goes back is named.
+class StampOrder {
+ public:
+  void add(std::int64_t stamp_ns) {
+    const double back_s = latest_ns_ ? secondsBetween(stamp_ns, *latest_ns_) : 0.0;
+    const bool went_back = std::exchange(is_back_, back_s > kGoesBack_s);
+    if (is_back_ && !went_back && times_++ == 0) first_ = goesBack("images", back_s, *latest_ns_);
+    latest_ns_ = std::max(latest_ns_.value_or(stamp_ns), stamp_ns);
+  }
+  std::optional<Remark> remark() const {
+    if (times_ < 2) return first_;
+    return Remark{first_->text + " (" + std::to_string(times_) + " times)", true};
+  }
+
+ private:
+  std::optional<std::int64_t> latest_ns_;
+  std::optional<Remark> first_;
+  bool is_back_ = false;
+  std::size_t times_ = 0;
+};
+
 /// Exchanged coordinates make the mirror image of a path, stretched.
 std::vector<Fix> exchangedIn(std::vector<Fix> fixes) {
   for (Fix& fix : fixes) std::swap(fix.position.latitude_deg, fix.position.longitude_deg);
@@ -191,10 +222,12 @@ ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::
     if (hasPosition(fix)) of_fixes.extend(fix.stamp_ns);
   }
   PictureMotion motion(threads);
+  StampOrder order;
   {
     ProgressBar bar("comparing clocks");
     for (std::size_t i = 0; i < images.size(); ++i) {
       const BagImage image = images.read(i);
+      order.add(image.stamp_ns);
       of_images.extend(image.stamp_ns);
       if (motion.wants(image.stamp_ns)) {
         try {
@@ -208,7 +241,7 @@ ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::
   requireCommonTime(bag, images, of_images, of_fixes);
   const std::vector<PictureShift> pictures = motion.finish();
   const Paths paths = pathsOf(fixes, config.trajectory);
-  if (const auto step = stepOf(pictures, paths)) return {0.0, 0.0, false, *step};
+  if (const auto step = stepOf(pictures, paths)) return {0.0, 0.0, false, *step, order.remark()};
   std::optional<ClockOffset> found = offsetOf(pictures, paths);
   const auto exchanged =
       agrees(found) ? std::nullopt : offsetOf(pictures, pathsOf(exchangedIn(fixes), config.trajectory));
@@ -218,25 +251,22 @@ ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::
   if (found && mount) found->offset_s += mount->antenna_m.x() / std::max(0.1, medianSpeed_mps(paths.front()));
   ClockCheck check = judged(found);
   check.exchanged = is_exchanged;
+  check.went_back = order.remark();
   if (is_exchanged)
     check.remark.text = "fixes: latitude and longitude are exchanged, by the turns: put right; " + check.remark.text;
   return check;
 }
 
 std::vector<Remark> breaksOf(const std::vector<Fix>& fixes, const TrajectoryCleanerConfig& config) {
-  constexpr double kGoesBack_s = 1.0;  // less is jitter
-  constexpr std::size_t kMostSaid = 5;
   std::vector<Remark> breaks;
   std::int64_t latest_ns = fixes.empty() ? 0 : fixes.front().stamp_ns;
   for (const Fix& fix : fixes) {
     const double step_s = secondsBetween(latest_ns, fix.stamp_ns);
-    const std::string at = " after " + secondsText(latest_ns) + " s";
     if (step_s > config.max_bridge_s) {
-      breaks.push_back({"fixes pause for " + seconds(step_s, 1) + at + ": nothing in between has a position"});
+      breaks.push_back({"fixes pause for " + seconds(step_s, 1) + " after " + secondsText(latest_ns) +
+                        " s: nothing in between has a position"});
     } else if (step_s < -kGoesBack_s && (breaks.empty() || !breaks.back().disagrees)) {
-      breaks.push_back({"the stamps of fixes go back by " + seconds(-step_s, 1) + at +
-                            ": a clock was set, or two recordings are one; what is not later than before is left out",
-                        true});
+      breaks.push_back(goesBack("fixes", -step_s, latest_ns));
     }
     latest_ns = std::max(latest_ns, fix.stamp_ns);
     if (breaks.size() == kMostSaid) break;

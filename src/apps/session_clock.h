@@ -16,6 +16,7 @@ struct ClockCheck {
   double sigma_s = 0.0;    ///< of what is left then; 0: not checked
   bool exchanged = false;  ///< the fixes' latitude and longitude are to be exchanged
   Remark remark;
+  std::optional<Remark> went_back = {};  ///< the stamps of images did
 };
 
 /// Compares turns of the path with turns of the pictures, of which it reads at most four a second. Throws BagError,

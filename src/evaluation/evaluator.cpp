@@ -1,6 +1,7 @@
 #include "evaluation/evaluator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <set>
@@ -134,8 +135,8 @@ std::string trackCsvRow(const Estimate& estimate) {
       << toString(estimate.state) << ',' << estimate.tracked.best.similarity << ',' << estimate.featuresName() << ','
       << estimate.comparisons << ',' << estimate.image.extract_ms << ',' << estimate.image.match_ms << ','
       << estimate.update_ms << ',' << toString(estimate.source) << ',' << (metric ? metric->inliers : 0) << ','
-      << (metric ? metric->reprojection_px : 0.0) << ',' << estimate.sigma_m() << ',' << estimate.sigmaYaw_rad() << ','
-      << estimate.swept << '\n';
+      << (metric ? metric->reprojection_px : 0.0) << ',' << largerSigma(pose.covariance_m2) << ','
+      << std::sqrt(pose.yaw_variance_rad2) << ',' << estimate.swept << '\n';
   return out.str();
 }
 

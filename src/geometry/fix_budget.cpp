@@ -20,6 +20,11 @@ constexpr double kNormal = 1.4826;
 constexpr double kTail = 3.0;  ///< sigmas; what is beyond is an outlier, no slow error, and counts as this
 constexpr double kLongest_s = 3600.0;
 constexpr double kPriorWeight = 4.0;
+/// Of a receiver that claims nothing, per axis: satellites promise 8 m horizontally for 95 % of the time (GPS Standard
+/// Positioning Service Performance Standard, 2020), which is 2.45 sigmas.
+constexpr double kUndeclared_m = 3.3;
+/// What its fixes count for in an adjustment: enough to say where the path lies, too little to bend it.
+constexpr double kUndeclaredWeight_m = 0.3;
 
 /// The mean of some residuals.
 struct Bin {
@@ -122,22 +127,29 @@ FixBudget fixBudget(const std::vector<FixResidual>& residuals, double adjusted_m
   return budget;
 }
 
-FixBudget fixBudget(const Trajectory& path, const std::vector<MapFix>& fixes, double assumed_m) {
+double sigmaOfUndeclared_m(const GeometryConfig& config) {
+  return config.fix_sigma_m > 0.0 ? config.fix_sigma_m : kUndeclaredWeight_m;
+}
+
+FixBudget fixBudget(const Trajectory& path, const std::vector<MapFix>& fixes, const GeometryConfig& config) {
   std::vector<FixResidual> residuals;
   for (const MapFix& fix : fixes) {
     const std::optional<TrajectoryPoint> then = path.at(fix.stamp_ns);
     if (!then || !fix.believed) continue;
     residuals.push_back({secondsBetween(fixes.front().stamp_ns, fix.stamp_ns), fix.position_m - then->position_m,
-                         fix.sigma_m > 0.0 ? fix.sigma_m : assumed_m});
+                         fix.sigma_m > 0.0 ? fix.sigma_m : sigmaOfUndeclared_m(config)});
   }
-  FixBudget budget = fixBudget(residuals);
-  budget.assumed = claimNothing(fixes);
-  return budget;
+  return withoutClaims(fixBudget(residuals), fixes, config);
 }
 
-bool claimNothing(const std::vector<MapFix>& fixes) {
+FixBudget withoutClaims(FixBudget budget, const std::vector<MapFix>& fixes, const GeometryConfig& config) {
   const auto without = std::count_if(fixes.begin(), fixes.end(), [](const MapFix& fix) { return fix.sigma_m <= 0.0; });
-  return 2 * without > static_cast<std::ptrdiff_t>(fixes.size());
+  budget.assumed = 2 * without > static_cast<std::ptrdiff_t>(fixes.size());
+  if (budget.assumed && config.fix_sigma_m <= 0.0) {
+    budget.declared_m = std::max(kUndeclared_m, budget.residual_m);
+    budget.sigma_m = std::max(budget.declared_m, budget.sigma_m);
+  }
+  return budget;
 }
 
 namespace {
@@ -155,10 +167,24 @@ std::string describe(const FixBudget& budget) {
   constexpr double kMore = 1.1;
   std::ostringstream text;
   text << std::fixed << std::setprecision(2) << budget.sigma_m << " m per axis (one sigma): fixes "
-       << (budget.assumed ? "claim no sigma, assumed (geometry/fix_sigma) " : "claim ") << budget.declared_m
-       << " m and are " << budget.residual_m << " m off the path (rms), alike for " << std::setprecision(0)
-       << budget.correlation_s << " of " << budget.duration_s << " s";
+       << (budget.assumed ? "claim no sigma, by geometry/fix_sigma or else as usual receivers " : "claim ")
+       << budget.declared_m << " m and are " << budget.residual_m << " m off the path (rms), alike for "
+       << std::setprecision(0) << budget.correlation_s << " of " << budget.duration_s << " s";
   if (budget.sigma_m > kMore * sigmaByReceiver_m(budget)) text << "; the adjustment leaves more open than they do";
+  return text.str();
+}
+
+std::string describe(const DoubtfulStretch& stretch) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(0) << stretch.from_m << " to " << stretch.to_m << " m ("
+       << std::setprecision(1) << secondsBetween(0, stretch.from_ns) << " to " << secondsBetween(0, stretch.to_ns)
+       << " s) may be off by " << stretch.sigma_m << " m per axis (one sigma): ";
+  if (stretch.off_turns_m > 0.0) {
+    text << "the images turn unlike the path, a path that turns as they do is " << stretch.off_turns_m
+         << " m per axis from it";
+    if (stretch.off_fixes_m > 0.0) text << ", ";
+  }
+  if (stretch.off_fixes_m > 0.0) text << "fixes lie up to " << stretch.off_fixes_m << " m beside it";
   return text.str();
 }
 

@@ -24,11 +24,14 @@ struct FixResidual {
 /// an adjustment of the path leaves open. On top comes what is alike from one second to the next beyond the claim: the
 /// path is bent, or the receiver claims too little. `residuals`: in order of time.
 FixBudget fixBudget(const std::vector<FixResidual>& residuals, double adjusted_m = 0.0);
-/// Of a path that was cleaned, but not adjusted. `assumed_m`: sigma of fixes that claim none.
-FixBudget fixBudget(const Trajectory& path, const std::vector<MapFix>& fixes, double assumed_m);
+/// Of a path that was cleaned, but not adjusted.
+FixBudget fixBudget(const Trajectory& path, const std::vector<MapFix>& fixes, const GeometryConfig& config);
 
-/// Most fixes have no sigma.
-bool claimNothing(const std::vector<MapFix>& fixes);
+/// What a fix that claims no sigma counts for: geometry/fix_sigma, if somebody knows it.
+double sigmaOfUndeclared_m(const GeometryConfig& config);
+/// Of fixes most of which claim no sigma, unless somebody knows it: what they show, and no better than such receivers
+/// are. A slow error of some metres shows in no recording.
+FixBudget withoutClaims(FixBudget budget, const std::vector<MapFix>& fixes, const GeometryConfig& config);
 
 /// How long a receiver errs alike: of a Gauss-Markov process whose mean over the session has the share of the declared
 /// variance that the budget leaves. At most an hour, since satellites move on.

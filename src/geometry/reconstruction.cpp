@@ -24,10 +24,10 @@ constexpr std::size_t kOverlap = 4;        ///< a window shares this part of its
 }  // namespace
 
 void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointRays> rays,
-                         const AveragedRotations& rotations, const std::vector<double>& directions,
-                         const FeatureSets& sets) {
+                         const AveragedRotations& rotations, const std::vector<RelativeRotation>& relative,
+                         const std::vector<double>& directions, const FeatureSets& sets) {
   const auto begin = static_cast<std::uint32_t>(images_.size());
-  for (PositionObservation fix : positionsAt(session.images, session.fixes, config_.fix_sigma_m)) {
+  for (PositionObservation fix : positionsAt(session.images, session.fixes, sigmaOfUndeclared_m(config_))) {
     fix.image += begin;
     fix.sigma_m *= kFixCorrelation;
     fixes_.push_back(fix);
@@ -57,6 +57,7 @@ void Reconstruction::add(const UnadjustedSession& session, std::vector<KeypointR
     problem_.heights.push_back({begin + static_cast<std::uint32_t>(i), up_m, kFixCorrelation * heights.sigma_m});
   }
   sessions_.push_back(&session);
+  relative_ = relative;
   sets_.append(sets);
 }
 
@@ -71,6 +72,11 @@ void Reconstruction::append(const Reconstruction& other) {
   for (PositionObservation fix : other.fixes_) {
     fix.image += begin;
     fixes_.push_back(fix);
+  }
+  for (RelativeRotation relative : other.relative_) {
+    relative.a += begin;
+    relative.b += begin;
+    relative_.push_back(relative);
   }
   for (HeightObservation height : other.problem_.heights) {
     height.image += begin;
@@ -122,7 +128,11 @@ void Reconstruction::move(std::size_t session, const std::vector<Eigen::Vector3d
 }
 
 void Reconstruction::tie(const std::vector<ImagePair>& ties) {
-  for (std::size_t k = 0; k < sessions(); ++k) problem_.sessions[k].fix_bias_sigma_m = budgets_[k].sigma_m;
+  for (std::size_t k = 0; k < sessions(); ++k) {
+    // What counts is how they compare: with large ones alone the common path slides along a flat valley of the cost.
+    const double most_m = budgets_[k].assumed ? sigmaOfUndeclared_m(config_) : budgets_[k].sigma_m;
+    problem_.sessions[k].fix_bias_sigma_m = std::min(budgets_[k].sigma_m, most_m);
+  }
   orderBy(ties);
   for (const ImagePair& pair : ties) sets_.join(pair);
 }

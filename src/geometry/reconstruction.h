@@ -13,6 +13,7 @@
 #include "geometry/feature_tracks.h"
 #include "geometry/fix_budget.h"
 #include "geometry/heading_offset.h"
+#include "geometry/path_doubts.h"
 #include "geometry/pose_solver.h"
 #include "geometry/rays.h"
 #include "geometry/relative_rotation.h"
@@ -73,9 +74,10 @@ class Reconstruction {
   explicit Reconstruction(const GeometryConfig& config) : config_(config) { problem_.lenses.clear(); }
 
   /// Appends the images of a session, where the cleaned path has their antenna, and what they show. `session` must
-  /// outlive it. `directions`: see drivingDirections().
+  /// outlive it. `relative`: what neighbours say of each other; `directions`: see drivingDirections().
   void add(const UnadjustedSession& session, std::vector<KeypointRays> rays, const AveragedRotations& rotations,
-           const std::vector<double>& directions, const FeatureSets& sets);
+           const std::vector<RelativeRotation>& relative, const std::vector<double>& directions,
+           const FeatureSets& sets);
   /// Appends those of another one, with its landmarks, as they are there.
   void append(const Reconstruction& other);
 
@@ -139,7 +141,7 @@ class Reconstruction {
     double up_m = 0.0;         ///< by altitudes, above the first one of its session; 0 without any
   };
 
-  /// Sessions that know where a place is, and how far from the nearest fix that they believe, metres.
+  /// Sessions that know where a place is, and what the test of their paths leaves open there, metres.
   using TiedSessions = std::map<std::uint32_t, double>;
 
   void orderBy(const std::vector<ImagePair>& ties);
@@ -155,7 +157,7 @@ class Reconstruction {
   std::vector<std::vector<LandmarkMatch>> landmarksOf(const std::vector<bool>& some) const;
   void triangulateWithout(const std::vector<bool>& left_out, double gate_px, std::size_t max_views);
   double distance_m(const Landmark& landmark) const;
-  std::vector<TiedSessions> tiedSessions() const;
+  std::vector<TiedSessions> tiedSessions(const std::vector<std::vector<PathDoubt>>& doubts) const;
   CommonBudget commonBudgetOf(const std::vector<TiedSessions>& tied) const;
   double mapSigma_m(const TiedSessions& tied, const CommonBudget& common) const;
   ImageGeometry imageAt(std::size_t image, double sigma_m) const;
@@ -168,8 +170,9 @@ class Reconstruction {
   std::vector<BundleWindow> windows() const;
   BundleProblem problemOf(const BundleWindow& window) const;
   bool isWithin(double farthest_m, const PositionObservation& fix) const;
-  std::vector<bool> confirmedByFixes() const;
-  std::vector<double> distancesFromFixes_m() const;
+  std::vector<std::optional<double>> turnsOffImages_rad() const;
+  std::vector<std::vector<PathEvidence>> evidence() const;
+  std::vector<std::optional<Eigen::Vector2d>> offFixes_m() const;
   std::vector<std::optional<double>> distancesOffFixes() const;
   std::vector<FixResidual> fixResiduals(std::size_t session) const;
   std::optional<double> usual(const std::vector<std::optional<double>>& values, std::size_t image) const;
@@ -181,6 +184,7 @@ class Reconstruction {
   std::vector<FixBudget> budgets_;  ///< of each session
   std::vector<Image> images_;
   std::vector<PositionObservation> fixes_;  ///< all of them
+  std::vector<RelativeRotation> relative_;  ///< of neighbours
   FeatureSets sets_;                        ///< of what the images show
   BundleProblem problem_;
   std::vector<std::size_t> ranks_;  ///< of the images, in windows

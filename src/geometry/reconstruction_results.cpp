@@ -22,8 +22,8 @@ namespace {
 /// Sigmas from believed fixes, where it is as likely by chance as 3.4 sigmas on a line.
 constexpr double kOffFixes = 3.7;
 constexpr double kLeastExplained = 1.0 / 3.0;  ///< of what is matched; leaves and people move
+constexpr double kBeyondClaim = 2.0;           ///< times what a receiver claims, its fixes are off a whole path
 constexpr double kAttitudeSigma_rad = 0.004;   ///< of a training image in the map
-constexpr double kDrift = 0.04;                ///< metres that images stray in a metre without fixes, one sigma
 constexpr double kLeastSigma_m = 0.01;         ///< of a path
 
 }  // namespace
@@ -33,7 +33,14 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
   std::vector<std::vector<double>> errors_px(sessions_.size());
   std::vector<std::size_t> tracked(sessions_.size());
   std::vector<ImageGeometry> images(images_.size());
-  const std::vector<TiedSessions> tied = tiedSessions();
+  const std::vector<std::vector<PathEvidence>> paths = evidence();
+  std::vector<std::vector<PathDoubt>> doubts;
+  for (std::size_t k = 0; k < paths.size(); ++k) {
+    doubts.push_back(doubtsOf(paths[k], budgets_[k].sigma_m));
+    if (budgets_[k].residual_m <= kBeyondClaim * budgets_[k].declared_m) continue;
+    for (PathDoubt& doubt : doubts.back()) doubt.fails = true;  // its sigma has grown by the budget
+  }
+  const std::vector<TiedSessions> tied = tiedSessions(doubts);
   const CommonBudget common = commonBudgetOf(tied);
   std::vector<std::vector<double>> sigmas_m(sessions_.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
@@ -69,8 +76,11 @@ std::vector<SessionGeometry> Reconstruction::results(std::uint32_t first_id) con
     geometry.focal_scale = std::exp(lensCorrection(k)[kFocalLength]);
     geometry.focal_sigma = shared_.lens[kFocalLength];
     geometry.delay_sigma_s = shared_.fix_delay_s;
+    geometry.doubtful = doubtfulStretches(paths[k], doubts[k], sigmas_m[k]);
     geometry.fixes = budgets_[k];
-    geometry.fixes.sigma_m = median(std::move(sigmas_m[k]));
+    double squared_m2 = 0.0;
+    for (const double sigma_m : sigmas_m[k]) squared_m2 += sigma_m * sigma_m;
+    geometry.fixes.sigma_m = std::sqrt(squared_m2 / static_cast<double>(sigmas_m[k].size()));
   }
   return geometries;
 }
@@ -95,21 +105,23 @@ std::vector<DrivenHeading> Reconstruction::drivenHeadings() const {
 }
 
 /// The sessions that show landmarks of each image, its own included.
-std::vector<Reconstruction::TiedSessions> Reconstruction::tiedSessions() const {
-  const std::vector<double> away_m = distancesFromFixes_m();
+std::vector<Reconstruction::TiedSessions> Reconstruction::tiedSessions(
+    const std::vector<std::vector<PathDoubt>>& doubts) const {
+  const auto doubt_m = [&](std::size_t i) { return doubts[sessionOf(i)][i - begin(sessionOf(i))].m(); };
   std::vector<TiedSessions> tied(images_.size());
-  for (std::size_t i = 0; i < images_.size(); ++i) tied[i][sessionOf(i)] = away_m[i];
+  for (std::size_t i = 0; i < images_.size(); ++i) tied[i][sessionOf(i)] = doubt_m(i);
   for (const Landmark& landmark : problem_.landmarks) {
     TiedSessions sessions;
     for (const LandmarkObservation& observation : landmark.observations) {
-      const auto added = sessions.emplace(sessionOf(observation.image), away_m[observation.image]).first;
-      added->second = std::min(added->second, away_m[observation.image]);
+      const double here_m = doubt_m(observation.image);
+      const auto added = sessions.emplace(sessionOf(observation.image), here_m).first;
+      added->second = std::min(added->second, here_m);
     }
     if (sessions.size() == 1) continue;
     for (const LandmarkObservation& observation : landmark.observations) {
-      for (const auto& [session, distance_m] : sessions) {
-        const auto added = tied[observation.image].emplace(session, distance_m).first;
-        if (session != sessionOf(observation.image)) added->second = std::min(added->second, distance_m);
+      for (const auto& [session, least_m] : sessions) {
+        const auto added = tied[observation.image].emplace(session, least_m).first;
+        if (session != sessionOf(observation.image)) added->second = std::min(added->second, least_m);
       }
     }
   }
@@ -121,7 +133,7 @@ std::vector<FixResidual> Reconstruction::fixResiduals(std::size_t session) const
   const UnadjustedSession& of = *sessions_[session];
   const double delay_s = problem_.sessions[session].fix_delay_s;
   std::vector<FixResidual> residuals;
-  for (const FixAtImage& fix : fixesAtImages(of.images, of.fixes, config_.fix_sigma_m)) {
+  for (const FixAtImage& fix : fixesAtImages(of.images, of.fixes, sigmaOfUndeclared_m(config_))) {
     if (!fix.believed) continue;
     const std::size_t image = begin(session) + fix.image;
     const Eigen::Vector3d antenna_m = antennaInMap_m(problem_.cameras[image], image);
@@ -133,9 +145,8 @@ std::vector<FixResidual> Reconstruction::fixResiduals(std::size_t session) const
 
 void Reconstruction::findBudget() {
   FixBudget& budget = budgets_.front();
-  budget = fixBudget(fixResiduals(0), shared_.position_m);
-  budget.assumed = claimNothing(sessions_.front()->fixes);
-  if (budget.declared_m == 0.0) budget.sigma_m = budget.declared_m = config_.fix_sigma_m;  // no fixes
+  budget = withoutClaims(fixBudget(fixResiduals(0), shared_.position_m), sessions_.front()->fixes, config_);
+  if (budget.declared_m == 0.0) budget.sigma_m = budget.declared_m = sigmaOfUndeclared_m(config_);  // no fixes
   budget.sigma_m = std::max(budget.sigma_m, kLeastSigma_m);
 }
 
@@ -143,7 +154,7 @@ void Reconstruction::findBudget() {
 CommonBudget Reconstruction::commonBudgetOf(const std::vector<TiedSessions>& tied) const {
   std::vector<bool> is_tied(sessions_.size());
   for (const TiedSessions& together : tied) {
-    for (const auto& [session, away_m] : together) is_tied[session] = is_tied[session] || together.size() > 1;
+    for (const auto& [session, doubt_m] : together) is_tied[session] = is_tied[session] || together.size() > 1;
   }
   std::vector<TiedBudget> budgets;
   for (std::size_t k = 0; k < sessions_.size(); ++k) {
@@ -168,11 +179,10 @@ CommonBudget Reconstruction::commonBudgetOf(const std::vector<TiedSessions>& tie
 double Reconstruction::mapSigma_m(const TiedSessions& tied, const CommonBudget& common) const {
   const double stretch = tied.size() > 1 ? common.stretch : 1.0;
   std::map<std::size_t, double> information;  // of each receiver
-  for (const auto& [session, away_m] : tied) {
+  for (const auto& [session, doubt_m] : tied) {
     const double bias_m = std::max(stretch * budgets_[session].sigma_m, kLeastSigma_m);
-    const double drift_m = kDrift * away_m;
     double& best = information[common.receivers[session]];
-    best = std::max(best, 1.0 / (bias_m * bias_m + drift_m * drift_m));
+    best = std::max(best, 1.0 / (bias_m * bias_m + doubt_m * doubt_m));
   }
   double sum = 0.0;
   for (const auto& [receiver, of_receiver] : information) sum += of_receiver;
@@ -188,43 +198,73 @@ ImageGeometry Reconstruction::imageAt(std::size_t image, double sigma_m) const {
   return geometry;
 }
 
-std::vector<bool> Reconstruction::confirmedByFixes() const {
-  std::vector<bool> confirmed(images_.size());
-  for (const PositionObservation& fix : fixes_) confirmed[fix.image] = isWithin(kBelievedFix_m, fix);
-  return confirmed;
-}
-
-/// Of each image along the path of its session, from the nearest one that a fix confirms; without any, the whole path.
-std::vector<double> Reconstruction::distancesFromFixes_m() const {
-  const std::vector<bool> confirmed = confirmedByFixes();
-  std::vector<double> away_m;
-  for (std::size_t k = 0; k < sessions(); ++k) {
-    const std::size_t first = begin(k);
-    const auto step_m = [&](std::size_t i) { return (cleaned(i).position_m - cleaned(i - 1).position_m).norm(); };
-    double path_m = 0.0;
-    for (std::size_t i = first + 1; i < first + imagesIn(k); ++i) path_m += step_m(i);
-    for (std::size_t i = first; i < first + imagesIn(k); ++i) {
-      const double onwards_m = i == first ? path_m : std::min(path_m, away_m.back() + step_m(i));
-      away_m.push_back(confirmed[i] ? 0.0 : onwards_m);
-    }
-    for (std::size_t i = away_m.size(); i > first + 1; --i) {
-      away_m[i - 2] = std::min(away_m[i - 2], away_m[i - 1] + step_m(i - 1));
-    }
-  }
-  return away_m;
-}
-
-/// Of each image from where believed fixes have it, in sigmas of these.
-std::vector<std::optional<double>> Reconstruction::distancesOffFixes() const {
-  std::vector<std::optional<double>> distances(images_.size());
+/// Of each image from where the believed fix at it has it.
+std::vector<std::optional<Eigen::Vector2d>> Reconstruction::offFixes_m() const {
+  std::vector<std::optional<Eigen::Vector2d>> off_m(images_.size());
   for (const PositionObservation& fix : fixes_) {
     if (!fix.believed) continue;
     const BundleSession& session = problem_.sessionOf(fix.image);
     const Eigen::Vector2d then_m = fix.east_north_m + session.fix_delay_s * fix.velocity_m_s - session.fix_bias_m;
-    const Eigen::Vector3d antenna_m = antennaInMap_m(problem_.cameras[fix.image], fix.image);
-    distances[fix.image] = (antenna_m.head<2>() - then_m).norm() / fix.sigma_m;
+    off_m[fix.image] = then_m - antennaInMap_m(problem_.cameras[fix.image], fix.image).head<2>();
+  }
+  return off_m;
+}
+
+/// The same in sigmas of the fixes.
+std::vector<std::optional<double>> Reconstruction::distancesOffFixes() const {
+  const std::vector<std::optional<Eigen::Vector2d>> off_m = offFixes_m();
+  std::vector<std::optional<double>> distances(images_.size());
+  for (const PositionObservation& fix : fixes_) {
+    if (off_m[fix.image]) distances[fix.image] = off_m[fix.image]->norm() / fix.sigma_m;
   }
   return distances;
+}
+
+/// By how much more than their poses the images turn to the left, from those before to each.
+std::vector<std::optional<double>> Reconstruction::turnsOffImages_rad() const {
+  std::vector<double> sum_rad(images_.size());
+  std::vector<std::optional<double>> turned_rad(images_.size());
+  std::vector<std::vector<const RelativeRotation*>> pairs(images_.size());
+  for (const RelativeRotation& pair : relative_) pairs[pair.b].push_back(&pair);
+  for (std::size_t i = 1; i < images_.size(); ++i) {
+    std::vector<double> sums_rad;
+    for (const RelativeRotation* pair : pairs[i]) {
+      const Eigen::Quaterniond by_images = problem_.cameras[pair->a].rotation * pair->b_from_a.conjugate();
+      const Eigen::Matrix3d more = (by_images * problem_.cameras[i].rotation.conjugate()).toRotationMatrix();
+      sums_rad.push_back(sum_rad[pair->a] + std::atan2(more(1, 0), more(0, 0)));
+    }
+    sum_rad[i] = sums_rad.empty() ? sum_rad[i - 1] : median(sums_rad);
+    if (!sums_rad.empty()) turned_rad[i] = sum_rad[i] - sum_rad[i - 1];
+  }
+  return turned_rad;
+}
+
+/// Of each session.
+std::vector<std::vector<PathEvidence>> Reconstruction::evidence() const {
+  const std::vector<std::optional<Eigen::Vector2d>> off_m = offFixes_m();
+  const std::vector<std::optional<double>> turned_rad = turnsOffImages_rad();
+  const std::vector<std::optional<double>> explained = explainedShares();
+  std::vector<std::vector<PathEvidence>> paths(sessions());
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    // One that is astray comes into no map, and would bend the path.
+    const Eigen::Vector3d at_m =
+        isAstray(i, explained[i]) ? (startOf_m(i) + usualShift_m(i)).eval() : antennaInMap_m(problem_.cameras[i], i);
+    PathEvidence at{images_[i].cleaned.stamp_ns, at_m.head<2>()};
+    at.turned_rad = turned_rad[i];
+    if (off_m[i]) {
+      std::vector<Eigen::Vector3d> around_m;
+      for (const std::size_t neighbour : neighboursOf(i)) {
+        if (off_m[neighbour]) around_m.emplace_back(off_m[neighbour]->x(), off_m[neighbour]->y(), 0.0);
+      }
+      at.off_fixes_m = medianOf(around_m).head<2>();
+    }
+    paths[sessionOf(i)].push_back(at);
+  }
+  for (const PositionObservation& fix : fixes_) {
+    const std::uint32_t session = sessionOf(fix.image);
+    paths[session][fix.image - begin(session)].fix_sigma_m = fix.sigma_m / kFixCorrelation;
+  }
+  return paths;
 }
 
 /// The median around an image: one fix may err.

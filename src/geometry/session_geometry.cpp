@@ -164,7 +164,7 @@ class SessionAdjuster {
     if (session_.finds_mount) findMounting(yaws_rad, directions, relative);
     // Level, whatever the altitudes say: a camera turned aside by much would explain how a robot leans across a slope.
     const AveragedRotations rotations = averageRotations(yaws_rad, relative, mountingOf(session_.mount));
-    reconstruction_.add(session_, std::move(rays), rotations, directions, sets);
+    reconstruction_.add(session_, std::move(rays), rotations, relative, directions, sets);
   }
 
   /// What is nearly level and ahead the adjustment finds by itself.
@@ -398,8 +398,10 @@ void GeometryConfig::declare(ParameterVisitor& visitor) {
                principal_point_sigma, 1e-6, 1.0);
   visitor.real({"geometry/distortion_sigma", "1", "and the radial coefficients k1 and k2"}, distortion_sigma, 1e-6,
                1.0);
-  visitor.real({"geometry/fix_sigma", "m", "standard deviation per axis of a fix that does not tell its own"},
-               fix_sigma_m, 0.001, 100.0);
+  visitor.real({"geometry/fix_sigma", "m",
+                "standard deviation per axis of a fix that does not tell its own; 0: not known, so positions may be "
+                "off by metres"},
+               fix_sigma_m, 0.0, 100.0);
   visitor.real(
       {"geometry/spacing", "m",
        "of a session with landmarks keep, after all images were adjusted, only those at least this far from the "

@@ -199,7 +199,9 @@ std::optional<PoseVerifier::Solution> PoseVerifier::solve(const std::vector<std:
   pose.covariance = config_.sigma_factor * config_.sigma_factor * atBase(solved->covariance, pose);
   pose.inliers = solved->agreeing;
   pose.reprojection_px = solved->median_error * focal_px_;
-  if (const auto geometry = map_.geometry(images.front())) pose.map_covariance = atBase(geometry->covariance, pose);
+  // Of the image whose landmarks made it: the nearest one may be of a stretch that is better known.
+  const auto geometry = map_.geometry(solution.matched.training_image);
+  if (geometry) pose.map_covariance = atBase(geometry->covariance, pose);
   solution.moving_gain = solved->moving_gain;
   solution.focal_scale = solved->focal_scale;
   solution.focal_sigma = solved->focal_sigma;

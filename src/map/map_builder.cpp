@@ -210,12 +210,14 @@ void MapBuilder::finish(const Sink& sink, const Progress& progress) {
   }
   for (std::size_t i = 0; i < geometries.size(); ++i) {
     FixBudget& budget = report_.session_images[i].fixes;
-    budget = fixBudget(report_.sessions[i].trajectory, fixes_[i], config_.geometry.fix_sigma_m);
+    budget = fixBudget(report_.sessions[i].trajectory, fixes_[i], config_.geometry);
     header_.sessions[i].fixes = budget;
     if (!geometries[i]) continue;
     report_.session_images[i].geometry = *geometries[i];  // without poses and landmarks
     Session& session = header_.sessions[i];
+    session.doubtful = geometries[i]->doubtful;
     if (geometries[i]->contradicts_calibration || geometries[i]->contradicts_fixes) {
+      session.fixes->sigma_m = budget.sigma_m = std::max(budget.sigma_m, geometries[i]->fixes.sigma_m);
       geometries[i].reset();
       session.camera.reset();
       continue;

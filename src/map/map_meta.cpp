@@ -16,8 +16,9 @@ namespace {
 
 constexpr const char* kCamera = "/camera/";  ///< behind the key of the session
 constexpr const char* kPublished = "/published_camera/";
-constexpr const char* kMount = "/mount/";  ///< likewise
-constexpr const char* kFixes = "/fixes/";  ///< likewise
+constexpr const char* kMount = "/mount/";        ///< likewise
+constexpr const char* kFixes = "/fixes/";        ///< likewise
+constexpr const char* kDoubtful = "/doubtful/";  ///< likewise, before the number of the stretch
 constexpr const char* kMask = "/mask";
 constexpr const char* kKind = "features/kind";
 constexpr const char* kDimension = "features/dimension";  ///< of a descriptor
@@ -146,6 +147,12 @@ ParameterValues toValues(const FixBudget& fixes) {
           {"duration_s", fixes.duration_s}, {"sigma_m", fixes.sigma_m}};
 }
 
+double requireInBudget(double value, const std::string& key) {
+  if (value >= 0.0 && value <= kLargestBudget) return value;
+  throw std::runtime_error("meta value '" + key + "' = " + std::to_string(value) + " is not in [0, " +
+                           std::to_string(kLargestBudget) + "]");
+}
+
 std::optional<FixBudget> takeFixes(ParameterValues& meta, const std::string& session) {
   ParameterValues values = takeGroup(meta, session + kFixes);
   if (values.empty()) return std::nullopt;
@@ -155,14 +162,44 @@ std::optional<FixBudget> takeFixes(ParameterValues& meta, const std::string& ses
                                  {"correlation_s", &fixes.correlation_s},
                                  {"duration_s", &fixes.duration_s},
                                  {"sigma_m", &fixes.sigma_m}}) {
-    *to = take<double>(values, name);
-    if (*to >= 0.0 && *to <= kLargestBudget) continue;
-    throw std::runtime_error("meta value '" + session + kFixes + name + "' = " + std::to_string(*to) +
-                             " is not in [0, " + std::to_string(kLargestBudget) + "]");
+    *to = requireInBudget(take<double>(values, name), session + kFixes + name);
   }
   fixes.assumed = takeFlag(values, "assumed");
   if (values.empty()) return fixes;
   throw std::runtime_error("meta value '" + session + kFixes + values.begin()->first + "' is unknown");
+}
+
+ParameterValues toValues(const DoubtfulStretch& stretch) {
+  return {{"from_ns", stretch.from_ns},        {"to_ns", stretch.to_ns},
+          {"from_m", stretch.from_m},          {"to_m", stretch.to_m},
+          {"sigma_m", stretch.sigma_m},        {"off_fixes_m", stretch.off_fixes_m},
+          {"off_turns_m", stretch.off_turns_m}};
+}
+
+/// `group`: the key of the stretch.
+DoubtfulStretch stretchOf(ParameterValues values, const std::string& group) {
+  DoubtfulStretch stretch;
+  stretch.from_ns = take<std::int64_t>(values, "from_ns");
+  stretch.to_ns = take<std::int64_t>(values, "to_ns");
+  for (const auto& [name, to] : {std::pair<const char*, double*>{"from_m", &stretch.from_m},
+                                 {"to_m", &stretch.to_m},
+                                 {"sigma_m", &stretch.sigma_m},
+                                 {"off_fixes_m", &stretch.off_fixes_m},
+                                 {"off_turns_m", &stretch.off_turns_m}}) {
+    *to = requireInBudget(take<double>(values, name), group + name);
+  }
+  if (values.empty()) return stretch;
+  throw std::runtime_error("meta value '" + group + values.begin()->first + "' is unknown");
+}
+
+std::vector<DoubtfulStretch> takeDoubtful(ParameterValues& meta, const std::string& session) {
+  std::vector<DoubtfulStretch> doubtful;
+  while (true) {
+    const std::string group = session + kDoubtful + std::to_string(doubtful.size()) + '/';
+    ParameterValues values = takeGroup(meta, group);
+    if (values.empty()) return doubtful;
+    doubtful.push_back(stretchOf(std::move(values), group));
+  }
 }
 
 /// Of masks that differ, in memory; packed they are small.
@@ -237,6 +274,7 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
     }
     if (version >= kSincePublished) session.published = takeCamera(meta, key, kPublished);
     if (version >= kSinceFixes) session.fixes = takeFixes(meta, key);
+    if (version >= kSinceDoubts) session.doubtful = takeDoubtful(meta, key);
     if (!session.mask.empty()) ++used;
     sessions.push_back(std::move(session));
   }
@@ -311,6 +349,10 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
     }
     if (session.fixes) {
       for (const auto& [name, value] : toValues(*session.fixes)) meta[key + kFixes + name] = value;
+    }
+    for (std::size_t n = 0; n < session.doubtful.size(); ++n) {
+      const std::string group = key + kDoubtful + std::to_string(n) + '/';
+      for (const auto& [name, value] : toValues(session.doubtful[n])) meta[group + name] = value;
     }
     if (session.mask.empty()) continue;
     const std::vector<std::uint8_t>& bits = *masks.insert(packMask(session.mask)).first;

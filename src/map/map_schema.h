@@ -53,6 +53,8 @@ constexpr int kSinceKinds = 8;
 constexpr int kSinceFixes = 8;
 /// From this version on a map may have a vocabulary, and its images a VLAD.
 constexpr int kSinceVlad = 9;
+/// From this version on a session says where its recording contradicts itself.
+constexpr int kSinceDoubts = 10;
 /// From this version on a session's camera may differ from the calibration that was published for it.
 constexpr int kSincePublished = 7;
 

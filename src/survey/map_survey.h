@@ -133,6 +133,19 @@ struct LandmarkSurvey {
 /// `most_images`: at least 1; of a map that has more, so many are read, evenly spread.
 LandmarkSurvey landmarkSurvey(const TrainingMap& map, std::size_t most_images);
 
+/// Images of one session in a row whose positions are about as good, within a factor of two.
+struct ErrorStretch {
+  int session = 0;
+  double from_m = 0.0;  ///< along the images of the session
+  double to_m = 0.0;
+  double least_m = 0.0;  ///< of their standard deviations, per horizontal axis
+  double most_m = 0.0;
+};
+
+/// By the covariance of each image, or else what its session's fixes leave; of no session of an older map that says
+/// neither. `most_images`: of a larger map every k-th image is read. The images of a session follow each other.
+std::vector<ErrorStretch> expectedErrors(const TrainingMap& map, std::size_t most_images);
+
 /// When two images look alike although they are far apart, and how much work may go into finding them.
 struct AmbiguityConfig {
   double near_m = 5.0;                       ///< an image not farther away shows the same scene

@@ -94,6 +94,25 @@ TEST(MapReport, AStretchThatWasNotComparedHasNoTwin) {
   EXPECT_THAT(reportOf(places), HasSubstr("10 images\n")) << "image 11 is of another session";
 }
 
+TEST(MapReport, NamesStretchesByTheirErrorAndThoseThatAreDoubtful) {
+  const test::TemporaryFolder folder;
+  MapHeader header = test::exampleHeader();
+  header.sessions[0].fixes = FixBudget{0.3, false, 0.2, 10.0, 100.0, 0.2};
+  header.sessions[0].doubtful = {{1'000'000'000, 61'500'000'000, 0.0, 40.0, 3.0, 12.0, 8.0}};
+  const TrainingMap map(header, test::exampleImages(20));
+  const std::string path = folder / "a.map";
+  saveMap(map, path);
+  MapFindings findings;
+  findings.survey = survey(map, findings.config);
+  findings.errors = {{0, 0.0, 40.0, 1.0, 3.0}, {0, 40.0, 90.0, 0.2, 0.2}};
+  std::ostringstream text;
+  printMapReport(text, path, map, findings);
+  EXPECT_THAT(text.str(), HasSubstr("0 m to     40 m: 3.00 m\n"));
+  EXPECT_THAT(text.str(), HasSubstr("40 m to     90 m: 0.20 m\n"));
+  EXPECT_THAT(text.str(), HasSubstr("check before use: 0 to 40 m (1.0 to 61.5 s) may be off by 3.0 m per axis"));
+  EXPECT_THAT(text.str(), HasSubstr("8.0 m per axis from it, fixes lie up to 12.0 m beside it\n"));
+}
+
 TEST(MapReport, SaysWhichCameraEachSessionHas) {
   const std::string report = reportOf(AmbiguousPlaces());
   EXPECT_THAT(report,

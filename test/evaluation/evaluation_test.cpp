@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include "base/text.h"
@@ -33,6 +35,25 @@ TEST(TrackCsv, RowHasAFieldForEveryColumnAndReadsBackExactly) {
   EXPECT_EQ(std::stod(fields[2]), -2.0e-7);
   EXPECT_EQ(fields[6], "TRACKING");
   EXPECT_EQ(fields[8], "SIFT");
+}
+
+/// What a pose is off by on the earth, not only in relation to a map that may be wrong itself.
+TEST(TrackCsv, SigmasHaveTheMapsErrorInThem) {
+  Estimate estimate;
+  estimate.metric = MetricPose();
+  estimate.metric->covariance.diagonal().setConstant(0.01 * 0.01);
+  estimate.metric->map_covariance.diagonal().setConstant(20.0 * 20.0);
+  estimate.pose.covariance_m2.setIdentity();
+  estimate.pose.covariance_m2 *= 400.0001;
+  estimate.pose.yaw_variance_rad2 = 0.25;
+  const std::vector<std::string> columns = csvFields(trackCsvHeader());
+  const std::vector<std::string> fields = csvFields(trackCsvRow(estimate));
+  const auto field = [&](const char* name) {
+    const auto column = std::find(columns.begin(), columns.end(), name) - columns.begin();
+    return std::stod(fields[static_cast<std::size_t>(column)]);
+  };
+  EXPECT_NEAR(field("sigma_m"), 20.0, 0.001);
+  EXPECT_NEAR(field("sigma_yaw_rad"), 0.5, 1e-9);
 }
 
 }  // namespace

@@ -125,7 +125,7 @@ TEST(FixBudget, FindsHowLongAReceiverErrsAlike) {
 
 TEST(FixBudget, SaysWhenTheAdjustmentLeavesMoreOpen) {
   const auto saysMore = [](double sigma_m) {
-    return describe({0.05, false, 0.02, 1.0, 6.0, sigma_m}).find("the adjustment leaves more open") !=
+    return describe(FixBudget{0.05, false, 0.02, 1.0, 6.0, sigma_m}).find("the adjustment leaves more open") !=
            std::string::npos;
   };
   EXPECT_FALSE(saysMore(0.047));
@@ -166,6 +166,31 @@ TEST(CommonBudget, CountsSessionsThatFollowEachOtherAsOne) {
   EXPECT_NE(common.receivers[0], common.receivers[2]);
   EXPECT_LT(common.stretch, 1.0) << "two that agree";
   EXPECT_DOUBLE_EQ(commonBudget({at(900.0), at(0.0)}).stretch, 1.0) << "one";
+}
+
+std::vector<MapFix> fixesClaiming(double sigma_m) {
+  std::vector<MapFix> fixes(10);
+  for (MapFix& fix : fixes) fix.sigma_m = sigma_m;
+  return fixes;
+}
+
+/// A receiver that says nothing may be off by metres for minutes, which shows nowhere.
+TEST(FixBudget, OfAReceiverThatClaimsNothingIsThatOfUsualOnes) {
+  const FixBudget shown{0.3, false, 0.2, 5.0, 100.0, 0.1};
+  EXPECT_EQ(withoutClaims(shown, fixesClaiming(0.3), {}).sigma_m, 0.1) << "it claims something";
+  const FixBudget unknown = withoutClaims(shown, fixesClaiming(0.0), {});
+  EXPECT_TRUE(unknown.assumed);
+  EXPECT_GE(unknown.sigma_m, 3.0);
+  const FixBudget poor{0.3, false, 7.0, 5.0, 100.0, 2.0};
+  EXPECT_EQ(withoutClaims(poor, fixesClaiming(0.0), {}).sigma_m, 7.0) << "what shows";
+}
+
+TEST(FixBudget, OfAReceiverThatSomebodyKnowsIsWhatHeSays) {
+  GeometryConfig known;
+  known.fix_sigma_m = 0.05;
+  const FixBudget budget = withoutClaims({0.05, false, 0.04, 5.0, 100.0, 0.02}, fixesClaiming(0.0), known);
+  EXPECT_TRUE(budget.assumed);
+  EXPECT_EQ(budget.sigma_m, 0.02);
 }
 
 }  // namespace

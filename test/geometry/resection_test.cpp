@@ -41,7 +41,7 @@ class ResectionTest : public testing::Test {
         sets.join(pair);
       }
     }
-    reconstruction_.add(session_, std::move(rays), rotations, std::vector<double>(drive_.truth.size(), 1.0), sets);
+    reconstruction_.add(session_, std::move(rays), rotations, {}, std::vector<double>(drive_.truth.size(), 1.0), sets);
     reconstruction_.triangulateAll(20.0, 20);
   }
 

@@ -29,6 +29,23 @@ TEST_F(PoseVerifierTest, FindsThePoseToCentimetres) {
   }
 }
 
+TEST_F(PoseVerifierTest, HasTheErrorOfTheImageWhoseLandmarksMadeIt) {
+  std::vector<TrainingImage> images;
+  for (std::size_t i = 0; i < street_.map().size(); ++i) images.push_back(street_.map().image(i));
+  for (TrainingImage& image : images) {
+    if (image.geometry) image.geometry->covariance.diagonal().head<2>().setConstant(100.0);
+  }
+  images[14].geometry->covariance.diagonal().head<2>().setConstant(0.01);
+  const TrainingMap doubtful(street_.map().header(), images);
+  SessionChoice sessions(doubtful, true);
+  PoseVerifier verifier(doubtful, {}, sessions);
+  const LocalFeatures seen = street_.fewSeenFrom(street_.trueNear(14, kBeside_m), 16, 60);
+  verifier.startImage(0, seen, street_.camera());
+  const auto pose = verifier.nearOneOf({14});
+  ASSERT_TRUE(pose);
+  EXPECT_GT(pose->map_covariance(0, 0), 90.0) << "the robot is nearest to image 14";
+}
+
 TEST_F(PoseVerifierTest, NamesTheTrainingImagesWhoseLandmarksItUses) {
   ASSERT_TRUE(verify(0.0, street_.seenFrom(street_.trueNear(14, kBeside_m)), {14}));
   std::vector<std::size_t> compared = verifier_.compared();

@@ -22,8 +22,8 @@ TEST_F(MapStore, RefusesAnotherSqliteFile) {
 }
 
 TEST_F(MapStore, NamesBothVersions) {
-  tamper("PRAGMA user_version = 10");
-  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 10"), HasSubstr("versions 3 to 9")));
+  tamper("PRAGMA user_version = 11");
+  EXPECT_THAT(refusal(path_), AllOf(HasSubstr("version 11"), HasSubstr("versions 3 to 10")));
 }
 
 TEST_F(MapStore, AVersionHasItsOwnTablesAndValues) {

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "visual_localization/geometry/camera_pose.h"
+#include "visual_localization/geometry/fix_budget.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -19,7 +20,7 @@ struct GeometryConfig {
   double focal_sigma = 0.03;
   double principal_point_sigma = 0.01;
   double distortion_sigma = 0.05;
-  double fix_sigma_m = 0.3;
+  double fix_sigma_m = 0.0;
   int window = 2000;  ///< images adjusted at a time, which bounds the memory; no parameter
   double spacing_m = 2.0;
 
@@ -69,6 +70,7 @@ struct SessionLandmarks {
   std::optional<CameraPose> found_camera = {};
   double tied_apart_m = 0.0;    ///< from what the sessions before see as well, before they were tied; 0: not tied
   double agreeing_share = 1.0;  ///< of the features matched over several images: those that the adjustment explains
+  std::vector<DoubtfulStretch> doubtful = {};  ///< in order of time
 };
 
 }  // namespace visual_localization

@@ -17,10 +17,11 @@ class MapStoreError : public std::runtime_error {
 };
 
 /// Version of the schema that this build writes.
-constexpr int kMapSchemaVersion = 9;
+constexpr int kMapSchemaVersion = 10;
 /// The oldest one that it reads. Version 3 knows neither cameras nor masks; until version 4 the rows of an image could
 /// belong to another map; until version 5 a map has no history; until version 6 its features
-/// are not upright; until version 7 they are all SIFT; until version 8 they have no VLAD.
+/// are not upright; until version 7 they are all SIFT; until version 8 they have no VLAD; until version 9 no stretch of
+/// a session is doubtful.
 constexpr int kOldestMapSchemaVersion = 3;
 
 /// Megabytes (2^20 bytes) of features that are kept in memory unless someone says otherwise.

@@ -71,6 +71,8 @@ struct Session {
   std::optional<CameraModel> published = {};
   /// How far off its positions may be by its fixes; none: not known.
   std::optional<FixBudget> fixes = {};
+  /// Where its recording contradicts itself, in order of time; none in maps of older versions.
+  std::vector<DoubtfulStretch> doubtful = {};
 };
 
 /// What holds for all images of a map.
