@@ -70,11 +70,13 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   if (!metric) metric = poseNearProposal(tracked);
   sessions_->noteRecognition(metric || tracked.best.recognised);
   if (!metric && tracked.best.recognised) learnSession(tracked);
-  const Evidence evidence = verify(tracked, metric);
+  const std::optional<PredictedPose> predicted = metric ? std::nullopt : verifiedMotion(tracked);
+  const Evidence evidence = verify(tracked, metric, predicted);
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
 
   last_ = estimateOf(stamp_ns, tracked, metric, evidence, state);
+  choosePose(*last_, predicted);
   return answer(stopwatch.elapsed_ms());
 }
 
@@ -95,7 +97,6 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.tracked = tracked;
   estimate.evidence = evidence;
   if (const auto session = sessions_->chosen()) estimate.session = map_->header().sessions[*session].name;
-  choosePose(estimate);
   if (isMetric()) {
     scores_.count(verifier_->compared());
     estimate.focal_scale = verifier_->focal().scale();
@@ -146,13 +147,16 @@ bool Localizer::isFrozen() const {
 }
 
 /// Compares global features only when the local ones are not sure.
-Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric) {
+Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric,
+                           const std::optional<PredictedPose>& predicted) {
   const StateConfig& state = config_.state;
   Evidence evidence;
   if (isMetric() && !verifier_->focal().contradicts()) evidence.verified = metric && metric->confirmed;
   evidence.features = scores_.kind();
   const bool sift = evidence.features == FeatureKind::kLocal;
-  evidence.probability = probabilityOf(tracked);
+  Eigen::Vector2d claimed_m = predicted ? predicted->position_m : tracked.position_m;
+  if (metric) claimed_m = metric->base.translation().head<2>();
+  evidence.probability = probabilityOf(tracked, claimed_m);
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
   if (state.place_check && !sure && !evidence.probability && !evidence.verified.value_or(false)) {
@@ -217,12 +221,14 @@ TrackerEstimate Localizer::trackImage() {
 
 TrackerEstimate Localizer::trackVerified(const MetricPose& metric) {
   const Eigen::Vector2d position_m = metric.base.translation().head<2>();
-  PoseLikelihood verified(*map_, position_m);
+  const std::size_t best_image = verifier_->matched().training_image;
+  const Score best = scores_[best_image];
+  PoseLikelihood verified(*map_, position_m, Fitness{best.weight, best_image, best});
   tracker_->update(verified);
   TrackerEstimate tracked = tracker_->belief();
   bringTracker(tracked, metric);
-  tracked.best_image = verifier_->matched().training_image;
-  tracked.best = scores_[tracked.best_image];
+  tracked.best_image = best_image;
+  tracked.best = best;
   tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
   return tracked;
 }
@@ -236,12 +242,30 @@ void Localizer::witness(const Motion& motion, const std::optional<MetricPose>& m
   witness_->update(witness_->likelihoodBeside(scores_.compared()));
 }
 
-/// Around the estimate; by global features thresholds decide, as by choice.
-std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) const {
+/// Where the motion since the last verified pose leads to: that is the pose, whatever looks alike elsewhere, as long as
+/// a velocity holds. Later, and where thresholds decide, a tracker that is elsewhere is believed; of odometry only one
+/// that recognises its place. Poses by a calibration that the images contradict lead nowhere.
+std::optional<PredictedPose> Localizer::verifiedMotion(const TrackerEstimate& tracked) {
+  if (!isMetric() || verifier_->focal().contradicts()) return std::nullopt;
+  const PosePredictor& predictor = verifier_->predictor();
+  const std::optional<PredictedPose> predicted = predictor.predicted();
+  if (!predicted) return std::nullopt;
+  const bool is_fresh = config_.state.witness == "probability" && predictor.byVelocity();
+  const bool knows_better = is_fresh || (predicted->by_odometry && !tracked.best.recognised);
+  const double most_m = config_.state.max_distance_m;
+  return knows_better || (predicted->position_m - placeOf_m(tracked)).norm() <= most_m ? predicted : std::nullopt;
+}
+
+/// Around a position; by global features thresholds decide, as by choice.
+std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked,
+                                               const Eigen::Vector2d& position_m) const {
   if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kLocal) return std::nullopt;
   if (isThroughOtherLens(tracked.best_image)) return 0.0;
-  const PlaceFilter& filter = tracker_->posterior() != nullptr ? *tracker_->posterior() : *witness_;
-  return (1.0 - filter.offMap()) * filter.within(tracked.position_m, filter.around_m(config_.state.max_distance_m));
+  return posterior().probabilityWithin(position_m, hereRadius_m(tracked.best_image));
+}
+
+const PlaceFilter& Localizer::posterior() const {
+  return tracker_->posterior() != nullptr ? *tracker_->posterior() : *witness_;
 }
 
 /// The images ask for a focal length that is farther from the map's than the calibration's is: then things look as
