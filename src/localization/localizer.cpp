@@ -66,12 +66,14 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   scores_.startImage(metric ? FeatureKind::kLocal : choice_.next(),
                      [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
   sweep_.startImage();
+  const bool is_late = tracked_ns_ && stamp_ns < *tracked_ns_;
   const TrackerEstimate tracked = track(stamp_ns, metric);
   if (!metric) metric = poseNearProposal(tracked);
   sessions_->noteRecognition(metric || tracked.best.recognised);
   if (!metric && tracked.best.recognised) learnSession(tracked);
   const std::optional<PredictedPose> predicted = metric ? std::nullopt : verifiedMotion(tracked);
-  const Evidence evidence = verify(tracked, metric, predicted);
+  Evidence evidence = verify(tracked, metric, predicted);
+  if (is_late && evidence.probability) evidence.probability = 0.0;  // nobody knows how the robot came here
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
 
@@ -117,12 +119,13 @@ Estimate Localizer::lastAgain(std::int64_t stamp_ns, double elapsed_ms) {
   return answer(elapsed_ms);
 }
 
-/// The last estimate, after `elapsed_ms` since its image came. One of a camera that is frozen is in doubt.
+/// The last estimate, after `elapsed_ms` since its image came. One of a camera that is frozen, or of an image too old
+/// to say where the robot is by now, is in doubt.
 Estimate Localizer::answer(double elapsed_ms) {
   last_->update_ms = elapsed_ms - last_->image.extract_ms - last_->image.match_ms;
   last_->repeats = repeats_.images;
   last_->frozen = isFrozen();
-  if (last_->frozen) doubt();
+  if (last_->frozen || isStale()) doubt();
   return *last_;
 }
 
@@ -137,13 +140,21 @@ void Localizer::Repeats::add(std::int64_t stamp_ns, bool repeated) {
   last_ns = stamp_ns;
 }
 
+/// How long the last image has been coming.
+double Localizer::Repeats::seconds() const { return std::abs(secondsBetween(first_ns, last_ns)); }
+
+/// Whether the image repeats one from so long ago that a stream which repeats each to reach its rate does not.
+bool Localizer::isStale() const {
+  return config_.state.witness == "probability" && config_.state.frozen_images > 0 && repeats_.images > 0 &&
+         repeats_.seconds() >= config_.state.frozen_time_s;
+}
+
 /// Even a camera that stands still has noise: an image that stays says nothing about where the robot is by now.
 bool Localizer::isFrozen() const {
   constexpr std::size_t kStuck = 30;  // a driver that sends its last image with its old stamp, on and on
   const auto least = static_cast<std::size_t>(config_.state.frozen_images);
   if (least == 0 || repeats_.images < least) return false;
-  return std::abs(secondsBetween(repeats_.first_ns, repeats_.last_ns)) >= config_.state.frozen_time_s ||
-         repeats_.at_one_stamp >= kStuck;
+  return repeats_.seconds() >= config_.state.frozen_time_s || repeats_.at_one_stamp >= kStuck;
 }
 
 /// Compares global features only when the local ones are not sure.
@@ -154,16 +165,17 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
   if (isMetric() && !verifier_->focal().contradicts()) evidence.verified = metric && metric->confirmed;
   evidence.features = scores_.kind();
   const bool sift = evidence.features == FeatureKind::kLocal;
+  evidence.blind =
+      sift ? image_->localFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
   Eigen::Vector2d claimed_m = predicted ? predicted->position_m : tracked.position_m;
   if (metric) claimed_m = metric->base.translation().head<2>();
   evidence.probability = probabilityOf(tracked, claimed_m);
+  if (evidence.blind && evidence.probability) evidence.probability = 0.0;  // it shows no place
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
   if (state.place_check && !sure && !evidence.probability && !evidence.verified.value_or(false)) {
     evidence.place_ratio = sweep_.ratio(scores_, tracked.position_m, state.max_distance_m);
   }
-  evidence.blind =
-      sift ? image_->localFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
   return evidence;
 }
 

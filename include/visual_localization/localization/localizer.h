@@ -92,6 +92,7 @@ class Localizer {
     std::int64_t last_ns = 0;
 
     void add(std::int64_t stamp_ns, bool repeated);
+    double seconds() const;
   };
 
   FrontEndConfig frontEndConfig() const;
@@ -101,6 +102,7 @@ class Localizer {
   Estimate lastAgain(std::int64_t stamp_ns, double elapsed_ms);
   Estimate answer(double elapsed_ms);
   bool isFrozen() const;
+  bool isStale() const;
   Evidence verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric,
                   const std::optional<PredictedPose>& predicted);
   std::optional<PredictedPose> verifiedMotion(const TrackerEstimate& tracked);
