@@ -45,8 +45,8 @@ TEST_P(TrackingByProbability, AnImageThatShowsNothingIsNotTracked) {
   EXPECT_EQ(see(40.0).state, LocalizationState::kUncertain);
   image_->features = 100;
   image_->best = 0.5;
-  see(41.0);
-  EXPECT_EQ(see(42.0).state, LocalizationState::kTracking);
+  for (int x_m = 41; x_m < 44; ++x_m) see(x_m);
+  EXPECT_EQ(see(44.0).state, LocalizationState::kTracking);
 }
 
 TEST_P(TrackingByProbability, AnImageThatComesAgainLateIsNotTracked) {
