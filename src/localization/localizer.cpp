@@ -170,6 +170,8 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
   Eigen::Vector2d claimed_m = predicted ? predicted->position_m : tracked.position_m;
   if (metric) claimed_m = metric->base.translation().head<2>();
   evidence.probability = probabilityOf(tracked, claimed_m);
+  if (evidence.probability && evidence.verified)
+    missPose(metric.has_value(), predicted.has_value(), *evidence.probability);
   if (evidence.blind && evidence.probability) evidence.probability = 0.0;  // it shows no place
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
@@ -266,6 +268,15 @@ std::optional<PredictedPose> Localizer::verifiedMotion(const TrackerEstimate& tr
   const bool knows_better = is_fresh || (predicted->by_odometry && !tracked.best.recognised);
   const double most_m = config_.state.max_distance_m;
   return knows_better || (predicted->position_m - placeOf_m(tracked)).norm() <= most_m ? predicted : std::nullopt;
+}
+
+/// What it says that landmarks verify no pose: the more of a drive have one, the less a place alone is believed. For a
+/// while the verified motion speaks for itself.
+void Localizer::missPose(bool has_pose, bool is_predicted, double& probability) {
+  MissingPoses& missing = verifier_->missing();
+  const double in_map = missing.likelihood() * probability;
+  if (!has_pose && !is_predicted) probability = in_map / std::max(1e-12, in_map + 1.0 - probability);
+  missing.add(has_pose, probability);
 }
 
 /// Around a position; by global features thresholds decide, as by choice.

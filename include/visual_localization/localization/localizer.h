@@ -117,6 +117,7 @@ class Localizer {
   const PlaceFilter& posterior() const;
   double placeVariance_m2(std::size_t image) const;
   double hereRadius_m(std::size_t image) const;
+  void missPose(bool has_pose, bool is_predicted, double& probability);
   bool isThroughOtherLens(std::size_t training_image) const;
   void learnSession(const TrackerEstimate& tracked);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
