@@ -146,7 +146,7 @@ TEST(MissingPoses, TellNothingWherePlacesHaveNone) {
 
 TEST(MissingPoses, TellLittleWhereOnlySomeHaveOne) {
   MissingPoses missing;
-  for (int i = 0; i < 200; ++i) missing.add(i % 4 == 0, 0.99);
+  for (int i = 0; i < 201; ++i) missing.add(i % 4 == 0, 0.99);
   EXPECT_GT(missing.likelihood(), 0.4);
 }
 
