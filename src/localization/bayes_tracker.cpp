@@ -53,7 +53,7 @@ void BayesTracker::update(Likelihood& likelihood) {
   seen_an_image_ = true;
   chosen_.clear();
   if (const auto peak_m = likelihood.peak_m()) {
-    filter_.update(filter_.around(*peak_m));
+    filter_.update(filter_.around(*peak_m, likelihood.seenAtPeak()));
   } else {
     choose(likelihood);
     filter_.update(compare(likelihood));
@@ -70,6 +70,7 @@ void BayesTracker::choose(Likelihood& likelihood) {
   std::vector<std::size_t> proposed;
   if (!sees_all) proposed = likelihood.mostSimilar(is_known_ ? rest / kProposed : rest / 2);
   filter_.probabilities().mostProbable(rest - std::min(rest, proposed.size()), 0.0, chosen_);
+  for (std::size_t& place : chosen_) place = filter_.places().image(place);
   chosen_.insert(chosen_.end(), proposed.begin(), proposed.end());
   std::sort(chosen_.begin(), chosen_.end());
   chosen_.erase(std::unique(chosen_.begin(), chosen_.end()), chosen_.end());
@@ -122,10 +123,10 @@ TrackerEstimate BayesTracker::estimate(Likelihood& likelihood) {
 /// By one random offset and equal steps through the posterior, so that all weigh the same.
 void BayesTracker::drawParticles() {
   const double step = 1.0 / static_cast<double>(particles_.size());
-  const auto images = filter_.probabilities().quantiles(random_.uniform(0.0, step), step, particles_.size());
-  for (std::size_t i = 0; i < images.size(); ++i) {
+  const auto places = filter_.probabilities().quantiles(random_.uniform(0.0, step), step, particles_.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
     particles_[i] = Particle();
-    particles_[i].position_m = map_.position_m(images[i]);
+    particles_[i].position_m = filter_.places().position_m(places[i]);
     particles_[i].weight = step;
   }
 }

@@ -32,8 +32,9 @@ Fitness ImageLikelihood::at(const Eigen::Vector2d& position_m) {
   return {score.weight * std::exp(-0.5 * exponent * offset * offset), nearest.image, score};
 }
 
-PoseLikelihood::PoseLikelihood(const TrainingMap& map, const Eigen::Vector2d& verified_m)
-    : map_(map), verified_m_(verified_m), nearest_(map.nearest(verified_m).image) {}
+PoseLikelihood::PoseLikelihood(const TrainingMap& map, const Eigen::Vector2d& verified_m,
+                               const std::optional<Fitness>& seen)
+    : map_(map), verified_m_(verified_m), nearest_(map.nearest(verified_m).image), seen_(seen) {}
 
 Fitness PoseLikelihood::at(const Eigen::Vector2d& position_m) {
   constexpr double kSigma_m = 1.0;  // a cloud as wide as that of a place: the next image may have no pose

@@ -67,15 +67,19 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
   scores_.startImage(metric ? FeatureKind::kLocal : choice_.next(),
                      [this](FeatureKind kind, std::size_t i) { return image_->compare(kind, i); });
   sweep_.startImage();
+  const bool is_late = tracked_ns_ && stamp_ns < *tracked_ns_;
   const TrackerEstimate tracked = track(stamp_ns, metric);
   if (!metric) metric = poseNearProposal(tracked);
   sessions_->noteRecognition(metric || tracked.best.recognised);
   if (!metric && tracked.best.recognised) learnSession(tracked);
-  const Evidence evidence = verify(tracked, metric);
+  const std::optional<PredictedPose> predicted = metric ? std::nullopt : verifiedMotion(tracked);
+  Evidence evidence = verify(tracked, metric, predicted);
+  if (is_late && evidence.probability) evidence.probability = 0.0;  // nobody knows how the robot came here
   const LocalizationState state = assessor_.update(stamp_ns, tracked, evidence);
   choice_.update(tracked.spread_m, assessor_.lastConfirms(), assessor_.isDoubtful());
 
   last_ = estimateOf(stamp_ns, tracked, metric, evidence, state);
+  choosePose(*last_, predicted);
   return answer(stopwatch.elapsed_ms());
 }
 
@@ -96,7 +100,6 @@ Estimate Localizer::estimateOf(std::int64_t stamp_ns, const TrackerEstimate& tra
   estimate.tracked = tracked;
   estimate.evidence = evidence;
   if (const auto session = sessions_->chosen()) estimate.session = map_->header().sessions[*session].name;
-  choosePose(estimate);
   if (isMetric()) {
     scores_.count(verifier_->compared());
     estimate.focal_scale = verifier_->focal().scale();
@@ -117,12 +120,13 @@ Estimate Localizer::lastAgain(std::int64_t stamp_ns, double elapsed_ms) {
   return answer(elapsed_ms);
 }
 
-/// The last estimate, after `elapsed_ms` since its image came. One of a camera that is frozen is in doubt.
+/// The last estimate, after `elapsed_ms` since its image came. One of a camera that is frozen, or of an image too old
+/// to say where the robot is by now, is in doubt.
 Estimate Localizer::answer(double elapsed_ms) {
   last_->update_ms = elapsed_ms - last_->image.extract_ms - last_->image.match_ms;
   last_->repeats = repeats_.images;
   last_->frozen = isFrozen();
-  if (last_->frozen) doubt();
+  if (last_->frozen || isStale()) doubt();
   return *last_;
 }
 
@@ -137,30 +141,44 @@ void Localizer::Repeats::add(std::int64_t stamp_ns, bool repeated) {
   last_ns = stamp_ns;
 }
 
+/// How long the last image has been coming.
+double Localizer::Repeats::seconds() const { return std::abs(secondsBetween(first_ns, last_ns)); }
+
+/// Whether the image repeats one from so long ago that a stream which repeats each to reach its rate does not.
+bool Localizer::isStale() const {
+  return config_.state.witness == "probability" && config_.state.frozen_images > 0 && repeats_.images > 0 &&
+         repeats_.seconds() >= config_.state.frozen_time_s;
+}
+
 /// Even a camera that stands still has noise: an image that stays says nothing about where the robot is by now.
 bool Localizer::isFrozen() const {
   constexpr std::size_t kStuck = 30;  // a driver that sends its last image with its old stamp, on and on
   const auto least = static_cast<std::size_t>(config_.state.frozen_images);
   if (least == 0 || repeats_.images < least) return false;
-  return std::abs(secondsBetween(repeats_.first_ns, repeats_.last_ns)) >= config_.state.frozen_time_s ||
-         repeats_.at_one_stamp >= kStuck;
+  return repeats_.seconds() >= config_.state.frozen_time_s || repeats_.at_one_stamp >= kStuck;
 }
 
 /// Compares global features only when the local ones are not sure.
-Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric) {
+Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric,
+                           const std::optional<PredictedPose>& predicted) {
   const StateConfig& state = config_.state;
   Evidence evidence;
   if (isMetric() && !verifier_->focal().contradicts()) evidence.verified = metric && metric->confirmed;
   evidence.features = scores_.kind();
   const bool sift = evidence.features == FeatureKind::kLocal;
-  evidence.probability = probabilityOf(tracked);
+  evidence.blind =
+      sift ? image_->localFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
+  Eigen::Vector2d claimed_m = predicted ? predicted->position_m : tracked.position_m;
+  if (metric) claimed_m = metric->base.translation().head<2>();
+  evidence.probability = probabilityOf(tracked, claimed_m);
+  if (evidence.probability && evidence.verified)
+    missPose(metric.has_value(), predicted.has_value(), *evidence.probability);
+  if (evidence.blind && evidence.probability) evidence.probability = 0.0;  // it shows no place
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;
   if (state.place_check && !sure && !evidence.probability && !evidence.verified.value_or(false)) {
     evidence.place_ratio = sweep_.ratio(scores_, tracked.position_m, state.max_distance_m);
   }
-  evidence.blind =
-      sift ? image_->localFeatures() < static_cast<std::size_t>(state.min_features) : tracked.best.similarity <= 0.0;
   return evidence;
 }
 
@@ -218,12 +236,14 @@ TrackerEstimate Localizer::trackImage() {
 
 TrackerEstimate Localizer::trackVerified(const MetricPose& metric) {
   const Eigen::Vector2d position_m = metric.base.translation().head<2>();
-  PoseLikelihood verified(*map_, position_m);
+  const std::size_t best_image = verifier_->matched().training_image;
+  const Score best = scores_[best_image];
+  PoseLikelihood verified(*map_, position_m, Fitness{best.weight, best_image, best});
   tracker_->update(verified);
   TrackerEstimate tracked = tracker_->belief();
   bringTracker(tracked, metric);
-  tracked.best_image = verifier_->matched().training_image;
-  tracked.best = scores_[tracked.best_image];
+  tracked.best_image = best_image;
+  tracked.best = best;
   tracked.best_distance_m = (map_->position_m(tracked.best_image) - position_m).norm();
   return tracked;
 }
@@ -237,12 +257,39 @@ void Localizer::witness(const Motion& motion, const std::optional<MetricPose>& m
   witness_->update(witness_->likelihoodBeside(scores_.compared()));
 }
 
-/// Around the estimate; by global features thresholds decide, as by choice.
-std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked) const {
+/// Where the motion since the last verified pose leads to: that is the pose, whatever looks alike elsewhere, as long as
+/// a velocity holds. Later, and where thresholds decide, a tracker that is elsewhere is believed; of odometry only one
+/// that recognises its place. Poses by a calibration that the images contradict lead nowhere.
+std::optional<PredictedPose> Localizer::verifiedMotion(const TrackerEstimate& tracked) {
+  if (!isMetric() || verifier_->focal().contradicts()) return std::nullopt;
+  const PosePredictor& predictor = verifier_->predictor();
+  const std::optional<PredictedPose> predicted = predictor.predicted();
+  if (!predicted) return std::nullopt;
+  const bool is_fresh = config_.state.witness == "probability" && predictor.byVelocity();
+  const bool knows_better = is_fresh || (predicted->by_odometry && !tracked.best.recognised);
+  const double most_m = config_.state.max_distance_m;
+  return knows_better || (predicted->position_m - placeOf_m(tracked)).norm() <= most_m ? predicted : std::nullopt;
+}
+
+/// What it says that landmarks verify no pose: the more of a drive have one, the less a place alone is believed. For a
+/// while the verified motion speaks for itself.
+void Localizer::missPose(bool has_pose, bool is_predicted, double& probability) {
+  MissingPoses& missing = verifier_->missing();
+  const double in_map = missing.likelihood() * probability;
+  if (!has_pose && !is_predicted) probability = in_map / std::max(1e-12, in_map + 1.0 - probability);
+  missing.add(has_pose, probability);
+}
+
+/// Around a position; by global features thresholds decide, as by choice.
+std::optional<double> Localizer::probabilityOf(const TrackerEstimate& tracked,
+                                               const Eigen::Vector2d& position_m) const {
   if (config_.state.witness != "probability" || scores_.kind() != FeatureKind::kLocal) return std::nullopt;
   if (isThroughOtherLens(tracked.best_image)) return 0.0;
-  const PlaceFilter& filter = tracker_->posterior() != nullptr ? *tracker_->posterior() : *witness_;
-  return (1.0 - filter.offMap()) * filter.within(tracked.position_m, filter.around_m(config_.state.max_distance_m));
+  return posterior().probabilityWithin(position_m, hereRadius_m(tracked.best_image));
+}
+
+const PlaceFilter& Localizer::posterior() const {
+  return tracker_->posterior() != nullptr ? *tracker_->posterior() : *witness_;
 }
 
 /// The images ask for a focal length that is farther from the map's than the calibration's is: then things look as

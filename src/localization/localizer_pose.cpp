@@ -1,5 +1,9 @@
 // Which pose the localizer answers with.
 
+#include <algorithm>
+#include <cmath>
+
+#include "localization/place_filter.h"
 #include "localization/pose_verifier.h"
 #include "visual_localization/localization/localizer.h"
 #include "visual_localization/localization/path_interpolation.h"
@@ -8,16 +12,29 @@ namespace visual_localization {
 namespace {
 
 /// Of the positions of a session, by errors of its receiver that last.
-double mapVariance_m2(const TrainingMap& map, std::size_t image) {
+double receiverVariance_m2(const TrainingMap& map, std::size_t image) {
   const auto& fixes = map.header().sessions[static_cast<std::size_t>(map.pose(image).session)].fixes;
   return fixes ? fixes->sigma_m * fixes->sigma_m : 0.0;
 }
 
 }  // namespace
 
-/// The solved pose; without one where the motion so far leads to, if the tracker is not elsewhere; or what the tracker
-/// has. Poses by a calibration that the images contradict lead nowhere.
-void Localizer::choosePose(Estimate& estimate) {
+/// Of a position by what looks alike, beside the posterior's: no map is known better than to its spacing.
+double Localizer::placeVariance_m2(std::size_t image) const {
+  const double floor_m = std::min(LocalizerConfig::kMinPositionStd_m, posterior().spacing_m());
+  return floor_m * floor_m + receiverVariance_m2(*map_, image);
+}
+
+/// How far from a published position the robot may be for it to be right: as far as training images look alike, or as
+/// published sigmas say.
+double Localizer::hereRadius_m(std::size_t image) const {
+  constexpr double kSigmas = 3.0;
+  return std::max(posterior().around_m(), kSigmas * std::sqrt(placeVariance_m2(image)));
+}
+
+/// The solved pose; without one where the verified motion leads to, whatever looks alike elsewhere; or what the tracker
+/// has.
+void Localizer::choosePose(Estimate& estimate, const std::optional<PredictedPose>& predicted) {
   if (estimate.metric) {
     estimate.pose = poseOf(*estimate.metric);
     estimate.source = PoseSource::kMetric;
@@ -27,12 +44,7 @@ void Localizer::choosePose(Estimate& estimate) {
   const bool probable = estimate.evidence.probability && estimate.state == LocalizationState::kTracking;
   const bool placed = estimate.tracked.best.recognised || probable;
   estimate.source = placed ? PoseSource::kPlace : PoseSource::kNone;
-  const bool follows_poses = isMetric() && !verifier_->focal().contradicts();
-  const auto predicted = follows_poses ? verifier_->predictor().predicted() : std::nullopt;
   if (!predicted) return;
-  const double apart_m = (predicted->position_m - estimate.pose.position_m).norm();
-  const bool knows_better = predicted->by_odometry && !estimate.tracked.best.recognised;
-  if (apart_m > config_.state.max_distance_m && !knows_better) return;
   estimate.pose.position_m = predicted->position_m;
   estimate.pose.yaw_rad = predicted->yaw_rad;
   estimate.pose.covariance_m2 = predicted->covariance_m2;
@@ -56,25 +68,27 @@ PoseEstimate Localizer::poseOf(const MetricPose& metric) const {
 /// While the images confirm the position the covariance is that of its mode; otherwise that of the whole cloud
 /// about it, so that nothing downstream trusts a guess.
 PoseEstimate Localizer::poseOf(const TrackerEstimate& tracked, LocalizationState state) {
-  constexpr double kFloor_m2 = LocalizerConfig::kMinPositionStd_m * LocalizerConfig::kMinPositionStd_m;
-  const bool recognised = tracked.best.recognised && tracked.best_distance_m <= config_.state.max_distance_m;
   PoseEstimate pose;
-  pose.position_m = positionOf_m(tracked, recognised);
+  pose.position_m = placeOf_m(tracked);
   pose.covariance_m2 = state == LocalizationState::kTracking ? tracked.mode_covariance_m2 : tracked.cloud_covariance_m2;
-  pose.covariance_m2 += (kFloor_m2 + mapVariance_m2(*map_, tracked.best_image)) * Eigen::Matrix2d::Identity();
-  const Heading heading =
-      headingAt(*map_, pose.position_m, recognised ? std::optional(tracked.best_image) : std::nullopt, neighbours_);
+  pose.covariance_m2 += placeVariance_m2(tracked.best_image) * Eigen::Matrix2d::Identity();
+  const Heading heading = headingAt(
+      *map_, pose.position_m, isRecognised(tracked) ? std::optional(tracked.best_image) : std::nullopt, neighbours_);
   pose.yaw_rad = heading.yaw_rad;
   pose.yaw_variance_rad2 = heading.variance_rad2 + LocalizerConfig::kMinYawStd_rad * LocalizerConfig::kMinYawStd_rad;
   pose.geodetic = map_->frame().toGeodetic(pose.position_m);
   return pose;
 }
 
+bool Localizer::isRecognised(const TrackerEstimate& tracked) const {
+  return tracked.best.recognised && tracked.best_distance_m <= config_.state.max_distance_m;
+}
+
 /// The position by the sizes of features is exact in the same light and poor beside the path, that of the posterior the
 /// other way round. Their errors have different causes: the mean of both is often better than either.
-Eigen::Vector2d Localizer::positionOf_m(const TrackerEstimate& tracked, bool recognised) {
+Eigen::Vector2d Localizer::placeOf_m(const TrackerEstimate& tracked) {
   const bool by_size = config_.estimate == "interpolated" && scores_.kind() == FeatureKind::kLocal;
-  if (!recognised || !by_size) return tracked.position_m;
+  if (!isRecognised(tracked) || !by_size) return tracked.position_m;
   const Eigen::Vector2d sized_m = interpolateOnPath(*map_, scores_, tracked.best_image);
   return tracker_->posterior() == nullptr ? sized_m : 0.5 * (sized_m + tracked.position_m);
 }

@@ -50,37 +50,59 @@ void OffMapBelief::predict(double leaving) {
   probability_ = probability_ * (1.0 - kReturns) + (1.0 - probability_) * leaves;
 }
 
+double OffMapBelief::byChance(double log_matches) const {
+  return normal(log_matches - chance_.mean, std::max(kLeastChanceSigma, std::sqrt(chance_.variance)));
+}
+
+/// Of a place that looks like the right one: anything from chance to what the right one matches.
+double OffMapBelief::alike(double log_matches) const {
+  constexpr double kTail = 0.3;
+  const double above = log_matches - chance_.mean;
+  const double range = std::max(usual_.mean - chance_.mean, 1.0);
+  return above < 0.0 ? 0.0 : std::exp(-std::max(0.0, above - range) / kTail) / range;
+}
+
+/// Of the right place, which some people may hide. More matches than usual are no evidence against it.
+double OffMapBelief::right(double log_matches) const {
+  const double clear = normal(std::min(0.0, log_matches - usual_.mean), std::sqrt(usual_.variance));
+  return (1.0 - kOccluded) * clear + kOccluded * byChance(log_matches);
+}
+
 /// Of being there over being anywhere else.
 double OffMapBelief::likelihoodRatio(double log_matches) const {
-  constexpr double kTail = 0.3;
   constexpr double kLeast = 1e-6;
-  const double above = log_matches - chance_.mean;
-  const double by_chance = normal(above, std::max(kLeastChanceSigma, std::sqrt(chance_.variance)));
-  const double range = std::max(usual_.mean - chance_.mean, 1.0);
-  const double alike = above < 0.0 ? 0.0 : std::exp(-std::max(0.0, above - range) / kTail) / range;
-  // More matches than usual are no evidence against the place.
-  const double right = normal(std::min(0.0, log_matches - usual_.mean), std::sqrt(usual_.variance));
-  return ((1.0 - kOccluded) * right + kOccluded * by_chance) / ((1.0 - kAlike) * by_chance + kAlike * alike + kLeast);
+  const double by_chance = (1.0 - kAlike) * byChance(log_matches) + kAlike * alike(log_matches);
+  return right(log_matches) / (by_chance + kLeast);
+}
+
+/// The farther beyond, the fewer match: how far that is nobody knows.
+double OffMapBelief::beyondRatio(double log_matches) const {
+  constexpr double kMost = 1.0 / kOccluded;
+  if (!knowsChance()) return 1.0;
+  const double beyond = (1.0 - kOccluded) * alike(log_matches) + kOccluded * byChance(log_matches);
+  return std::min(kMost, beyond / (right(log_matches) + 1e-6));
 }
 
 void OffMapBelief::update(const std::vector<Compared>& compared) {
   if (!knowsChance() || compared.empty()) return;
   double in_map = 1.0;  // a training image that it was not compared with speaks neither for nor against
-  for (const Compared& one : compared) in_map += one.predicted * (likelihoodRatio(one.log_matches) - 1.0);
+  for (const Compared& one : compared) {
+    const double there = likelihoodRatio(one.log_matches);
+    in_map += one.predicted * (there - 1.0) + one.beyond * (beyondRatio(one.log_matches) * there - 1.0);
+  }
   probability_ /= probability_ + (1.0 - probability_) * std::max(1e-9, in_map);
 }
 
 void OffMapBelief::learnChance(double log_matches) {
   if (!knowsChance()) {
     chance_ = {log_matches, kChanceVariance, kChanceWeight};
-    usual_ = {log_matches + kUsualGap, kUsualVariance, kUsualWeight};
+    if (usual_.weight == 0.0) usual_ = {log_matches + kUsualGap, kUsualVariance, kUsualWeight};
   } else {
     chance_.add(log_matches, 1.0, kChanceMemory);
   }
 }
 
 void OffMapBelief::learnUsual(double log_matches, double certainty) {
-  if (!knowsChance()) return;
   usual_.add(log_matches, (1.0 - probability_) * certainty, kUsualMemory);
   usual_.variance = std::max(kLeastUsualVariance, usual_.variance);
 }

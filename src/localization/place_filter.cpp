@@ -15,23 +15,22 @@ void BayesConfig::declare(ParameterVisitor& visitor) {
 }
 
 PlaceFilter::PlaceFilter(const TrainingMap& map, const BayesConfig& config)
-    : map_(map), config_(config), pace_mps_(map.size()), places_(map.size()) {
-  learnPace();
+    : map_(map), config_(config), pace_mps_(map.size()), where_(map, learnPace(), around_m()), places_(where_.size()) {
   learnMoments();
   reset();
 }
 
 void PlaceFilter::learnMoments() {
-  const auto count = static_cast<double>(map_.size());
-  for (std::size_t i = 0; i < map_.size(); ++i) centroid_m_ += map_.position_m(i) / count;
-  for (std::size_t i = 0; i < map_.size(); ++i) {
-    const Eigen::Vector2d offset_m = map_.position_m(i) - centroid_m_;
+  const auto count = static_cast<double>(where_.size());
+  for (std::size_t i = 0; i < where_.size(); ++i) centroid_m_ += where_.position_m(i) / count;
+  for (std::size_t i = 0; i < where_.size(); ++i) {
+    const Eigen::Vector2d offset_m = where_.position_m(i) - centroid_m_;
     scatter_m2_ += offset_m * offset_m.transpose();
   }
 }
 
 void PlaceFilter::reset() {
-  places_.reset(1.0 / static_cast<double>(map_.size()));
+  places_.reset(1.0 / static_cast<double>(where_.size()));
   forgetMotion();
   log_best_.reset();
   off_map_.reset();
@@ -41,9 +40,9 @@ void PlaceFilter::reset(const std::vector<Eigen::Vector2d>& positions_m) {
   reset();
   places_.reset(0.0);
   for (const Eigen::Vector2d& position_m : positions_m) {
-    places_.own(map_.nearest(position_m).image).probability += 1.0 / static_cast<double>(positions_m.size());
+    places_.own(where_.nearest(position_m).image).probability += 1.0 / static_cast<double>(positions_m.size());
   }
-  off_map_.ruleOut();
+  off_map_.settle(true);
 }
 
 double PlaceFilter::likelihoodOf(const Score& score) const {
@@ -78,7 +77,7 @@ PlaceLikelihood PlaceFilter::likelihoodBeside(const std::vector<Scores::Compared
 }
 
 void PlaceFilter::updateOffMap(const PlaceLikelihood& likelihood) {
-  if (likelihood.is_verified) return off_map_.ruleOut();
+  if (likelihood.is_verified) return off_map_.settle(!likelihood.is_aside);
   asked_.clear();
   std::vector<double> in_turn;
   const auto in_turn_from = likelihood.compared.begin() + static_cast<std::ptrdiff_t>(likelihood.asked_in_turn);
@@ -88,16 +87,34 @@ void PlaceFilter::updateOffMap(const PlaceLikelihood& likelihood) {
     if (is_in_turn) in_turn.push_back(*one->log_matches);
     const auto is_same = [one](const auto& other) { return other.training_image == one->training_image; };
     if (is_in_turn && std::any_of(likelihood.compared.begin(), in_turn_from, is_same)) continue;  // it counts once
-    asked_.push_back({places_[one->training_image], *one->log_matches});
+    asked_.push_back({places_[one->training_image], *one->log_matches, beyond(one->training_image)});
   }
   if (!off_map_.knowsChance() && !in_turn.empty()) off_map_.learnChance(median(std::move(in_turn)));
   off_map_.update(asked_);
 }
 
+/// Probability of the places beyond a training image.
+double PlaceFilter::beyond(std::size_t training_image) const {
+  const auto [first, last] = where_.beyond(training_image);
+  double sum = 0.0;
+  for (std::size_t place = first; place < last; ++place) sum += places_[place];
+  return sum;
+}
+
+/// Of all places that have no image.
+double PlaceFilter::beyond() const {
+  double sum = 0.0;
+  for (std::size_t place = map_.size(); place < where_.size(); ++place) sum += places_[place];
+  return sum;
+}
+
+double PlaceFilter::offMap() const { return 1.0 - (1.0 - off_map_.probability()) * (1.0 - beyond()); }
+
 /// Once the image says where the robot is: what matched there, and what matched far from it.
 void PlaceFilter::learnMatches(const PlaceLikelihood& likelihood) {
   std::vector<std::size_t> most;
   places_.mostProbable(1, 0.0, most);
+  if (!where_.hasImage(most.front())) return;
   const Eigen::Vector2d place_m = map_.position_m(most.front());
   std::optional<double> best;
   for (std::size_t i = 0; i < likelihood.compared.size(); ++i) {
@@ -107,18 +124,33 @@ void PlaceFilter::learnMatches(const PlaceLikelihood& likelihood) {
     if (distance_m <= around_m()) best = std::max(best.value_or(0.0), *one.log_matches);
     if (distance_m > 2.0 * around_m() && i >= likelihood.asked_in_turn) off_map_.learnChance(*one.log_matches);
   }
-  if (best) off_map_.learnUsual(*best, independence_ * within(place_m, around_m()));
+  if (best) off_map_.learnUsual(*best, independence_ * (1.0 - beyond()) * within(place_m, around_m()));
+}
+
+/// Places beyond a training image never match better than it. Fewer matches than usual tell against the image itself,
+/// as many as usual against the places beyond.
+void PlaceFilter::setLikelihoodBeyond(const PlaceLikelihood::Compared& compared) {
+  const auto [first, last] = where_.beyond(compared.training_image);
+  if (first == last) return;
+  const double all = compared.log_matches ? off_map_.beyondRatio(*compared.log_matches) : 1.0;
+  const double ratio = std::pow(all, independence_);
+  places_.own(compared.training_image).likelihood = compared.likelihood * std::min(1.0, 1.0 / ratio);
+  for (std::size_t place = first; place < last; ++place) {
+    places_.own(place).likelihood = compared.likelihood * std::min(1.0, ratio);
+  }
 }
 
 void PlaceFilter::update(const PlaceLikelihood& likelihood) {
   updateOffMap(likelihood);
   using Place = PlaceProbabilities::Own;
   places_.forEach([&](Place& place) { place.likelihood = likelihood.elsewhere; });
-  for (const auto& compared : likelihood.compared)
+  for (const auto& compared : likelihood.compared) {
     places_.own(compared.training_image).likelihood = compared.likelihood;
+    if (!likelihood.is_verified) setLikelihoodBeyond(compared);
+  }
   const double sum = places_.sum([](const Place& place) { return place.likelihood; });
   if (!(sum > 0.0) || !std::isfinite(sum)) return;
-  const double uniform = config_.uniform / static_cast<double>(map_.size());
+  const double uniform = config_.uniform / static_cast<double>(where_.size());
   places_.forEach([&](Place& place) { place.likelihood = (1.0 - config_.uniform) * place.likelihood / sum + uniform; });
   learnSpeed(places_.sum([](const Place& place) { return place.stayed * place.likelihood; }));
   places_.forEach([](Place& place) { place.probability *= place.likelihood; });
@@ -130,53 +162,58 @@ void PlaceFilter::update(const PlaceLikelihood& likelihood) {
 }
 
 double PlaceFilter::within(const Eigen::Vector2d& position_m, double radius_m) const {
-  map_.within(position_m, radius_m, around_);
+  where_.within(position_m, radius_m, around_);
   double sum = 0.0;
   for (const std::uint32_t i : around_) sum += places_[i];
   return sum;
 }
 
-PlaceLikelihood PlaceFilter::around(const Eigen::Vector2d& position_m) const {
+PlaceLikelihood PlaceFilter::around(const Eigen::Vector2d& position_m, const std::optional<Fitness>& seen) const {
   constexpr double kSigma_m = 1.0;
   constexpr double kFarthest = 8.0;  // sigmas
   const double sigma_m = std::max(kSigma_m, spacing_m_);
   PlaceLikelihood likelihood;
   likelihood.elsewhere = 0.0;
   likelihood.is_verified = true;
-  const double nearest_m = map_.nearest(position_m).distance_m;
-  map_.within(position_m, nearest_m + kFarthest * sigma_m, around_);
+  const double nearest_m = where_.nearest(position_m).distance_m;
+  likelihood.is_aside = nearest_m > around_m();
+  where_.within(position_m, nearest_m + kFarthest * sigma_m, around_);
   for (const std::uint32_t i : around_) {
-    const double distance_m = (map_.position_m(i) - position_m).norm();
+    const double distance_m = (where_.position_m(i) - position_m).norm();
     likelihood.compared.push_back({i, gaussian(distance_m - nearest_m, sigma_m)});
+    if (seen && seen->training_image == i) {
+      likelihood.compared.back().log_matches = comparedWith(i, seen->score).log_matches;
+    }
   }
   return likelihood;
 }
 
 CloudMoments PlaceFilter::mode() const {
   constexpr std::size_t kCandidates = 16;
-  constexpr double kPlaces = 3.0;
-  constexpr double kWidest_m = 5.0;
-  const double radius_m = std::min(kWidest_m, kPlaces * spacing_m_);
+  const double radius_m = around_m();
   std::vector<std::size_t> candidates;
   places_.mostProbable(kCandidates, 0.0, candidates);
   std::sort(candidates.begin(), candidates.end());
-  std::size_t best = candidates.front();
+  std::size_t best = where_.image(candidates.front());
   double most = -1.0;
-  for (const std::size_t candidate : candidates) {
+  for (const std::size_t place : candidates) {
+    const std::size_t candidate = where_.image(place);
     const double mass = within(map_.position_m(candidate), radius_m);
     if (mass > most) most = mass, best = candidate;
   }
+  const Eigen::Matrix2d between_m2 = spacing_m_ * spacing_m_ / 12.0 * Eigen::Matrix2d::Identity();
   CloudMoments moments;
   double sum = 0.0;
-  map_.within(map_.position_m(best), radius_m, around_);
+  where_.within(map_.position_m(best), radius_m, around_);
   for (const std::uint32_t i : around_) {
-    moments.mean_m += places_[i] * map_.position_m(i);
+    moments.mean_m += places_[i] * where_.position_m(i);
     sum += places_[i];
   }
-  if (!(sum > 0.0)) return {map_.position_m(best), Eigen::Matrix2d::Zero()};
+  if (!(sum > 0.0)) return {map_.position_m(best), between_m2};
   moments.mean_m /= sum;
+  moments.covariance_m2 = between_m2;
   for (const std::uint32_t i : around_) {
-    const Eigen::Vector2d offset_m = map_.position_m(i) - moments.mean_m;
+    const Eigen::Vector2d offset_m = where_.position_m(i) - moments.mean_m;
     moments.covariance_m2 += places_[i] / sum * offset_m * offset_m.transpose();
   }
   return moments;
@@ -186,11 +223,11 @@ Eigen::Matrix2d PlaceFilter::covarianceAbout(const Eigen::Vector2d& centre_m) co
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
   const double common = places_.commonCount() > 0 ? places_.common().probability : 0.0;
   for (const PlaceProbabilities::Own& place : places_.allOwn()) {
-    const Eigen::Vector2d offset_m = map_.position_m(place.training_image) - centre_m;
+    const Eigen::Vector2d offset_m = where_.position_m(place.training_image) - centre_m;
     covariance_m2 += (place.probability - common) * offset_m * offset_m.transpose();
   }
   const Eigen::Vector2d offset_m = centroid_m_ - centre_m;
-  const auto count = static_cast<double>(map_.size());
+  const auto count = static_cast<double>(where_.size());
   return covariance_m2 + common * (scatter_m2_ + count * offset_m * offset_m.transpose());
 }
 

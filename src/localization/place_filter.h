@@ -11,6 +11,8 @@
 
 #include "localization/off_map.h"
 #include "localization/place_probabilities.h"
+#include "localization/places.h"
+#include "visual_localization/localization/likelihood.h"
 #include "visual_localization/localization/motion.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/scores.h"
@@ -29,10 +31,13 @@ struct PlaceLikelihood {
   std::vector<Compared> compared;
   std::size_t asked_in_turn = 0;  ///< of `compared`, from this one on chosen whatever the image shows
   double elsewhere = 1.0;         ///< of each training image that it was not compared with
-  bool is_verified = false;       ///< landmarks say that the robot is in the map
+  bool is_verified = false;       ///< landmarks say where the robot is
+  bool is_aside = false;          ///< and that is far from all places
 };
 
-/// Discrete Bayes filter over the training images: how likely the robot is at each. It moves along the direction that
+/// Discrete Bayes filter over the training images and places beyond the ends of their path: how likely the robot is at
+/// each. Beyond an end it sees the image at the end as well as there, or less well; so the motion tells the difference,
+/// and how well the right image matched before. It moves along the direction that
 /// they look, as fast as the session did there times a factor of which a distribution is kept (0: it stands), or as
 /// odometry says, and to any of them with a small probability: it may have been carried away, or lost. Between sessions
 /// it moves as within one.
@@ -59,14 +64,19 @@ class PlaceFilter {
   /// What the image says.
   void update(const PlaceLikelihood& likelihood);
 
-  /// Of each training image; they sum to one.
+  /// Of each place; they sum to one.
   const PlaceProbabilities& probabilities() const { return places_; }
-  /// Of being within `radius_m` of a position.
+  const Places& places() const { return where_; }
+  /// Of being within `radius_m` of a position, given that the robot is at one of the places.
   double within(const Eigen::Vector2d& position_m, double radius_m) const;
-  /// Of being where the map has no image. The other probabilities are given that it is not.
-  double offMap() const { return off_map_.probability(); }
-  /// How likely an image is taken at each training image by its distance from a position.
-  PlaceLikelihood around(const Eigen::Vector2d& position_m) const;
+  /// The same, without that.
+  double probabilityWithin(const Eigen::Vector2d& position_m, double radius_m) const {
+    return (1.0 - off_map_.probability()) * within(position_m, radius_m);
+  }
+  /// Of being where the map has no image: beyond an end of its path or elsewhere.
+  double offMap() const;
+  /// How likely an image is taken at each place by its distance from a position. `seen`: what it is like there.
+  PlaceLikelihood around(const Eigen::Vector2d& position_m, const std::optional<Fitness>& seen = {}) const;
 
   /// The position with most probability around, and its covariance there.
   CloudMoments mode() const;
@@ -76,8 +86,8 @@ class PlaceFilter {
   double speed_mps(std::size_t training_image) const;
   /// Usual distance of successive training images.
   double spacing_m() const { return spacing_m_; }
-  /// Training images this near are one place: `least_m`, or three of them where they are farther apart.
-  double around_m(double least_m = 5.0) const { return std::max(least_m, 3.0 * spacing_m_); }
+  /// Training images this near may look alike: some metres, where the map is not smaller than that.
+  double around_m() const { return std::max(3.0 * spacing_m_, std::min(5.0, 8.0 * spacing_m_)); }
 
   /// Speeds as shares of the session's.
   static constexpr std::array<double, 11> kSpeeds{-1.0, 0.0, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
@@ -97,7 +107,7 @@ class PlaceFilter {
     double sigma_m = 0.0;
   };
 
-  void learnPace();
+  double learnPace();
   void learnMoments();
   void forgetMotion();
   double secondsOf(const Motion& motion) const;
@@ -110,14 +120,18 @@ class PlaceFilter {
   void learnSpeed(double elsewhere);
   double leavingFrom(std::size_t image, const Motion& motion) const;
   void updateOffMap(const PlaceLikelihood& likelihood);
+  double beyond(std::size_t training_image) const;
+  double beyond() const;
+  void setLikelihoodBeyond(const PlaceLikelihood::Compared& compared);
   void learnMatches(const PlaceLikelihood& likelihood);
 
   const TrainingMap& map_;
   BayesConfig config_;
   double spacing_m_ = 1.0;
-  double interval_s_ = 1.0;                               ///< usual time between successive training images
-  std::vector<float> pace_mps_;                           ///< of the session at each training image
-  Eigen::Vector2d centroid_m_ = Eigen::Vector2d::Zero();  ///< of the training images
+  double interval_s_ = 1.0;      ///< usual time between successive training images
+  std::vector<float> pace_mps_;  ///< of the session at each training image
+  Places where_;
+  Eigen::Vector2d centroid_m_ = Eigen::Vector2d::Zero();  ///< of the places
   Eigen::Matrix2d scatter_m2_ = Eigen::Matrix2d::Zero();  ///< about it, not divided by their number
   PlaceProbabilities places_;
   PerSpeed speeds_{};  ///< how likely each of kSpeeds is

@@ -45,8 +45,8 @@ double PlaceFilter::secondsOf(const Motion& motion) const {
   return std::min(motion.seconds() > 0.0 ? motion.seconds() : interval_s_, kLongest_s);
 }
 
-/// A robot is likely to be slow where the session was.
-void PlaceFilter::learnPace() {
+/// A robot is likely to be slow where the session was. Returns the spacing.
+double PlaceFilter::learnPace() {
   std::vector<double> gaps_m;
   std::vector<double> intervals_s;
   std::vector<double> paces_mps;
@@ -71,6 +71,7 @@ void PlaceFilter::learnPace() {
     const double known_mps = pace_mps < 0.0F ? usual_mps : static_cast<double>(pace_mps);
     pace_mps = static_cast<float>(std::clamp(known_mps, kSlowest * usual_mps, kFastest * usual_mps));
   }
+  return spacing_m_;
 }
 
 void PlaceFilter::forgetMotion() {
@@ -88,8 +89,8 @@ PlaceFilter::Arrival& PlaceFilter::arrivalAt(std::size_t image) {
   return arrivals_.back();
 }
 
-PlaceFilter::Way PlaceFilter::wayAt(double speed, std::size_t image, const Motion& motion) const {
-  const double distance_m = speed * static_cast<double>(pace_mps_[image]) * secondsOf(motion);
+PlaceFilter::Way PlaceFilter::wayAt(double speed, std::size_t place, const Motion& motion) const {
+  const double distance_m = speed * static_cast<double>(pace_mps_[where_.image(place)]) * secondsOf(motion);
   return {distance_m, std::hypot(kDistanceSigma * distance_m, kPlaceSigma * spacing_m_)};
 }
 
@@ -117,7 +118,7 @@ void PlaceFilter::predict(const Motion& motion) {
   places_.mostProbable(kMostMoved, kLeastMoved * places_[moved.front()], moved);
   for (const std::size_t image : moved) {
     // A part of what is common is not moved: all of it, moved alike, would be what it was.
-    if (places_[image] <= 0.0 || (map_.size() > kMostMoved && places_.isCommon(image))) continue;
+    if (places_[image] <= 0.0 || (where_.size() > kMostMoved && places_.isCommon(image))) continue;
     moveFrom(image, motion);
     places_.own(image).stayed = 0.0;
   }
@@ -129,7 +130,7 @@ void PlaceFilter::predict(const Motion& motion) {
   }
   for (double& speed : speeds_) speed /= sum;
   const double carried_away = independence_ * config_.anywhere;
-  const double anywhere = carried_away / static_cast<double>(map_.size());
+  const double anywhere = carried_away / static_cast<double>(where_.size());
   places_.forEach([&](Place& place) {
     place.probability = place.stayed;
     if (place.arrival != PlaceProbabilities::kNone) {
@@ -146,16 +147,16 @@ void PlaceFilter::moveFrom(std::size_t image, const Motion& motion) {
   const double longest_m = std::max(wayAt(kSpeeds.back(), image, motion).distance_m, motion.increment().distance_m);
   const auto sessions = static_cast<double>(map_.header().sessions.size());
   const double most = std::min(std::ceil(3.0 * sessions * (1.0 + longest_m / spacing_m_)), 1.0 * kMostAround);
-  map_.nearest(map_.position_m(image), static_cast<std::size_t>(most), neighbours_);
+  where_.nearest(where_.position_m(image), static_cast<std::size_t>(most), neighbours_);
   const double probability = places_[image];
   leaving_ += probability * leavingFrom(image, motion);
-  const double yaw_rad = map_.yaw_rad(image);
+  const double yaw_rad = where_.yaw_rad(image);
   const Eigen::Vector2d heading(std::cos(yaw_rad), std::sin(yaw_rad));
   ahead_m_.clear();
   std::size_t facing = 0;
   for (const Neighbour& neighbour : neighbours_) {
-    if (!faceAlike(yaw_rad, map_.yaw_rad(neighbour.image)) && neighbour.image != image) continue;
-    const double along_m = heading.dot(map_.position_m(neighbour.image) - map_.position_m(image));
+    if (!faceAlike(yaw_rad, where_.yaw_rad(neighbour.image)) && neighbour.image != image) continue;
+    const double along_m = heading.dot(where_.position_m(neighbour.image) - where_.position_m(image));
     ahead_m_.push_back(std::copysign(neighbour.distance_m, along_m));
     neighbours_[facing++] = neighbour;
   }
@@ -180,13 +181,13 @@ void PlaceFilter::moveFrom(std::size_t image, const Motion& motion) {
 /// How likely the motion leads beyond the training images around one, all of which are in `neighbours_`.
 double PlaceFilter::leavingFrom(std::size_t image, const Motion& motion) const {
   constexpr double kAhead = -0.5;  // cosine: what a sharp bend leads to is not beside the path
-  const double known_m = neighbours_.size() < map_.size() ? neighbours_.back().distance_m : 1e300;
-  const Eigen::Vector2d here_m = map_.position_m(image);
-  const Eigen::Vector2d heading(std::cos(map_.yaw_rad(image)), std::sin(map_.yaw_rad(image)));
+  const double known_m = neighbours_.size() < where_.size() ? neighbours_.back().distance_m : 1e300;
+  const Eigen::Vector2d here_m = where_.position_m(image);
+  const Eigen::Vector2d heading(std::cos(where_.yaw_rad(image)), std::sin(where_.yaw_rad(image)));
   double ahead_m = 0.0;
   double behind_m = 0.0;
   for (const Neighbour& neighbour : neighbours_) {
-    const double along_m = heading.dot(map_.position_m(neighbour.image) - here_m);
+    const double along_m = heading.dot(where_.position_m(neighbour.image) - here_m);
     if (along_m >= kAhead * neighbour.distance_m) ahead_m = std::max(ahead_m, neighbour.distance_m);
     if (-along_m >= kAhead * neighbour.distance_m) behind_m = std::max(behind_m, neighbour.distance_m);
   }

@@ -77,6 +77,24 @@ bool FocalCheck::confirms() const { return !images_.empty() && sigma() <= kSureF
 
 void MotionEvidence::add(double gain) { sum_ = std::clamp(sum_ + std::min(gain, kMostOfOne), 0.0, kMost); }
 
+void MissingPoses::add(bool has_pose, double in_map) {
+  constexpr double kMemory = 0.99;
+  in_a_row_ = has_pose ? 0 : in_a_row_ + 1;
+  missed_ = kMemory * missed_ + (has_pose ? 0.0 : in_map);
+  seen_ = kMemory * seen_ + (has_pose ? 1.0 : 0.0);
+}
+
+/// Of a share that is not exactly known: images that follow each other miss for one reason.
+double MissingPoses::likelihood() const {
+  constexpr std::size_t kMost = 10;
+  double likelihood = 1.0;
+  for (std::size_t i = 0; i < std::min(in_a_row_ + 1, kMost); ++i) {
+    const double missed = missed_ + static_cast<double>(i);
+    likelihood *= missed / (missed + seen_);
+  }
+  return likelihood;
+}
+
 void PoseVerifier::configure(const MetricConfig& config) {
   config_ = config;
   focal_.configure(config.max_focal_error);
@@ -85,6 +103,7 @@ void PoseVerifier::configure(const MetricConfig& config) {
 
 void PoseVerifier::reset() {
   predictor_.reset();
+  missing_.restart();
   inliers_together_ = 0;
   moving_ = {};
   moving_gain_ = 0.0;

@@ -74,6 +74,23 @@ class MotionEvidence {
   double sum_ = 0.0;
 };
 
+/// Whether landmarks verify no pose because the robot is not in the map. How often they verify none in the map is
+/// learnt from the drive: hardly ever in the light of the map, at night often.
+class MissingPoses {
+ public:
+  /// An image with a pose or without. `in_map`: how likely the robot is where it seems, by all that is known.
+  void add(bool has_pose, double in_map);
+  /// How likely the next image and those before it, in a row without a pose, are in the map: elsewhere none has one.
+  double likelihood() const;
+  /// The robot may be anywhere.
+  void restart() { in_a_row_ = 0; }
+
+ private:
+  double missed_ = 10.0;  ///< images of the map without a pose; the first ones before anything is known
+  double seen_ = 0.0;     ///< and with one
+  std::size_t in_a_row_ = 0;
+};
+
 /// Solves the camera's pose from the landmarks of training images: of those near the pose that the motion so far
 /// predicts, or else of those that look most alike. The solved pose is judged, not the image that it came from.
 class PoseVerifier {
@@ -109,6 +126,7 @@ class PoseVerifier {
   const MatchedLandmarks& matched() const { return matched_; }
   /// What the last images say about the calibration. While they contradict it no pose is verified.
   const FocalCheck& focal() const { return focal_; }
+  MissingPoses& missing() { return missing_; }
 
  private:
   /// A landmark and the feature of the image that seems to show it.
@@ -159,6 +177,7 @@ class PoseVerifier {
   SessionChoice& sessions_;
   FocalCheck focal_;
   PosePredictor predictor_;
+  MissingPoses missing_;
   MotionEvidence moving_;             ///< of the images before
   double moving_gain_ = 0.0;          ///< of the image
   std::size_t inliers_together_ = 0;  ///< of verified poses that follow each other

@@ -127,5 +127,28 @@ TEST(FocalCheck, ContradictsBeyondTheAllowedErrorAndThreeSigmas) {
   }
 }
 
+TEST(MissingPoses, TellMuchWhereEveryImageHadOne) {
+  MissingPoses missing;
+  EXPECT_GT(missing.likelihood(), 0.9) << "nothing is known yet";
+  for (int i = 0; i < 100; ++i) missing.add(true, 1.0);
+  EXPECT_LT(missing.likelihood(), 0.1);
+  missing.add(false, 0.5);
+  EXPECT_LT(missing.likelihood(), 0.01) << "two in a row";
+  missing.add(true, 1.0);
+  EXPECT_GT(missing.likelihood(), 0.01) << "a new row";
+}
+
+TEST(MissingPoses, TellNothingWherePlacesHaveNone) {
+  MissingPoses missing;
+  for (int i = 0; i < 200; ++i) missing.add(false, 0.99);
+  EXPECT_GT(missing.likelihood(), 0.99);
+}
+
+TEST(MissingPoses, TellLittleWhereOnlySomeHaveOne) {
+  MissingPoses missing;
+  for (int i = 0; i < 201; ++i) missing.add(i % 4 == 0, 0.99);
+  EXPECT_GT(missing.likelihood(), 0.4);
+}
+
 }  // namespace
 }  // namespace visual_localization

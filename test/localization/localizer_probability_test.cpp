@@ -38,6 +38,32 @@ TEST_P(TrackingByProbability, WhatMatchesNothingIsNeverTracked) {
   for (int x_m = 0; x_m < 40; ++x_m) EXPECT_NE(see(x_m).state, LocalizationState::kTracking) << x_m;
 }
 
+TEST_P(TrackingByProbability, AnImageThatShowsNothingIsNotTracked) {
+  for (int x_m = 0; x_m < 40; ++x_m) see(x_m);
+  image_->features = 0;
+  image_->best = 0.0;
+  EXPECT_EQ(see(40.0).state, LocalizationState::kUncertain);
+  image_->features = 100;
+  image_->best = 0.5;
+  for (int x_m = 41; x_m < 44; ++x_m) see(x_m);
+  EXPECT_EQ(see(44.0).state, LocalizationState::kTracking);
+}
+
+TEST_P(TrackingByProbability, AnImageThatComesAgainLateIsNotTracked) {
+  for (int x_m = 0; x_m < 40; ++x_m) see(x_m);
+  image_->repeated = true;
+  EXPECT_EQ(see(40.0, 0.1).state, LocalizationState::kTracking) << "a stream that repeats images to reach its rate";
+  const Estimate late = see(40.0, 0.9);
+  EXPECT_EQ(late.state, LocalizationState::kUncertain);
+  EXPECT_FALSE(late.frozen) << "twice";
+}
+
+TEST_P(TrackingByProbability, AnImageFromBeforeTheLastOneIsNotTracked) {
+  for (int x_m = 0; x_m < 40; ++x_m) see(x_m);
+  EXPECT_EQ(see(39.0, -20.0).state, LocalizationState::kUncertain);
+  EXPECT_EQ(see(40.0).state, LocalizationState::kTracking);
+}
+
 TEST_P(TrackingByProbability, RelocalizingForgetsTheProbability) {
   for (int x_m = 0; x_m < 40; ++x_m) see(x_m);
   localizer_->relocalize();

@@ -72,8 +72,9 @@ class StreetDrive {
 };
 
 TEST(OffMap, IsOpenBeforeTheFirstImage) {
-  const StreetDrive drive(longStreet());
-  EXPECT_DOUBLE_EQ(drive.offMap(), OffMapBelief::kUnknown);
+  StreetDrive drive(longStreet());
+  const double in_map = kStreetImages / static_cast<double>(drive.filter().places().size());
+  EXPECT_NEAR(drive.offMap(), 1.0 - OffMapBelief::kUnknown * in_map, 1e-9);
 }
 
 TEST(OffMap, IsUnlikelyWhereThePlacesFollowEachOther) {
@@ -91,17 +92,26 @@ TEST(OffMap, TheEndStillMatchesBeyondItButLess) {
   // The same scenery from farther and farther behind the last image, as a camera that looks ahead has it.
   for (const std::size_t matches : {80, 65, 55, 48, 42, 38, 34, 30}) drive.see(kStreetImages - 1, matches);
   EXPECT_GT(drive.offMap(), 0.9);
-  EXPECT_GT(drive.filter().within({kEnd_m, 0.0}, 5.0), 0.9) << "of the places the last one is still the likeliest";
+  EXPECT_LT(drive.filter().probabilityWithin({kEnd_m, 0.0}, 3.0), 0.1) << "it went on";
 }
 
-TEST(OffMap, ARobotMayStopAtTheEnd) {
+TEST(OffMap, ARobotMayStopAheadOfTheEnd) {
+  constexpr std::size_t kHere = kStreetImages - 10;
   StreetDrive drive(longStreet());
-  drive.goTo(40, kStreetImages, 100);
-  for (int i = 0; i < 3; ++i) drive.see(kStreetImages - 1, 100);
+  drive.goTo(40, kHere, 100);
+  for (int i = 0; i < 3; ++i) drive.see(kHere, 100);
   for (int i = 0; i < 60; ++i) {
-    drive.see(kStreetImages - 1, 100);
+    drive.see(kHere, 100);
     EXPECT_LT(drive.offMap(), 0.03) << i;
   }
+}
+
+// The end looks the same from some metres behind it.
+TEST(OffMap, ARobotThatStopsAtTheEndMayHaveDrivenOn) {
+  StreetDrive drive(longStreet());
+  drive.goTo(40, kStreetImages, 100);
+  for (int i = 0; i < 10; ++i) drive.see(kStreetImages - 1, 100);
+  EXPECT_LT(drive.filter().probabilityWithin({kEnd_m, 0.0}, 5.0), 0.97);
 }
 
 TEST(OffMap, AClosedRoundHasNoEnd) {
@@ -133,7 +143,59 @@ TEST(OffMap, APoseByLandmarksRulesItOut) {
   StreetDrive drive(longStreet());
   drive.seeNothingKnown(20);
   drive.filter().update(drive.filter().around({30.0, 0.0}));
-  EXPECT_LE(drive.offMap(), OffMapBelief::kHardly);
+  EXPECT_NEAR(drive.offMap(), OffMapBelief::kHardly, 1e-3) << "and beyond the ends hardly either";
+}
+
+// Far landmarks verify poses for some metres beyond the end, and then fail; the end still matches.
+TEST(OffMap, VerifiedPosesLeadBeyondTheEnd) {
+  StreetDrive drive(longStreet());
+  Fitness seen;
+  seen.training_image = kStreetImages - 1;
+  seen.score.matches = 100;
+  for (double x_m = 80.0; x_m <= kEnd_m + 6.0; x_m += 1.0) {
+    drive.filter().predict(Motion(1.0));
+    drive.filter().update(drive.filter().around({x_m, 0.0}, seen));
+  }
+  EXPECT_GT(drive.offMap(), 0.9);
+  EXPECT_GT(drive.filter().probabilityWithin({kEnd_m + 6.0, 0.0}, 3.0), 0.9) << "where landmarks say";
+  for (int i = 0; i < 20; ++i) {
+    drive.see(kStreetImages - 1, 30);
+    EXPECT_LT(drive.filter().probabilityWithin({kEnd_m, 0.0}, 5.0), 0.5) << i;
+  }
+}
+
+TEST(OffMap, APoseFarAsideIsNotInTheMap) {
+  StreetDrive drive(longStreet());
+  drive.goTo(10, 40, 60);
+  drive.filter().update(drive.filter().around({40.0, 20.0}));
+  EXPECT_GT(drive.offMap(), 0.9);
+}
+
+TEST(OffMap, AfterAPoseTheRightPlaceIsKnownByItsMatches) {
+  const auto offMapAfter = [](std::size_t matches_at_pose) {
+    StreetDrive drive(longStreet());
+    drive.see(10, 60);
+    Fitness seen;
+    seen.score.matches = matches_at_pose;
+    for (std::size_t i = 11; i < kStreetImages; ++i) {
+      seen.training_image = i;
+      drive.filter().predict(Motion(1.0));
+      drive.filter().update(drive.filter().around({1.0 * static_cast<double>(i), 0.0}, seen));
+    }
+    drive.see(kStreetImages - 1, 30);
+    return drive.offMap();
+  };
+  EXPECT_GT(offMapAfter(200), offMapAfter(30) + 0.1) << "where 200 matched, 30 are of farther away";
+}
+
+TEST(OffMap, ADriveThatStartsAheadOfTheMapComesIntoIt) {
+  StreetDrive drive(longStreet());
+  for (const std::size_t matches : {20, 24, 30, 36, 43, 52, 60}) {
+    drive.see(0, matches);
+    EXPECT_LT(drive.filter().probabilityWithin({0.0, 0.0}, 3.0), 0.97) << matches;
+  }
+  drive.goTo(1, 8, 80);
+  EXPECT_GT(drive.filter().probabilityWithin({7.0, 0.0}, 3.0), 0.97);
 }
 
 TEST(OffMap, ATrainingImageThatIsAskedTwiceCountsOnce) {
@@ -162,7 +224,7 @@ TEST(OffMap, GlobalFeaturesSayNothing) {
   PlaceLikelihood likelihood;
   likelihood.compared.push_back(drive.filter().comparedWith(3, score));
   drive.filter().update(likelihood);
-  EXPECT_DOUBLE_EQ(drive.offMap(), before);
+  EXPECT_NEAR(drive.offMap(), before, 1e-3) << "but where in the map, and beyond its ends";
 }
 
 TEST(OffMap, OdometryLeadsBeyondTheEnd) {

@@ -31,6 +31,8 @@ class Likelihood {
   /// The only position where it is large, if it is known without asking anywhere. at() agrees with it: a tracker may
   /// go there at once, but need not.
   virtual std::optional<Eigen::Vector2d> peak_m() const { return std::nullopt; }
+  /// The training image that the peak rests on, if the image was compared with it.
+  virtual std::optional<Fitness> seenAtPeak() const { return std::nullopt; }
   /// A training image where a lost robot may be, in proportion to how alike the whole image looks.
   virtual std::size_t draw(Random& random) = 0;
   /// The `count` training images that look most alike as a whole, the best first.
@@ -41,11 +43,12 @@ class Likelihood {
 class PoseLikelihood final : public Likelihood {
  public:
   /// `map` must outlive it.
-  PoseLikelihood(const TrainingMap& map, const Eigen::Vector2d& verified_m);
+  PoseLikelihood(const TrainingMap& map, const Eigen::Vector2d& verified_m, const std::optional<Fitness>& seen = {});
 
   Fitness at(const Eigen::Vector2d& position_m) override;
   Score of(std::size_t training_image) override { return at(map_.position_m(training_image)).score; }
   std::optional<Eigen::Vector2d> peak_m() const override { return verified_m_; }
+  std::optional<Fitness> seenAtPeak() const override { return seen_; }
   std::size_t draw(Random&) override { return nearest_; }
   std::vector<std::size_t> mostSimilar(std::size_t count) override;
 
@@ -53,6 +56,7 @@ class PoseLikelihood final : public Likelihood {
   const TrainingMap& map_;
   Eigen::Vector2d verified_m_;
   std::size_t nearest_;  ///< training image
+  std::optional<Fitness> seen_;
 };
 
 }  // namespace visual_localization

@@ -26,6 +26,7 @@ class ImageLikelihood;
 class PlaceFilter;
 class PoseVerifier;
 class SessionChoice;
+struct PredictedPose;
 
 /// One image in, one estimate out: the whole method. The nodelet, the offline programs and the experiments all
 /// run through this class. Not thread-safe.
@@ -91,6 +92,7 @@ class Localizer {
     std::int64_t last_ns = 0;
 
     void add(std::int64_t stamp_ns, bool repeated);
+    double seconds() const;
   };
 
   FrontEndConfig frontEndConfig() const;
@@ -100,7 +102,10 @@ class Localizer {
   Estimate lastAgain(std::int64_t stamp_ns, double elapsed_ms);
   Estimate answer(double elapsed_ms);
   bool isFrozen() const;
-  Evidence verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric);
+  bool isStale() const;
+  Evidence verify(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric,
+                  const std::optional<PredictedPose>& predicted);
+  std::optional<PredictedPose> verifiedMotion(const TrackerEstimate& tracked);
   bool isMetric() const;
   std::optional<MetricPose> poseNearPrediction(std::int64_t stamp_ns);
   std::optional<MetricPose> poseNearProposal(const TrackerEstimate& tracked);
@@ -108,14 +113,19 @@ class Localizer {
   TrackerEstimate trackImage();
   TrackerEstimate trackVerified(const MetricPose& metric);
   void witness(const Motion& motion, const std::optional<MetricPose>& metric);
-  std::optional<double> probabilityOf(const TrackerEstimate& tracked) const;
+  std::optional<double> probabilityOf(const TrackerEstimate& tracked, const Eigen::Vector2d& position_m) const;
+  const PlaceFilter& posterior() const;
+  double placeVariance_m2(std::size_t image) const;
+  double hereRadius_m(std::size_t image) const;
+  void missPose(bool has_pose, bool is_predicted, double& probability);
   bool isThroughOtherLens(std::size_t training_image) const;
   void learnSession(const TrackerEstimate& tracked);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
-  void choosePose(Estimate& estimate);
+  void choosePose(Estimate& estimate, const std::optional<PredictedPose>& predicted);
   PoseEstimate poseOf(const MetricPose& metric) const;
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
-  Eigen::Vector2d positionOf_m(const TrackerEstimate& tracked, bool recognised);
+  bool isRecognised(const TrackerEstimate& tracked) const;
+  Eigen::Vector2d placeOf_m(const TrackerEstimate& tracked);
   void configureTracker(const std::string& tracker_before);
   void forgetEvidence();
 
