@@ -134,12 +134,15 @@ bool PosePredictor::isBesidePrediction(const MetricPose& pose) const {
   return !isPredicted(pose) && (pose.base.translation().head<2>() - expected->position_m).norm() < kBeside_m;
 }
 
-/// Whether odometry since the last verified pose leads to this one; nothing when it does not know.
+/// Whether odometry since the last verified pose leads to this one; nothing when it does not know. The map's own error
+/// is the same for both.
 std::optional<bool> PosePredictor::odometryAgrees(const MetricPose& pose) const {
   if (!last_ || odometry_ == nullptr) return std::nullopt;
   const auto way = odometry_->between(last_->stamp_ns, stamp_ns_);
   if (!way) return std::nullopt;
-  const PredictedPose expected = predictedBy(last_->pose, *way, odometry_config_);
+  MetricPose last = last_->pose;
+  last.map_covariance.setZero();
+  const PredictedPose expected = predictedBy(last, *way, odometry_config_);
   const double off_m = (pose.base.translation().head<2>() - expected.position_m).norm();
   const double turned_rad = std::abs(angleDifference(expected.yaw_rad, yawOf(pose.base)));
   return off_m <= kSlipped_m + 3.0 * largerSigma(expected.covariance_m2) && turned_rad <= kSlipped_rad;

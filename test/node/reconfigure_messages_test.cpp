@@ -54,7 +54,8 @@ TEST_F(ReconfigureMessages, EverythingThatCanChangeIsDescribedAndNothingElse) {
                                        "tf_rate",
                                        "usage_file",
                                        "session_folder",
-                                       "model"};
+                                       "model",
+                                       "preset"};
   std::set<std::string> expected;
   for (const auto& entry : parameters::values(declare_)) {
     if (at_start.count(entry.first) == 0) expected.insert(entry.first);
