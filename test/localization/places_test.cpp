@@ -28,7 +28,7 @@ std::unique_ptr<const TrainingMap> mapAt(const std::vector<TrainingPose>& poses,
 }
 
 /// An image a metre to the east.
-void drive(double from_m, double to_m, int session, std::vector<TrainingPose>& poses) {
+void driveOn(double from_m, double to_m, int session, std::vector<TrainingPose>& poses) {
   for (double x_m = from_m; x_m <= to_m; x_m += kSpacing_m) {
     const auto stamp_ns = static_cast<std::int64_t>(1000 + poses.size()) * kSecond_ns;
     poses.push_back({stamp_ns, session, {x_m, 0.2 * session}, 0.0});
@@ -42,7 +42,7 @@ std::size_t countBeyond(const Places& places, std::size_t image) {
 
 TEST(Places, AStreetGoesOnBeyondBothEnds) {
   std::vector<TrainingPose> poses;
-  drive(0.0, 99.0, 0, poses);
+  driveOn(0.0, 99.0, 0, poses);
   const auto map = mapAt(poses);
   const Places places(*map, kSpacing_m, kGap_m);
   EXPECT_EQ(places.size(), 140U);
@@ -72,8 +72,8 @@ TEST(Places, ARoundThatClosesHasNoEnd) {
 
 TEST(Places, AGapOfASessionIsAnEndOnEitherSide) {
   std::vector<TrainingPose> poses;
-  drive(0.0, 29.0, 0, poses);
-  drive(40.0, 69.0, 0, poses);
+  driveOn(0.0, 29.0, 0, poses);
+  driveOn(40.0, 69.0, 0, poses);
   const auto map = mapAt(poses);
   const Places places(*map, kSpacing_m, kGap_m);
   EXPECT_EQ(countBeyond(places, 29), 10U) << "up to the image on the other side";
@@ -83,16 +83,16 @@ TEST(Places, AGapOfASessionIsAnEndOnEitherSide) {
 
 TEST(Places, AnImageThatIsMissingIsNoEnd) {
   std::vector<TrainingPose> poses;
-  drive(0.0, 29.0, 0, poses);
-  drive(34.0, 69.0, 0, poses);
+  driveOn(0.0, 29.0, 0, poses);
+  driveOn(34.0, 69.0, 0, poses);
   const auto map = mapAt(poses);
   EXPECT_EQ(countBeyond(Places(*map, kSpacing_m, kGap_m), 29), 0U);
 }
 
 TEST(Places, AnotherSessionLeadsOn) {
   std::vector<TrainingPose> poses;
-  drive(0.0, 29.0, 0, poses);
-  drive(20.0, 60.0, 1, poses);
+  driveOn(0.0, 29.0, 0, poses);
+  driveOn(20.0, 60.0, 1, poses);
   const auto map = mapAt(poses, 2);
   const Places places(*map, kSpacing_m, kGap_m);
   EXPECT_EQ(countBeyond(places, 29), 0U);
@@ -102,8 +102,8 @@ TEST(Places, AnotherSessionLeadsOn) {
 
 TEST(Places, OneThatFacesTheOtherWayDoesNot) {
   std::vector<TrainingPose> poses;
-  drive(0.0, 29.0, 0, poses);
-  drive(20.0, 60.0, 1, poses);
+  driveOn(0.0, 29.0, 0, poses);
+  driveOn(20.0, 60.0, 1, poses);
   for (TrainingPose& pose : poses) pose.yaw_rad = pose.session == 1 ? M_PI : 0.0;
   const auto map = mapAt(poses, 2);
   EXPECT_EQ(countBeyond(Places(*map, kSpacing_m, kGap_m), 29), 20U);
