@@ -178,13 +178,12 @@ std::string describe(const DoubtfulStretch& stretch) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(0) << stretch.from_m << " to " << stretch.to_m << " m ("
        << std::setprecision(1) << secondsBetween(0, stretch.from_ns) << " to " << secondsBetween(0, stretch.to_ns)
-       << " s) may be off by " << stretch.sigma_m << " m per axis (one sigma): ";
-  if (stretch.off_turns_m > 0.0) {
-    text << "the images turn unlike the path, a path that turns as they do is " << stretch.off_turns_m
-         << " m per axis from it";
-    if (stretch.off_fixes_m > 0.0) text << ", ";
-  }
-  if (stretch.off_fixes_m > 0.0) text << "fixes lie up to " << stretch.off_fixes_m << " m beside it";
+       << " s): " << stretch.sigma_m << " m off per axis (one sigma)";
+  constexpr double kLeast_m = 0.05;  // less is written as 0.0
+  const bool by_turns = stretch.off_turns_m >= kLeast_m;
+  if (by_turns) text << "; by the turns of the images " << stretch.off_turns_m << " m";
+  if (stretch.off_fixes_m >= kLeast_m)
+    text << (by_turns ? ", " : "; ") << "by the fixes " << stretch.off_fixes_m << " m";
   return text.str();
 }
 
