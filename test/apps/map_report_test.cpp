@@ -110,7 +110,7 @@ TEST(MapReport, NamesStretchesByTheirErrorAndThoseThatAreDoubtful) {
   EXPECT_THAT(text.str(), HasSubstr("0 m to     40 m: 3.00 m\n"));
   EXPECT_THAT(text.str(), HasSubstr("40 m to     90 m: 0.20 m\n"));
   EXPECT_THAT(text.str(), HasSubstr("check before use: 0 to 40 m (1.0 to 61.5 s): 3.0 m off per axis"));
-  EXPECT_THAT(text.str(), HasSubstr("8.0 m per axis from it, fixes lie up to 12.0 m beside it\n"));
+  EXPECT_THAT(text.str(), HasSubstr("; by the turns of the images 8.0 m, by the fixes 12.0 m\n"));
 }
 
 TEST(MapReport, SaysWhichCameraEachSessionHas) {
