@@ -25,8 +25,8 @@ check_style() {
   scripts/check_imports.py
   scripts/check_unity.py
   scripts/check_links.py
-  shellcheck scripts/*.sh .ci/run
-  find scripts test -name '*.py' -print0 | xargs -0 python3 -c \
+  shellcheck scripts/*.sh lab/*.sh .ci/run
+  find scripts lab test -name '*.py' -print0 | xargs -0 python3 -c \
     'import ast, sys; [ast.parse(open(path, encoding="utf-8").read(), path) for path in sys.argv[1:]]'
   echo "scripts: clean"
 }

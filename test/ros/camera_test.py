@@ -16,7 +16,7 @@ from sensor_msgs.msg import Image
 import localizer_fixture as fixture
 from visual_localization.msg import LocalizationStatus
 
-sys.path.insert(0, str(pathlib.Path(os.path.realpath(__file__)).parents[2] / 'scripts'))
+sys.path.insert(0, str(pathlib.Path(os.path.realpath(__file__)).parents[1] / 'support'))
 import camera_faults as faults  # noqa: E402
 
 DEADLINE_S = 30.0

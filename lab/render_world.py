@@ -1,6 +1,6 @@
 """Renders one round through a procedural world, as a robot with a camera drives it.
 
-blender -b -P scripts/render_world.py -- --world town --seed 1 --day overcast --round 0 --out DIR
+blender -b -P lab/render_world.py -- --world town --seed 1 --day overcast --round 0 --out DIR
 
 Worlds: campus (around the main building), town (700 m of streets on a hillside), meadow (195 m between hedges).
 Writes DIR/frame_%04d.png (grey), DIR/camera.yaml (calibration) and DIR/pose.csv (index,t,x,y,z,yaw: seconds, metres

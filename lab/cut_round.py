@@ -11,6 +11,7 @@ from typing import List, Optional, Tuple
 
 import rosbag
 import rospy
+import package_scripts  # noqa: F401
 from camera_info import TOPIC as CAMERA_INFO_TOPIC
 from camera_info import read_camera_info
 from sensor_msgs.msg import CameraInfo

@@ -13,6 +13,7 @@ import cv2
 import genpy
 import numpy as np
 import rosbag
+import package_scripts  # noqa: F401
 from local_frame import LocalFrame
 from wheel_odometry import TOPIC, events
 

@@ -40,7 +40,7 @@ evaluate() {
 turn_rounds() {
   local name
   for name in sunny_1 sunny_2 sunny_3 cloudy_1 cloudy_2 cloudy_3; do
-    [[ -e $rounds/turned_$name.bag ]] || "$repo/scripts/turn_round.py" "$rounds/campus_a_$name.bag" \
+    [[ -e $rounds/turned_$name.bag ]] || "$repo/lab/turn_round.py" "$rounds/campus_a_$name.bag" \
       "$rounds/turned_$name.bag" --degrees 30 --about 48.53450 9.07130
   done
 }
@@ -93,7 +93,7 @@ main() {
   done
   evaluate paper ledger
   for name in $OF_PACKAGE; do evaluate package "$name"; done
-  "$repo/scripts/report_claims.py" "$output"
+  "$repo/lab/report_claims.py" "$output"
 }
 
 main "$@"

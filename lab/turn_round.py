@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 import rosbag
+import package_scripts  # noqa: F401
 from local_frame import metres_per_degree
 
 

@@ -17,6 +17,7 @@ from typing import Dict
 import cv2
 import numpy as np
 import rosbag
+import package_scripts  # noqa: F401
 from colmap_steps import Clock, Colmap, Poses, poses_of
 from local_frame import LocalFrame
 

@@ -5,7 +5,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-SCRIPT = Path(sys.argv[1])
+SCRIPT = Path(__file__).resolve().parents[1] / 'plot_beside.py'
 HEADER = 'stamp,east_m,north_m,source\n'
 
 
@@ -48,4 +48,4 @@ class PlotBesideTest(unittest.TestCase):
 
 
 if __name__ == '__main__':
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

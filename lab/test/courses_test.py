@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(sys.argv[1])))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from worlds.meadow_course import MeadowPlan, meadow_drive  # noqa: E402
 from worlds.spec import Spec  # noqa: E402
 from worlds.town_course import SHARED_STREET, TWIN_ROWS, TownPlan, slopes, town_drive  # noqa: E402
@@ -178,4 +178,4 @@ class MeadowCourseTest(unittest.TestCase):
 
 
 if __name__ == '__main__':
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

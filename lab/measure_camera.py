@@ -20,7 +20,7 @@ import numpy as np
 import rosbag
 from sensor_msgs.msg import CompressedImage
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / 'test/support'))
 from camera_faults import FAULTS, Fault, soiled  # noqa: E402
 
 IMAGES = '/stereo/left/image_raw'

@@ -13,12 +13,11 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 
 import yaml
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-from evaluation_report.data import DataError, Group, number, read_rows  # noqa: E402
-from evaluation_report.files import written_whole  # noqa: E402
-from evaluation_report.papers import Papers, group_key, method_key  # noqa: E402
-from evaluation_report.tables import markdown  # noqa: E402
+import package_scripts
+from evaluation_report.data import DataError, Group, number, read_rows
+from evaluation_report.files import written_whole
+from evaluation_report.papers import Papers, group_key, method_key
+from evaluation_report.tables import markdown
 
 PRESETS = ('paper', 'paper_program')
 MARGIN = 0.2  # of a ratio or a value: claims.yaml
@@ -205,7 +204,7 @@ def report(root: Path, entries: List[Dict], why: Dict[str, str], papers: Papers)
                        for preset in PRESETS)
     header = ['claim', 'papers', "papers' text", '', "authors' program", '', 'why']
     return ("# The papers' claims\n\n"
-            'Made by `scripts/report_claims.py`; `config/evaluation/papers/claims.yaml` says when a claim agrees. Differences, '
+            'Made by `lab/report_claims.py`; `config/evaluation/papers/claims.yaml` says when a claim agrees. Differences, '
             'ratios and values with their 95 % intervals over pairs of rounds; several groups in the order sunny → '
             'sunny, cloudy → cloudy, sunny → cloudy, cloudy → sunny, as far as the papers have them.\n\n'
             f'{totals}.\n\n' + markdown(header, rows)
@@ -219,7 +218,7 @@ def main() -> int:
     """Exit code 0, or 1 with one line when a file is not as it should be."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('root', type=Path, metavar='ROOT', help='folder of the reports')
-    parser.add_argument('--config', type=Path, default=HERE.parent / 'config/evaluation', metavar='DIR',
+    parser.add_argument('--config', type=Path, default=package_scripts.FOLDER.parent / 'config/evaluation', metavar='DIR',
                         help='where papers/claims.yaml and papers.csv are (default: %(default)s)')
     arguments = parser.parse_args()
     try:

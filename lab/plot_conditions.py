@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 import rosbag
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from evaluation_report.data import DataError, read_description  # noqa: E402
-from evaluation_report.files import written_whole  # noqa: E402
-from evaluation_report.style import COLOURS, STYLE, hide_unused, literal, page, plt, shape  # noqa: E402
-from matplotlib.lines import Line2D  # noqa: E402
+import package_scripts  # noqa: F401
+from evaluation_report.data import DataError, read_description
+from evaluation_report.files import written_whole
+from evaluation_report.style import COLOURS, STYLE, hide_unused, literal, page, plt, shape
+from matplotlib.lines import Line2D
 
 BINS = 32
 

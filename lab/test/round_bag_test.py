@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import rosbag
 
-SCRIPTS = Path(sys.argv[1])
-sys.path.insert(0, str(SCRIPTS))
+LAB = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(LAB))
 import wheel_odometry  # noqa: E402
 from make_round_bag import ALTITUDE_M  # noqa: E402
 from worlds.lens import Lens, write_calibration  # noqa: E402
@@ -55,7 +55,7 @@ class RoundBagTest(unittest.TestCase):
             write_calibration(self.folder / 'camera.yaml', Lens((32, 24), 62, DISTORTION))
 
     def run_script(self, *options: str) -> subprocess.CompletedProcess:
-        return subprocess.run([sys.executable, str(SCRIPTS / 'make_round_bag.py'), str(self.folder),
+        return subprocess.run([sys.executable, str(LAB / 'make_round_bag.py'), str(self.folder),
                                str(self.folder / 'round.bag'), *options], capture_output=True, text=True, timeout=100,
                               check=False)
 
@@ -134,7 +134,7 @@ class RoundBagTest(unittest.TestCase):
         self.write(tilted=True)
         before = self.messages()
         copy = self.folder / 'copy.bag'
-        subprocess.run([sys.executable, str(SCRIPTS / 'add_odometry.py'), '--bag', str(self.folder / 'round.bag'),
+        subprocess.run([sys.executable, str(LAB / 'add_odometry.py'), '--bag', str(self.folder / 'round.bag'),
                         '--output', str(copy), '--slip', '60', '90'], capture_output=True, timeout=100, check=True)
         with rosbag.Bag(str(copy)) as bag:
             counts = {topic: info.message_count for topic, info in bag.get_type_and_topic_info().topics.items()}
@@ -190,4 +190,4 @@ class OdometryTest(unittest.TestCase):
 
 
 if __name__ == '__main__':
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+    unittest.main(verbosity=2)

@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 import rosbag
 import rospy
+import package_scripts  # noqa: F401
 from camera_info import TOPIC as CAMERA_INFO_TOPIC
 from camera_info import read_camera_info
 from geometry_msgs.msg import PoseStamped, Quaternion

@@ -52,12 +52,12 @@ main() {
   cmake -S "$work/.source" -B "$build" -DCMAKE_BUILD_TYPE=Release -DVISUAL_LOCALIZATION_ROS=OFF \
     -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
     '-DCMAKE_CXX_FLAGS=-w -D_GLIBCXX_ASSERTIONS' -DCMAKE_CXX_FLAGS_RELEASE=-O2
-  "$repo/scripts/mutants.py" --source "$work/.source" --build "$build" --out "$work/mutants.json" "${folders[@]}"
+  "$repo/lab/mutants.py" --source "$work/.source" --build "$build" --out "$work/mutants.json" "${folders[@]}"
   cmake --build "$build" --parallel "$(nproc)" --target "${tests[@]/#/test_}"
   for test in "${tests[@]}"; do programs+=("$build/test/test_$test"); done
-  "$repo/scripts/mutant_outcomes.py" run --mutants "$work/mutants.json" --out "$work/outcomes.jsonl" "${options[@]}" \
+  "$repo/lab/mutant_outcomes.py" run --mutants "$work/mutants.json" --out "$work/outcomes.jsonl" "${options[@]}" \
     "${programs[@]}"
-  "$repo/scripts/mutant_outcomes.py" report "$work/outcomes.jsonl" >"$work/report.md"
+  "$repo/lab/mutant_outcomes.py" report "$work/outcomes.jsonl" >"$work/report.md"
   sed '/^$/,$d' "$work/report.md"
   echo "survivors: $work/report.md"
 }

@@ -14,10 +14,10 @@ from typing import Tuple
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from evaluation_report.data import DataError, number, read_rows  # noqa: E402
-from evaluation_report.files import written_whole  # noqa: E402
-from evaluation_report.style import COLOURS, STYLE, plt  # noqa: E402
+import package_scripts  # noqa: F401
+from evaluation_report.data import DataError, number, read_rows
+from evaluation_report.files import written_whole
+from evaluation_report.style import COLOURS, STYLE, plt
 
 LONGEST_STEP_M = 10.0  # a path does not go on across a longer gap
 

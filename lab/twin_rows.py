@@ -12,11 +12,11 @@ from typing import List, Tuple
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from local_frame import LocalFrame  # noqa: E402
-from make_round_bag import LATITUDE_DEG, LONGITUDE_DEG  # noqa: E402
-from map_error import truth_of  # noqa: E402
-from worlds.town_course import TWIN_ROWS, TownPlan  # noqa: E402
+import package_scripts  # noqa: F401
+from local_frame import LocalFrame
+from make_round_bag import LATITUDE_DEG, LONGITUDE_DEG
+from map_error import truth_of
+from worlds.town_course import TWIN_ROWS, TownPlan
 
 JUNCTION_M = 8  # no house is nearer to the end of a street
 STREET_M = 6  # from its middle

@@ -6,7 +6,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-SCRIPT = Path(sys.argv.pop(1))
+SCRIPT = Path(__file__).resolve().parents[1] / 'report_claims.py'
 CONFIG = SCRIPT.parents[1] / 'config/evaluation'
 PAPERS = """experiment,source,train_group,test_group,method,metric,value
 made,"a paper",a,a,fast,mean_err_m,1.0

@@ -1,5 +1,5 @@
 #pragma once
-// What a place with mutants asks; scripts/mutants.py copies it into the sources that it mutates.
+// What a place with mutants asks; lab/mutants.py copies it into the sources that it mutates.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Dict, List, Tuple
 
 import numpy as np
+import package_scripts  # noqa: F401
 from camera_info import read_camera_info
 
 Poses = Dict[str, Tuple[float, float, float]]  # east, north, yaw by the name of the image
