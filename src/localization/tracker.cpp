@@ -5,9 +5,9 @@
 
 #include "base/text.h"
 #include "localization/bayes_tracker.h"
-#include "localization/dpso.h"
-#include "localization/multi_swarm.h"
-#include "localization/particle_filter.h"
+#include "localization/papers/dpso.h"
+#include "localization/papers/multi_swarm.h"
+#include "localization/papers/particle_filter.h"
 #include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/parameters/parameters.h"
 

@@ -3,8 +3,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "localization/dpso.h"
-#include "localization/particle_filter.h"
+#include "localization/papers/dpso.h"
+#include "localization/papers/particle_filter.h"
 #include "test/support/world.h"
 
 namespace visual_localization::benchmarks {

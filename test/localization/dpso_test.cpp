@@ -1,4 +1,4 @@
-#include "localization/dpso.h"
+#include "localization/papers/dpso.h"
 
 #include <algorithm>
 #include <cmath>

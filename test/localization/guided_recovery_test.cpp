@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/numbers.h"
-#include "localization/dpso.h"
+#include "localization/papers/dpso.h"
 #include "test/support/world.h"
 
 namespace visual_localization {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/numbers.h"
-#include "localization/particle_filter.h"
+#include "localization/papers/particle_filter.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
 #include "visual_localization/localization/particles.h"

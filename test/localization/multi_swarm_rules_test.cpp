@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "localization/multi_swarm.h"
+#include "localization/papers/multi_swarm.h"
 #include "test/localization/twin_street.h"
 
 namespace visual_localization {

@@ -1,6 +1,6 @@
 // Several swarms where two places look alike.
 
-#include "localization/multi_swarm.h"
+#include "localization/papers/multi_swarm.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "localization/dpso.h"
+#include "localization/papers/dpso.h"
 #include "test/support/swarm_config.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"

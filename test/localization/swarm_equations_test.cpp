@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "localization/dpso.h"
+#include "localization/papers/dpso.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "localization/dpso.h"
+#include "localization/papers/dpso.h"
 #include "test/support/synthetic.h"
 #include "test/support/world.h"
 #include "visual_localization/geo/trajectory.h"

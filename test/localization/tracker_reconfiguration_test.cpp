@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "localization/dpso.h"
+#include "localization/papers/dpso.h"
 #include "test/support/world.h"
 #include "visual_localization/localization/tracker.h"
 

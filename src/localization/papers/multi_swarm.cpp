@@ -1,4 +1,4 @@
-#include "localization/multi_swarm.h"
+#include "localization/papers/multi_swarm.h"
 
 #include <algorithm>
 #include <utility>

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "localization/dpso.h"
+#include "localization/papers/dpso.h"
 #include "visual_localization/localization/particles.h"
 #include "visual_localization/localization/tracker.h"
 

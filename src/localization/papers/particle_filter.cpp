@@ -1,4 +1,4 @@
-#include "localization/particle_filter.h"
+#include "localization/papers/particle_filter.h"
 
 #include <algorithm>
 #include <cmath>
