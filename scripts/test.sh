@@ -10,10 +10,10 @@ usage() {
   cat <<'USAGE'
 Usage: test.sh [--preset NAME] [--tests REGEX] [--no-lint]
   --preset NAME  test (default), release, debug, asan, tsan, coverage, or core-only (without ROS)
-  --tests REGEX  run only the tests whose name matches
+  --tests REGEX  run only the suites and programs whose name matches
   --no-lint      leave out formatting, import directions and the checks of the scripts
 Builds in build/NAME; the output of the build is in build/NAME.log. Exit code 0 when everything passed; tests that were
-skipped are listed as such. A rostest without a report is an error.
+skipped are listed as such. A suite or a rostest without a report is an error.
 USAGE
 }
 

@@ -22,7 +22,7 @@ using testing::HasSubstr;
 /// A kind of local features that the package does not have: floats, 64 long.
 class SecondKind : public test::WallStreet {
  protected:
-  SecondKind() { registerLocalFeatureKind(std::make_shared<test::PatchFeatures>()); }
+  static void SetUpTestSuite() { registerLocalFeatureKind(std::make_shared<test::PatchFeatures>()); }
 
   static std::vector<Fix> fixes() {
     std::vector<Fix> all;
