@@ -32,14 +32,21 @@ readonly tree_marker=.visual_localization_tree
 # Whether make_tree() has made the tree to its end.
 is_tree() { is_own_tree && [[ -e $tree/root/.is_whole ]]; }
 
+# Whether these are this user's, and nobody else may write there. What root runs in a tree, nobody else may have put in.
+is_ours() { [[ -z $(find "$@" -maxdepth 0 \( ! -uid "$EUID" -o -perm /022 \) 2>&1) ]]; }
+
 # Whether the folder itself, no link to one, is a tree that make_tree() began.
-is_own_tree() { [[ -d $tree && ! -L $tree && -f $tree/$tree_marker && ! -L $tree/$tree_marker ]]; }
+is_own_tree() {
+  [[ -d $tree && ! -L $tree && -f $tree/$tree_marker && ! -L $tree/$tree_marker ]] \
+    && is_ours "$tree" "$tree/$tree_marker"
+}
 
 # Fails when something else is where the tree is to be. What was not made here is never deleted.
 require_own_tree() {
   if is_own_tree || [[ ! -e $tree && ! -L $tree ]]; then return; fi
-  if [[ -d $tree && ! -L $tree && -z $(ls -A "$tree") ]]; then return; fi
-  fail "$tree is no tree of this script (it has no $tree_marker): delete it yourself, or name another folder"
+  if [[ -d $tree && ! -L $tree && -z $(ls -A "$tree") ]] && is_ours "$tree"; then return; fi
+  fail "$tree is no tree of this script (without $tree_marker, or others may write there): delete it yourself," \
+    "or name another folder"
 }
 
 # Nothing, where there is no tree.
@@ -51,14 +58,15 @@ remove_tree() {
     && rmdir "$tree"
 }
 
-# Chained by &&: where the steps are called, set -e is without effect. policy-rc.d keeps services from starting.
+# Chained by &&: where the steps are called, set -e is without effect. policy-rc.d keeps services from starting. Files
+# are put in place of what is there, for a link would lead out of the tree.
 make_tree() {
   # shellcheck disable=SC2154
   remove_tree \
-    && mkdir -p "$tree" \
-    && touch "$tree/$tree_marker" \
+    && install --directory --mode 755 "$tree" \
+    && install --mode 644 /dev/null "$tree/$tree_marker" \
     && debootstrap --variant=minbase --include=ca-certificates "$release" "$tree" "$mirror" \
-    && cp /etc/hosts /etc/resolv.conf "$tree/etc/" \
+    && install --mode 644 /etc/hosts /etc/resolv.conf "$tree/etc/" \
     && install -m 755 /dev/stdin "$tree/usr/sbin/policy-rc.d" <<<$'#!/bin/sh\nexit 101' \
     && touch "$tree/root/.is_whole"
 }
@@ -66,7 +74,7 @@ make_tree() {
 # Installs the Debian package `package` with all that it needs.
 install_package() {
   # shellcheck disable=SC2154
-  cp "$package" "$tree/root/visual-localization.deb" && in_tree 'apt-get update
+  install --mode 644 "$package" "$tree/root/visual-localization.deb" && in_tree 'apt-get update
     apt-get install --yes --no-install-recommends --reinstall /root/visual-localization.deb'
 }
 

@@ -45,6 +45,8 @@ main() {
 
   local source
   for source in "${sources[@]}"; do
+    [[ $(basename "$source") =~ ^[[:alnum:]][[:alnum:]._+-]*$ ]] \
+      || fail "${source@Q} does not end with a plain name of a folder: a letter or digit, then also . _ + -"
     [[ -f $source/CMakeLists.txt ]] || fail "$source is not the folder of a CMake project"
   done
   builds=$(mktemp -d)

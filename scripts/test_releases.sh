@@ -37,7 +37,8 @@ copy_checkout() {
 
 # Debian 11 has no package of CLI11 and Highway.
 install_sources() {
-  echo "deb-src $mirror bookworm main" >"$tree/etc/apt/sources.list.d/bookworm-source.list" && in_tree "apt-get update
+  install --mode 644 /dev/stdin "$tree/etc/apt/sources.list.d/source.list" <<<"deb-src $mirror bookworm main" \
+    && in_tree "apt-get update
     apt-get install --yes --no-install-recommends cmake g++ make dpkg-dev
     mkdir -p /root/sources
     cd /root/sources

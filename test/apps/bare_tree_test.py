@@ -1,5 +1,5 @@
-"""Scripts that delete folders delete only what they made: bare_tree.sh, with a debootstrap that makes next to nothing,
-and compare_tracks.py."""
+"""Scripts that delete folders delete only what they made, and root runs nothing that another user may have put there:
+bare_tree.sh, with a debootstrap that makes next to nothing, install_from_source.sh and compare_tracks.py."""
 import os
 import subprocess
 import sys
@@ -7,7 +7,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-SCRIPTS = Path(sys.argv[1])
+SCRIPTS = Path(sys.argv[1]).resolve()
 sys.path.insert(0, str(SCRIPTS))
 
 DEBOOTSTRAP = """#!/bin/sh
@@ -16,6 +16,7 @@ eval tree=\\${$(($# - 1))}
 test -e "$tree/.visual_localization_tree" || exit 1
 mkdir -p "$tree/etc" "$tree/usr/sbin" "$tree/root"
 touch "$tree/etc/of_debian"
+ln -s "$tree/../outside" "$tree/etc/hosts"
 """
 
 
@@ -54,6 +55,7 @@ tree={self.tree} release=bookworm mirror=nowhere
                          'remove_tree'):
             result = self.run_shell(commands)
             self.assertEqual(result.returncode, 0, f'{commands}: {result.stderr}')
+        self.assertFalse((self.folder / 'outside').exists(), 'a link was followed out of the tree')
 
     def test_what_was_not_made_here_is_refused(self):
         (self.tree / 'root').mkdir(parents=True)
@@ -72,16 +74,51 @@ tree={self.tree} release=bookworm mirror=nowhere
         self.refuse('remove_tree')
 
     def test_a_tree_that_was_begun_is_ours(self):
-        self.tree.mkdir()
-        (self.tree / '.visual_localization_tree').touch()
+        self.tree.mkdir(mode=0o755)
+        (self.tree / '.visual_localization_tree').touch(mode=0o644)
         (self.tree / 'half').mkdir()
         result = self.run_shell('make_tree; is_tree')
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertFalse((self.tree / 'half').exists())
 
     def test_an_empty_folder_is_taken(self):
-        self.tree.mkdir()
+        self.tree.mkdir(mode=0o755)
         self.assertEqual(self.run_shell('make_tree; is_tree').returncode, 0)
+
+    def test_what_another_user_may_write_is_refused(self):
+        self.tree.mkdir(mode=0o755)
+        self.tree.chmod(0o777)
+        self.refuse('make_tree')
+        self.tree.chmod(0o755)
+        self.assertEqual(self.run_shell('make_tree; is_tree').returncode, 0)
+        marker = self.tree / '.visual_localization_tree'
+        for path in (self.tree, marker):
+            mode = path.stat().st_mode
+            path.chmod(mode | 0o020)
+            self.assertEqual(self.run_shell('is_tree').returncode, 1, path)
+            self.refuse('remove_tree')
+            path.chmod(mode)
+        if os.geteuid() != 0:
+            return  # nobody else can own a tree
+        for path in (self.tree, marker):
+            os.chown(path, 65534, 65534)
+            self.refuse('require_own_tree')
+            os.chown(path, 0, 0)
+        self.assertEqual(self.run_shell('is_tree').returncode, 0)
+
+
+class InstallFromSourceTest(unittest.TestCase):
+    """What it builds stays in a folder of its own."""
+
+    def test_what_is_no_plain_name_is_refused(self):
+        with tempfile.TemporaryDirectory() as name:
+            (Path(name) / 'CMakeLists.txt').write_text('message(FATAL_ERROR ran)', encoding='utf-8')
+            (Path(name) / 'below').mkdir()
+            for source in ('..', '.', '../.', '/', f'{name}/below/..'):
+                result = subprocess.run([SCRIPTS / 'install_from_source.sh', '--prefix', name, source], text=True,
+                                        cwd=Path(name) / 'below', capture_output=True, timeout=60, check=False)
+                self.assertEqual(result.returncode, 1, source)
+                self.assertRegex(result.stderr, f"^install_from_source: '{source}' does not end with a plain name")
 
 
 class CompareTracksTest(unittest.TestCase):
