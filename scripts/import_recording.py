@@ -84,6 +84,8 @@ def common_options() -> argparse.ArgumentParser:
                         help='where metres count from, degrees and metres (default: 49 8.4 200)')
     parser.add_argument('--sigma', type=real(1e-4, 1e4), metavar='M', help='standard deviation of the positions '
                         '(default: not known; KITTI: 0.05)')
+    parser.add_argument('--allow-outside', action='store_true', help='take images, too, that lie elsewhere than in '
+                        'their folder: by links, .. and absolute paths')
     parser.add_argument('--start', type=ranged(1, 4e9), default=Decimal(1300000001), metavar='S',
                         help='Unix time of the first image where stamps do not say it (default: %(default)s)')
     return parser

@@ -53,7 +53,7 @@ python3-visualization-msgs python3-diagnostic-msgs python3-std-srvs python3-tf2-
 readonly PLOTS='
 python3-matplotlib python3-numpy: plots
 python3-yaml: configuration files in scripts
-python3-opencv: images in scripts'
+python3-opencv python3-pil: images in scripts'
 readonly LINT='
 clang-format clang-tidy shellcheck: checks of style'
 readonly CLANG='

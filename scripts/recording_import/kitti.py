@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseStamped, Quaternion
 from sensor_msgs.msg import CameraInfo
 
 from .recording import Image, Recording
-from .sources import FARTHEST_M, clock_of, metric_fix, numbered
+from .sources import FARTHEST_M, LARGEST_STAMP, clock_of, metric_fix, numbered
 from .table import exact, text_of
 
 # East, north and up of the axes of a camera that looks north: x to the right, y down, z ahead; and of z, -x and -y, the
@@ -70,13 +70,16 @@ def kitti_odometry(options: argparse.Namespace) -> Recording:
     """A sequence of KITTI's odometry benchmark: images, times.txt and calib.txt, and the poses beside the sequences."""
     folder = options.source
     poses_path = options.poses or folder.parent.parent / 'poses' / f'{folder.resolve().name}.txt'
-    files = numbered(folder / f'image_{options.camera}')
+    files = numbered(folder / f'image_{options.camera}', options)
     times = rows_of_numbers(folder / 'times.txt', 1)
     poses = rows_of_numbers(poses_path, 12)
     for path, rows in ((folder / 'times.txt', times), (poses_path, poses)):
         if max(files) >= len(rows):
             raise DataError(path, f'has {len(rows)} lines, the images go to number {max(files)}: at least '
                             f'{max(files) + 1} are expected')
+    for line, (stamp,) in times:
+        if not 0 <= stamp <= LARGEST_STAMP:
+            raise DataError(folder / 'times.txt', f'line {line}: {stamp} s is not from 0 to {LARGEST_STAMP:g} s')
     for (_, (before,)), (line, (after,)) in zip(times, times[1:]):
         if after <= before:
             raise DataError(folder / 'times.txt', f'line {line}: {after} s is not after {before} s')

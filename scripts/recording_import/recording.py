@@ -1,8 +1,10 @@
 """What a recording consists of, and the bag that it becomes."""
 import copy
 import heapq
+import io
 import sys
 import time
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Iterator, List, NamedTuple, Optional, Tuple
@@ -10,6 +12,7 @@ from typing import Iterator, List, NamedTuple, Optional, Tuple
 import cv2
 import genpy
 import numpy as np
+import PIL.Image
 import rosbag
 from evaluation_report.data import DataError
 from evaluation_report.files import written_whole
@@ -20,6 +23,7 @@ IMAGES, CALIBRATION, FIXES, POSES = ('/stereo/left/image_raw/compressed', '/ster
                                      '/ground_truth/pose')
 ENDINGS = ('.jpg', '.jpeg', '.png', '.pgm', '.ppm', '.bmp', '.tif', '.tiff')
 MOST_BYTES = 256 << 20  # of an image's file
+MOST_PIXELS = 4096 * 4096  # as the other programs take
 LAST_STAMP_NS = (2**32 - 1) * 10**9  # a ROS stamp has 32 bits of seconds
 ENCODINGS = {('uint8', 1): 'mono8', ('uint8', 3): 'bgr8', ('uint16', 1): 'mono16', ('uint16', 3): 'bgr16'}
 
@@ -52,7 +56,13 @@ class Recording:
     notes: List[str] = field(default_factory=list)  # what was assumed
 
 
-def image_files(folder: Path) -> List[Path]:
+def require_inside(path: Path, folder: Path, allow_outside: bool) -> None:
+    """Whoever made the recording must not choose what else of this machine comes into the bag."""
+    if not allow_outside and folder.resolve() not in path.resolve().parents:
+        raise DataError(path, f'lies outside of {folder}: --allow-outside takes it')
+
+
+def image_files(folder: Path, allow_outside: bool) -> List[Path]:
     """The images of a folder by name."""
     try:
         files = sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())
@@ -60,7 +70,24 @@ def image_files(folder: Path) -> List[Path]:
         raise DataError(folder, f'cannot be read: {error.strerror}') from error
     if not files:
         raise DataError(folder, f'holds no image ({" ".join(ENDINGS)})')
+    for path in files:
+        require_inside(path, folder, allow_outside)
     return files
+
+
+def require_size(path: Path, data: bytes) -> None:
+    """By the header alone: what is larger is never decoded."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')
+            with PIL.Image.open(io.BytesIO(data)) as image:
+                width, height = image.size
+    except PIL.Image.DecompressionBombError as error:
+        raise DataError(path, f'is too large: {error}') from error
+    except Exception as error:  # pylint: disable=broad-except  # whatever a broken file leads to
+        raise DataError(path, 'is not an image' if data else 'is empty') from error
+    if width * height > MOST_PIXELS:
+        raise DataError(path, f'is {width} x {height}, at most {MOST_PIXELS} pixels are read')
 
 
 def image_message(path: Path) -> Tuple[CompressedImage, Tuple[int, int]]:
@@ -71,12 +98,13 @@ def image_message(path: Path) -> Tuple[CompressedImage, Tuple[int, int]]:
         data = path.read_bytes()
     except OSError as error:
         raise DataError(path, f'cannot be read: {error.strerror}') from error
+    require_size(path, data)
     try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         pixels = None
     if pixels is None:
-        raise DataError(path, 'is not an image that OpenCV reads' if data else 'is empty')
+        raise DataError(path, 'is not an image that OpenCV reads')
     kind = 'jpeg' if data.startswith(b'\xff\xd8') else 'png'
     transparent = pixels.ndim == 3 and pixels.shape[2] == 4
     if transparent:

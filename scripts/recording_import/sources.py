@@ -8,15 +8,16 @@ from typing import Callable, Dict, NamedTuple, Optional, Tuple
 from evaluation_report.data import DataError
 from local_frame import geodetic
 
-from .recording import Fix, Image, Recording, image_files
+from .recording import Fix, Image, Recording, image_files, require_inside
 from .table import Row, Table, exact, text_of
 
 FARTHEST_M = 1e5  # from the datum: the map is a plane
 LARGEST_SIGMA_M = 1e4
 LAST_NUMBER = 10**9
+LARGEST_STAMP = 1e20
 # A stamp's unit by its size: seconds since 1970 have ten digits. Smaller ones count from the start of the recording.
 UNITS = ((1e8, 's from the start', 10**9), (1e11, 's', 10**9), (1e14, 'ms', 10**6), (1e17, 'us', 10**3),
-         (1e20, 'ns', 1))
+         (float('inf'), 'ns', 1))
 
 class Clock(NamedTuple):
     """How stamps are written."""
@@ -47,10 +48,10 @@ def number_of(path: Path) -> int:
     return int(digits[-1])
 
 
-def numbered(folder: Path) -> Dict[int, Path]:
+def numbered(folder: Path, options: argparse.Namespace) -> Dict[int, Path]:
     """The images of a folder by their numbers."""
     files: Dict[int, Path] = {}
-    for path in image_files(folder):
+    for path in image_files(folder, options.allow_outside):
         number = number_of(path)
         if number in files:
             raise DataError(path, f'and {files[number].name} both have the number {number}')
@@ -122,7 +123,7 @@ def by_number(files: Dict[int, Path], options: argparse.Namespace,
 
 def numbered_images(options: argparse.Namespace) -> Recording:
     """Gardens Point and others: the number of an image is its place."""
-    files = numbered(options.source)
+    files = numbered(options.source, options)
     if options.spacing is not None:
         return by_number(files, options, lambda number, stamp_ns: metric_fix(
             stamp_ns, (number * options.spacing, 0.0, 0.0), options.sigma, options))
@@ -170,7 +171,7 @@ def pose_position(path: Path, options: argparse.Namespace) -> Tuple[float, float
 
 def images_with_poses(options: argparse.Namespace) -> Recording:
     """Fast-SeqSLAM and others: beside each image a file of the same name with its pose."""
-    files = numbered(options.source)
+    files = numbered(options.source, options)
     folder = options.poses or options.source
 
     def fix_of(number: int, stamp_ns: int) -> Fix:
@@ -189,8 +190,9 @@ def rows_with_files(table: Table, column: int, options: argparse.Namespace) -> R
         path = options.images / row.fields[column].strip()
         if '\0' in row.fields[column] or not path.is_file():
             raise row.refuse(column, f'there is no file {path}')
+        require_inside(path, options.images, options.allow_outside)
         files.append(path)
-        stamps.append(Decimal(0) if stamp_column is None else row.decimal(stamp_column, 0, 1e20, ''))
+        stamps.append(Decimal(0) if stamp_column is None else row.decimal(stamp_column, 0, LARGEST_STAMP, ''))
     if stamp_column is None:
         clock, stamps = Clock('', 10**9, start_ns(options)), [
             index * Decimal(options.period) for index in range(len(files))]
@@ -209,11 +211,11 @@ def rows_with_files(table: Table, column: int, options: argparse.Namespace) -> R
 def rows_with_stamps(table: Table, column: int, options: argparse.Namespace) -> Recording:
     """A row is a fix; the images are named by their stamps."""
     positions = Positions(table, options)
-    stamps = [row.decimal(column, 0, 1e20, '') for row in table.rows]
+    stamps = [row.decimal(column, 0, LARGEST_STAMP, '') for row in table.rows]
     images = []
-    for path in image_files(options.images):
+    for path in image_files(options.images, options.allow_outside):
         stamp = exact(path.stem)
-        if stamp is None or not 0 <= stamp < 10**20:
+        if stamp is None or not 0 <= stamp <= LARGEST_STAMP:
             raise DataError(path, f'is not named by a stamp, and {table.path} has no column of files: say which by '
                             '--column file=NAME')
         images.append((stamp, path))

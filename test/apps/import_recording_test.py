@@ -4,9 +4,12 @@ import csv
 import io
 import itertools
 import math
+import os
+import struct
 import subprocess
 import sys
 import unittest
+import zlib
 from pathlib import Path
 from unittest import mock
 
@@ -33,6 +36,14 @@ def messages(bag: Path) -> dict:
         for topic, message, _ in file.read_messages():
             topics.setdefault(topic, []).append(message)
     return topics
+
+
+def png_header(width: int, height: int) -> bytes:
+    """The beginning of a PNG of this size, and its end."""
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
+    header = struct.pack('>IIBBBBB', width, height, 8, 0, 0, 0, 0)
+    return b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', header) + chunk(b'IDAT', zlib.compress(b'')) + chunk(b'IEND', b'')
 
 
 class ImportTest(ProgramTest):
@@ -167,6 +178,39 @@ class NumberedImagesTest(ImportTest):
                                 timeout=200, check=True)
         self.assertIn('import_recording.py kitti_odometry dataset', result.stdout)
 
+    def test_a_size_is_refused_before_anything_is_decoded(self):
+        (self.images / 'Image004.png').write_bytes(png_header(60000, 60000))
+        (self.images / 'Image005.png').write_bytes(png_header(6000, 3000))
+        arguments = ('numbered_images', self.images, '--spacing', 1)
+        with mock.patch('cv2.imdecode', side_effect=lambda data, flags: self.decoded(data, flags)):
+            self.refused(('Image004.png: is too large',), *arguments)
+            (self.images / 'Image004.png').unlink()
+            self.refused(('Image005.png: is 6000 x 3000, at most 16777216 pixels',), *arguments)
+
+    def decoded(self, data: np.ndarray, _: int) -> np.ndarray:
+        """What stands for a decoder: small files only."""
+        self.assertIn(data.tobytes(), self.data)
+        return np.zeros((20, 30), np.uint8)
+
+    def test_the_partial_file_follows_no_link(self):
+        victim = self.write('victim', 'precious')
+        (self.folder / f'.{self.output.name}.partial').symlink_to(victim)
+        self.output.symlink_to(victim)
+        self.imported('numbered_images', self.images, '--spacing', 1)
+        self.assertEqual(victim.read_text(), 'precious')
+        self.assertFalse(self.output.is_symlink())
+        mask = os.umask(0)
+        os.umask(mask)
+        self.assertEqual(self.output.stat().st_mode & 0o777, 0o666 & ~mask)
+
+    def test_a_link_out_of_the_folder_is_followed_only_when_told(self):
+        private = self.folder / 'private.png'
+        private.write_bytes(self.data[1])
+        (self.images / 'Image004.png').symlink_to(private)
+        arguments = ('numbered_images', self.images, '--spacing', 1)
+        self.refused(('Image004.png: lies outside of', '--allow-outside'), *arguments)
+        self.assertEqual(len(self.imported(*arguments, '--allow-outside')[IMAGES]), 4)
+
     def test_an_output_that_cannot_be_written_is_named(self):
         self.output = self.images / 'Image000.jpg' / 'a.bag'
         self.refused(('a.bag: cannot be written',), 'numbered_images', self.images, '--spacing', 1)
@@ -250,6 +294,7 @@ class CsvTest(ImportTest):
     def test_what_is_wrong_is_named(self):
         self.picture('a.png')
         self.picture('b.png')
+        self.picture('../private.png')
         for text, words in (
                 ('file,x,y\na.png,0,0\nc.png,1,1\n', ("line 3, column 1 ('file')", 'c.png')),
                 ('file,t,x,y\na.png,5,0,0\nb.png,5,1,1\n', ('b.png', 'has the stamp of a.png')),
@@ -257,6 +302,8 @@ class CsvTest(ImportTest):
                 ('t,x,y\n5,0,0\n', ('a.png: is not named by a stamp', '--column file=NAME')),
                 ('x,y\n5,0\n', ('neither files nor stamps', 'columns: x, y')),
                 ('file,x,y\na.png,,\n', ('has no position',)),
+                ('file,x,y\n../images/../private.png,0,0\n', ('private.png: lies outside of', '--allow-outside')),
+                (f'file,x,y\n{self.folder}/private.png,0,0\n', ('private.png: lies outside of',)),
                 ('file,x,y\na.png,0\x1b[2J,0\n', ('line 2', '?[2J'))):
             self.refused(words, 'csv', self.write('p.csv', text), '--images', self.images)
 
@@ -305,6 +352,7 @@ class KittiTest(ImportTest):
         for name, text, words in (
                 ('sequences/03/times.txt', '0.0\n0.1\n', ('has 2 lines', 'number 2', 'at least 3')),
                 ('sequences/03/times.txt', '0.0\n0.2\n0.1\n', ('line 3', '0.1 s is not after 0.2 s')),
+                ('sequences/03/times.txt', '0.0\n0.1\n1e39\n', ('line 3', '1E+39 s is not from 0 to 1e+20 s')),
                 ('sequences/03/times.txt', '0.0\n\n0.1\n', ('line 2', "''")),
                 ('sequences/03/calib.txt', 'P1: 1\n', ('no line P0:',)),
                 ('sequences/03/calib.txt', KITTI_P0.replace('700', '-700'), ('P0 is not',)),
