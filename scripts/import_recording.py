@@ -1,12 +1,15 @@
 #!/usr/bin/python3
-"""Turns a public data set, or a folder of images with a table of positions, into a bag as a robot records it.
+"""Turns a public data set, a video, photographs, or images with a table of positions, into a bag as a robot records it.
 
-JPEG and PNG images are copied as they are. Topics: /stereo/left/image_raw/compressed, /gps/fix, and where the camera is
-known /stereo/left/camera_info. Metres count from --datum.
+JPEG and PNG images are copied as they are, unless --width makes them smaller. Topics:
+/stereo/left/image_raw/compressed, /gps/fix, where the camera is known /stereo/left/camera_info, and with --mount
+/tf_static. Metres count from --datum.
 """
 import argparse
+import math
 import signal
 import sys
+import tempfile
 from decimal import Decimal
 from pathlib import Path
 from typing import Tuple
@@ -14,7 +17,7 @@ from typing import Tuple
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from camera_info import read_camera_info  # noqa: E402
 from evaluation_report.data import DataError, printable  # noqa: E402
-from recording_import import kitti, sources  # noqa: E402
+from recording_import import kitti, photos, sources, video  # noqa: E402
 from recording_import.recording import Recording, write_bag  # noqa: E402
 from recording_import.table import MEANINGS, exact  # noqa: E402
 
@@ -24,7 +27,10 @@ EXAMPLES = {
                        '--scale 176 -110 --period 2 --output day_left.bag',
     'images_with_poses': 'import_recording.py images_with_poses UofA/day --values 2 3 --output day.bag',
     'csv': 'import_recording.py csv positions.csv --images images --output drive.bag',
+    'photos': 'import_recording.py photos walk --width 640 --output walk.bag',
+    'video': 'import_recording.py video GX010001.MP4 --width 640 --output ride.bag',
 }
+MOUNTS = {'ahead': 0.0, 'left': 0.5, 'back': 1.0, 'right': -0.5}  # directions of view, half turns
 
 
 def ranged(low: float, high: float):
@@ -58,6 +64,28 @@ def place_in_file(text: str) -> int:
     return int(text)
 
 
+def pixels(text: str) -> int:
+    """A width of images."""
+    return int(ranged(16, 8192)(text))
+
+
+class Mount(argparse.Action):
+    """A direction, or six numbers."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        if len(values) == 1 and values[0] in MOUNTS:
+            pose = [0.0, 0.0, 0.0, MOUNTS[values[0]] * math.pi, 0.0, 0.0]
+        elif len(values) == 6:
+            try:
+                pose = [real(-limit, limit)(value) for value, limit in zip(values, 3 * [100] + 3 * [2 * math.pi])]
+            except argparse.ArgumentTypeError as error:
+                raise argparse.ArgumentError(self, str(error))
+        else:
+            raise argparse.ArgumentError(self, f"'{printable(' '.join(values))}' is not {', '.join(MOUNTS)}, nor six "
+                                         'numbers: x y z yaw pitch roll, m and rad')
+        setattr(namespace, self.dest, pose)
+
+
 def column(text: str) -> Tuple[str, str]:
     """MEANING=COLUMN."""
     meaning, separator, name = text.partition('=')
@@ -86,8 +114,12 @@ def common_options() -> argparse.ArgumentParser:
                         '(default: not known; KITTI: 0.05)')
     parser.add_argument('--allow-outside', action='store_true', help='take images, too, that lie elsewhere than in '
                         'their folder: by links, .. and absolute paths')
-    parser.add_argument('--start', type=ranged(1, 4e9), default=Decimal(1300000001), metavar='S',
-                        help='Unix time of the first image where stamps do not say it (default: %(default)s)')
+    parser.add_argument('--width', type=pixels, metavar='PX', help='make wider images so wide (default: as they are)')
+    parser.add_argument('--mount', nargs='+', action=Mount, metavar='M', help='how the camera looks from the robot: '
+                        'ahead, left, back or right, or x y z yaw pitch roll, m and rad, as robot/camera of the map '
+                        'builder (default: not known)')
+    parser.add_argument('--start', type=ranged(1, 4e9), metavar='S', help='Unix time of the first image where stamps '
+                        f'do not say it (default: {sources.DEFAULT_START_S}); of photos and videos in any case')
     return parser
 
 
@@ -101,6 +133,8 @@ def parser_of_forms() -> Parser:
     table.add_argument('--column', type=column, action='append', default=[], metavar='MEANING=COLUMN',
                        help=f'which column, by name or position from 1, is the {", ".join(MEANINGS)}; '
                        'the usual names are known')
+    track = argparse.ArgumentParser(add_help=False)
+    track.add_argument('--gpx', type=Path, metavar='FILE', help='track of the same walk')
     metric.add_argument('--scale', type=factor, nargs=2, default=[1.0, 1.0], metavar=('A', 'B'),
                         help='factors of the two numbers of a position, to metres or degrees')
     metric.add_argument('--period', type=ranged(1e-3, 1e4), default=Decimal(1), metavar='S',
@@ -134,6 +168,13 @@ def parser_of_forms() -> Parser:
                           'east and north')
     anything.add_argument('--images', type=Path, metavar='FOLDER', help='of the images (default: that of the table); '
                           'without a column of files they are named by their stamps')
+    walk = form('photos', 'folder of photographs with positions in EXIF, or with a GPX file', track)
+    walk.add_argument('source', type=Path, help='folder; times are those of EXIF, or the names: stamps, dates and '
+                      'times, or hours, minutes and seconds from the start (frame_00_00_21.000.jpg)')
+    film = form('video', 'video of a GoPro with its own track (GPMF), or with a GPX file', track)
+    film.add_argument('source', type=Path, help='any video that OpenCV reads; images are kept in a temporary folder')
+    film.add_argument('--period', type=ranged(1e-3, 1e4), default=Decimal('0.5'), metavar='S',
+                      help='from image to image (default: %(default)s s)')
     return parser
 
 
@@ -154,8 +195,12 @@ def arguments() -> argparse.Namespace:
 
 def read(options: argparse.Namespace) -> Recording:
     """The recording as its form has it."""
+    if options.source.suffix in ('.mcap', '.db3'):
+        raise DataError(options.source, f'is a bag of ROS 2: rosbags-convert --src {options.source.parent} --dst '
+                        f'{options.source.stem}.bag converts the folder of it (pip install rosbags)')
     recording = {'kitti_odometry': kitti.kitti_odometry, 'numbered_images': sources.numbered_images,
-                 'images_with_poses': sources.images_with_poses, 'csv': sources.csv_table}[options.form](options)
+                 'images_with_poses': sources.images_with_poses, 'csv': sources.csv_table,
+                 'photos': photos.photos_folder, 'video': video.video}[options.form](options)
     if not recording.fixes:
         raise DataError(options.source, 'has no position')
     if options.camera_info is not None:
@@ -173,7 +218,8 @@ def main() -> int:
     options = arguments()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what is half written goes
     try:
-        print(write_bag(read(options), options.output))
+        with tempfile.TemporaryDirectory(prefix='import_recording.') as options.scratch:
+            print(write_bag(read(options), options.output, options.width, options.mount))
         return 0
     except DataError as failure:
         print(f'import_recording: {failure}', file=sys.stderr)

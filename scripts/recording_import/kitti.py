@@ -4,21 +4,18 @@ from decimal import Decimal
 from pathlib import Path
 from typing import List, Tuple
 
-import cv2
 import genpy
 import numpy as np
 from evaluation_report.data import DataError
 from geometry_msgs.msg import PoseStamped, Quaternion
 from sensor_msgs.msg import CameraInfo
 
-from .recording import Image, Recording
+from .recording import BODY_FROM_OPTICAL, Image, Recording, quaternion
 from .sources import FARTHEST_M, LARGEST_STAMP, clock_of, metric_fix, numbered
 from .table import exact, text_of
 
-# East, north and up of the axes of a camera that looks north: x to the right, y down, z ahead; and of z, -x and -y, the
-# axes of a body: x ahead, y left, z up.
+# East, north and up of the axes of a camera that looks north: x to the right, y down, z ahead.
 FROM_CAMERA = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
-CAMERA_FROM_BODY = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
 
 
 def rows_of_numbers(path: Path, count: int) -> List[Tuple[int, List[Decimal]]]:
@@ -60,10 +57,7 @@ def kitti_pose(line: int, values: List[Decimal], camera: np.ndarray, path: Path)
     if np.abs(place).max() > FARTHEST_M:
         raise DataError(path, f'line {line} is {np.abs(place).max():.3g} m from the first, at most {FARTHEST_M:g} are '
                         'expected')
-    turn = cv2.Rodrigues(FROM_CAMERA @ rotation @ CAMERA_FROM_BODY)[0].ravel()
-    half = np.linalg.norm(turn) / 2
-    axis = turn * (np.sin(half) / (2 * half) if half > 0 else 0.5)
-    return place, Quaternion(*axis, np.cos(half))
+    return place, quaternion(FROM_CAMERA @ rotation @ BODY_FROM_OPTICAL.T)
 
 
 def kitti_odometry(options: argparse.Namespace) -> Recording:
@@ -71,8 +65,13 @@ def kitti_odometry(options: argparse.Namespace) -> Recording:
     folder = options.source
     poses_path = options.poses or folder.parent.parent / 'poses' / f'{folder.resolve().name}.txt'
     files = numbered(folder / f'image_{options.camera}', options)
-    times = rows_of_numbers(folder / 'times.txt', 1)
     poses = rows_of_numbers(poses_path, 12)
+    notes = []
+    if (folder / 'times.txt').exists():
+        times = rows_of_numbers(folder / 'times.txt', 1)
+    else:
+        times = [(line, [Decimal(index) / 10]) for index, (line, _) in enumerate(poses)]
+        notes.append('guessed: 10 images a second, since there is no times.txt')
     for path, rows in ((folder / 'times.txt', times), (poses_path, poses)):
         if max(files) >= len(rows):
             raise DataError(path, f'has {len(rows)} lines, the images go to number {max(files)}: at least '
@@ -84,7 +83,7 @@ def kitti_odometry(options: argparse.Namespace) -> Recording:
         if after <= before:
             raise DataError(folder / 'times.txt', f'line {line}: {after} s is not after {before} s')
     calibration, camera = kitti_camera(folder / 'calib.txt', options.camera)
-    recording = Recording([], [], calibration)
+    recording = Recording([], [], calibration, notes=notes)
     clock = clock_of(times[-1][1][0], options)
     for number, path in files.items():
         stamp_ns = clock.ns(times[number][1][0])

@@ -16,11 +16,14 @@ import PIL.Image
 import rosbag
 from evaluation_report.data import DataError
 from evaluation_report.files import written_whole
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, CompressedImage, NavSatFix, NavSatStatus
+from tf2_msgs.msg import TFMessage
 
-IMAGES, CALIBRATION, FIXES, POSES = ('/stereo/left/image_raw/compressed', '/stereo/left/camera_info', '/gps/fix',
-                                     '/ground_truth/pose')
+IMAGES, CALIBRATION = '/stereo/left/image_raw/compressed', '/stereo/left/camera_info'
+FIXES, POSES, FRAMES = '/gps/fix', '/ground_truth/pose', '/tf_static'
+# Of x ahead, y left, z up, the axes of an image: x to the right, y down, z ahead.
+BODY_FROM_OPTICAL = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 ENDINGS = ('.jpg', '.jpeg', '.png', '.pgm', '.ppm', '.bmp', '.tif', '.tiff')
 MOST_BYTES = 256 << 20  # of an image's file
 MOST_PIXELS = 4096 * 4096  # as the other programs take
@@ -75,7 +78,15 @@ def image_files(folder: Path, allow_outside: bool) -> List[Path]:
     return files
 
 
-def require_size(path: Path, data: bytes) -> None:
+def require_pixels(path: Path, width: int, height: int, narrower: Optional[int]) -> None:
+    """What becomes `narrower` may be larger."""
+    most = MOST_PIXELS * (8 if narrower is not None else 1)
+    if not 0 < width * height <= most:
+        raise DataError(path, f'is {width} x {height}, at most {most} pixels are read'
+                        + ('' if narrower is not None else '; more with --width PX'))
+
+
+def require_size(path: Path, data: bytes, narrower: Optional[int]) -> None:
     """By the header alone: what is larger is never decoded."""
     try:
         with warnings.catch_warnings():
@@ -86,19 +97,27 @@ def require_size(path: Path, data: bytes) -> None:
         raise DataError(path, f'is too large: {error}') from error
     except Exception as error:  # pylint: disable=broad-except  # whatever a broken file leads to
         raise DataError(path, 'is not an image' if data else 'is empty') from error
-    if width * height > MOST_PIXELS:
-        raise DataError(path, f'is {width} x {height}, at most {MOST_PIXELS} pixels are read')
+    require_pixels(path, width, height, narrower)
 
 
-def image_message(path: Path) -> Tuple[CompressedImage, Tuple[int, int]]:
-    """The file as it is if it is JPEG or PNG, else as PNG; and its width and height."""
+def resized(pixels: np.ndarray, width: Optional[int]) -> np.ndarray:
+    """At most so wide, of the same shape."""
+    if width is None or pixels.shape[1] <= width:
+        return pixels
+    return cv2.resize(pixels, (width, max(1, round(pixels.shape[0] * width / pixels.shape[1]))),
+                      interpolation=cv2.INTER_AREA)
+
+
+def image_message(path: Path, width: Optional[int]) -> Tuple[CompressedImage, Tuple[int, int]]:
+    """The file as it is if it is JPEG or PNG and not wider than `width`, pixels; else encoded anew. And its width and
+    height."""
     try:
         if path.stat().st_size > MOST_BYTES:
             raise DataError(path, f'{path.stat().st_size / 2**20:.0f} MiB, at most {MOST_BYTES >> 20} are read')
         data = path.read_bytes()
     except OSError as error:
         raise DataError(path, f'cannot be read: {error.strerror}') from error
-    require_size(path, data)
+    require_size(path, data, width)
     try:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
@@ -112,8 +131,10 @@ def image_message(path: Path) -> Tuple[CompressedImage, Tuple[int, int]]:
     encoding = ENCODINGS.get((str(pixels.dtype), 1 if pixels.ndim == 2 else pixels.shape[2]))
     if encoding is None:
         raise DataError(path, f'has pixels of type {pixels.dtype}: 8 or 16 bits, grey or colour, are read')
-    if transparent or (kind == 'png' and not data.startswith(b'\x89PNG')):
-        data = cv2.imencode('.png', pixels)[1].tobytes()
+    smaller = resized(pixels, width)
+    if transparent or smaller is not pixels or (kind == 'png' and not data.startswith(b'\x89PNG')):
+        pixels, ending = smaller, '.jpg' if kind == 'jpeg' else '.png'
+        data = cv2.imencode(ending, pixels, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
     message = CompressedImage(format=f'{encoding}; {kind} compressed {encoding if encoding.startswith("bgr") else ""}',
                               data=data)
     message.header.frame_id = 'stereo_left'
@@ -132,11 +153,11 @@ def fix_message(fix: Fix) -> NavSatFix:
     return message
 
 
-def image_events(recording: Recording) -> Iterator[tuple]:
+def image_events(recording: Recording, width: Optional[int]) -> Iterator[tuple]:
     """Each image with the calibration beside it."""
     size, shown = None, time.monotonic()
     for index, image in enumerate(recording.images):
-        message, this_size = image_message(image.path)
+        message, this_size = image_message(image.path, width)
         if size not in (None, this_size):
             raise DataError(image.path, f'is {this_size[0]} x {this_size[1]}, the images before are '
                             f'{size[0]} x {size[1]}')
@@ -146,6 +167,8 @@ def image_events(recording: Recording) -> Iterator[tuple]:
             info = copy.deepcopy(recording.calibration)
             if info.width == 0:  # KITTI's files do not say it
                 info.width, info.height = size
+            if width is not None and info.width > width == size[0]:
+                scale(info, size)
             if (info.width, info.height) != size:
                 raise DataError(image.path, f'is {size[0]} x {size[1]}, the calibration is for '
                                 f'{info.width} x {info.height}')
@@ -157,8 +180,46 @@ def image_events(recording: Recording) -> Iterator[tuple]:
         print('\r\033[K', end='', file=sys.stderr)
 
 
-def write_bag(recording: Recording, output: Path) -> str:
-    """Writes the messages in the order of their stamps; says what there is."""
+def quaternion(rotation: np.ndarray) -> Quaternion:
+    """Of a 3 x 3 matrix."""
+    turn = cv2.Rodrigues(rotation)[0].ravel()
+    half = np.linalg.norm(turn) / 2
+    axis = turn * (np.sin(half) / (2 * half) if half > 0 else 0.5)
+    return Quaternion(*axis, np.cos(half))
+
+
+def scale(info: CameraInfo, size: Tuple[int, int]) -> None:
+    """The calibration of the same camera for images of another size."""
+    for matrix, columns in ((info.K, 3), (info.P, 4)):
+        scaled = list(matrix)
+        for row, factor in enumerate((size[0] / info.width, size[1] / info.height)):
+            for column in range(columns):
+                scaled[row * columns + column] *= factor
+            scaled[row * columns + 2] += (factor - 1) / 2  # pixels count from their centres
+        matrix[:] = scaled
+    info.width, info.height = size
+
+
+def mounting(pose: List[float]) -> TFMessage:
+    """The camera on the robot, and the antenna at the robot's origin. `pose`: x y z yaw pitch roll, m and rad, of a
+    camera whose x points ahead."""
+    x, y, z, yaw, pitch, roll = pose
+    turn = np.eye(3)
+    for axis, angle in (((0, 0, 1), yaw), ((0, 1, 0), pitch), ((1, 0, 0), roll)):
+        turn = turn @ cv2.Rodrigues(np.array(axis, float) * angle)[0]
+    message = TFMessage()
+    for frame, place, rotation in (('stereo_left', (x, y, z), turn @ BODY_FROM_OPTICAL), ('gps', (0, 0, 0), np.eye(3))):
+        link = TransformStamped(child_frame_id=frame)
+        link.header.frame_id = 'base_link'
+        link.transform.translation = Vector3(*place)
+        link.transform.rotation = quaternion(rotation)
+        message.transforms.append(link)
+    return message
+
+
+def write_bag(recording: Recording, output: Path, width: Optional[int], mount: Optional[List[float]]) -> str:
+    """Writes the messages in the order of their stamps; says what there is. `width`: of the widest image, pixels.
+    `mount`: see mounting()."""
     recording.images.sort()
     for before, after in zip(recording.images, recording.images[1:]):
         if before.stamp_ns == after.stamp_ns:
@@ -172,7 +233,10 @@ def write_bag(recording: Recording, output: Path) -> str:
     with written_whole(output) as partial:
         try:
             with rosbag.Bag(str(partial), 'w') as bag:
-                for stamp_ns, _, topic, message in heapq.merge(image_events(recording), fixes, poses,
+                if mount is not None:
+                    start = genpy.Time(*divmod(min(stamps), 10**9))
+                    bag.write(FRAMES, mounting(mount), start)
+                for stamp_ns, _, topic, message in heapq.merge(image_events(recording, width), fixes, poses,
                                                                key=lambda event: event[:2]):
                     message.header.stamp = genpy.Time(*divmod(stamp_ns, 10**9))
                     bag.write(topic, message, message.header.stamp)

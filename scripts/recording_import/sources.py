@@ -3,18 +3,20 @@ import argparse
 import re
 from decimal import Decimal
 from pathlib import Path
-from typing import Callable, Dict, NamedTuple, Optional, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Tuple
 
 from evaluation_report.data import DataError
 from local_frame import geodetic
 
 from .recording import Fix, Image, Recording, image_files, require_inside
 from .table import Row, Table, exact, text_of
+from .times import stamp_of_name
 
 FARTHEST_M = 1e5  # from the datum: the map is a plane
 LARGEST_SIGMA_M = 1e4
 LAST_NUMBER = 10**9
 LARGEST_STAMP = 1e20
+DEFAULT_START_S = 1300000001
 # A stamp's unit by its size: seconds since 1970 have ten digits. Smaller ones count from the start of the recording.
 UNITS = ((1e8, 's from the start', 10**9), (1e11, 's', 10**9), (1e14, 'ms', 10**6), (1e17, 'us', 10**3),
          (float('inf'), 'ns', 1))
@@ -37,7 +39,12 @@ def clock_of(largest: Decimal, options: argparse.Namespace) -> Clock:
 
 
 def start_ns(options: argparse.Namespace) -> int:
-    return int(Decimal(options.start) * 10**9)
+    return int(Decimal(options.start or DEFAULT_START_S) * 10**9)
+
+
+def natural(path: Path) -> Tuple:
+    """For names in the order of the numbers in them: 9 before 10."""
+    return tuple((part.isdigit(), int(part) if part.isdigit() else part) for part in re.split('([0-9]+)', path.name))
 
 
 def number_of(path: Path) -> int:
@@ -54,7 +61,8 @@ def numbered(folder: Path, options: argparse.Namespace) -> Dict[int, Path]:
     for path in image_files(folder, options.allow_outside):
         number = number_of(path)
         if number in files:
-            raise DataError(path, f'and {files[number].name} both have the number {number}')
+            raise DataError(path, f'and {files[number].name} both have the number {number}; where names are times, use '
+                            'photos or csv; where only their order counts, csv with a table in that order')
         files[number] = path
     return dict(sorted(files.items()))
 
@@ -212,20 +220,33 @@ def rows_with_stamps(table: Table, column: int, options: argparse.Namespace) -> 
     """A row is a fix; the images are named by their stamps."""
     positions = Positions(table, options)
     stamps = [row.decimal(column, 0, LARGEST_STAMP, '') for row in table.rows]
-    images = []
-    for path in image_files(options.images, options.allow_outside):
-        stamp = exact(path.stem)
-        if stamp is None or not 0 <= stamp <= LARGEST_STAMP:
-            raise DataError(path, f'is not named by a stamp, and {table.path} has no column of files: say which by '
-                            '--column file=NAME')
-        images.append((stamp, path))
-    clocks = [clock_of(max(values), options) for values in (stamps, [stamp for stamp, _ in images])]
-    recording = Recording([Image(clocks[1].ns(stamp), path) for stamp, path in images], [])
+    files = image_files(options.images, options.allow_outside)
+    names = [stamp_of_name(path.stem) for path in files]
+    unnamed = [path for path, name in zip(files, names) if name is None or name >= LARGEST_STAMP]
+    if unnamed and len(files) == len(table.rows):
+        return rows_in_order(table, files, stamps, options)
+    if unnamed:
+        raise DataError(unnamed[0], f'is not named by a stamp, and {table.path} has no column of files: say which by '
+                        f'--column file=NAME ({len(table.rows)} rows are not in the order of {len(files)} images)')
+    clocks = [clock_of(max(values), options) for values in (stamps, names)]
+    recording = Recording([Image(clocks[1].ns(stamp), path) for stamp, path in zip(names, files)], [])
     for row, stamp in zip(table.rows, stamps):
         fix = positions.fix(row, clocks[0].ns(stamp))
         if fix is not None:
             recording.fixes.append(fix)
     recording.notes.append(f'stamps: fixes in {clocks[0].unit}, images in {clocks[1].unit}')
+    return recording
+
+
+def rows_in_order(table: Table, files: List[Path], stamps: List[Decimal], options: argparse.Namespace) -> Recording:
+    """A row for each image, in the order of their names."""
+    positions, clock = Positions(table, options), clock_of(max(stamps), options)
+    recording = Recording([], [], notes=['guessed: the rows are those of the images, in the order of their names'])
+    for row, path, stamp in zip(table.rows, sorted(files, key=natural), stamps):
+        recording.images.append(Image(clock.ns(stamp), path))
+        fix = positions.fix(row, clock.ns(stamp))
+        if fix is not None:
+            recording.fixes.append(fix)
     return recording
 
 
@@ -239,6 +260,11 @@ def csv_table(options: argparse.Namespace) -> Recording:
         return rows_with_files(table, file_column, options)
     if stamp_column is not None:
         return rows_with_stamps(table, stamp_column, options)
-    header = f'columns: {", ".join(table.header)}' if table.header else 'no header'
-    raise DataError(table.path, f'has neither files nor stamps ({header}): say which by --column file=NAME or --column '
-                    'stamp=NAME')
+    files = image_files(options.images, options.allow_outside)
+    if len(files) != len(table.rows):
+        header = f'columns: {", ".join(table.header)}' if table.header else 'no header'
+        raise DataError(table.path, f'has neither files nor stamps ({header}): say which by --column file=NAME or '
+                        f'--column stamp=NAME ({len(table.rows)} rows are not in the order of {len(files)} images)')
+    recording = rows_in_order(table, files, [index * Decimal(options.period) for index in range(len(files))], options)
+    recording.notes.append(f'stamps: {options.period} s from row to row')
+    return recording

@@ -8,6 +8,7 @@ import os
 import struct
 import subprocess
 import sys
+import tempfile
 import unittest
 import zlib
 from pathlib import Path
@@ -15,6 +16,7 @@ from unittest import mock
 
 import cv2
 import numpy as np
+import PIL.Image
 import rosbag
 from program_runner import ProgramTest, run
 
@@ -88,6 +90,8 @@ class ImportTest(ProgramTest):
 
     def refused(self, words: tuple, *arguments, code: int = 1):
         """One line that holds these words, and no bag."""
+        if self.output.is_file():
+            self.output.unlink()
         self.assert_refused(self.start(*arguments), code, *words)
         self.assertEqual([path.name for path in self.folder.iterdir() if 'made.bag' in path.name], [])
 
@@ -308,6 +312,201 @@ class CsvTest(ImportTest):
             self.refused(words, 'csv', self.write('p.csv', text), '--images', self.images)
 
 
+    def test_rows_in_the_order_of_the_images(self):
+        for number in (9, 10, 11):
+            self.picture(f'frame{number}.png')
+        for text, said, stamps in (('x,y\n1,5\n2,6\n3,7\n', '2 s from row to row', [0, 2, 4]),
+                                   ('t,x,y\n7,1,5\n8.5,2,6\n9,3,7\n', 'in the order of their names', [0, 1.5, 2])):
+            result = self.start('csv', self.write('p.csv', text), '--images', self.images, '--period', 2)
+            self.assertIn(said, result.stdout, result.stderr)
+            topics = messages(self.output)
+            np.testing.assert_allclose(self.places(topics[FIXES]), [(1, 5), (2, 6), (3, 7)], atol=2e-3)
+            times = [image.header.stamp.to_sec() for image in topics[IMAGES]]
+            np.testing.assert_allclose(np.array(times) - times[0], stamps, atol=1e-6)
+
+
+GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>
+<trkpt lat="48.5" lon="9.0"><ele>400</ele><time>2024-06-01T10:00:00Z</time></trkpt>
+<trkpt lat="48.5001" lon="9.0"><time>2024-06-01T10:00:10.500Z</time></trkpt>
+<trkpt lat="48.5002" lon="9.0001"><time>2024-06-01T12:00:20+02:00</time></trkpt></trkseg></trk></gpx>"""
+GPX_START_S = 1717236000
+
+
+class PhotosTest(ImportTest):
+    """Photographs of a walk, by EXIF or by their names, beside a GPX file or with positions of their own."""
+
+    def photo(self, name: str, taken: str, place: tuple = None, zone: str = None):
+        """A JPEG with EXIF. `place`: latitude and longitude, each as degrees, minutes and seconds with its sign."""
+        exif = PIL.Image.Exif()
+        exif[0x8769] = {0x9003: taken, **({0x9011: zone} if zone else {})}
+        if place:
+            (north, latitude), (east, longitude) = place
+            exif[0x8825] = {1: north, 2: latitude, 3: east, 4: longitude, 5: b'\0', 6: 401.5, 31: 4.0}
+        PIL.Image.fromarray(np.full((60, 80, 3), 90, np.uint8)).save(self.images / name, exif=exif)
+
+    def test_positions_of_exif(self):
+        for number, seconds in ((2, '05'), (10, '07')):
+            self.photo(f'{number}.jpg', f'2024:06:01 10:00:{seconds}',
+                       (('S', (48.0, 30.0, 36.0)), ('E', (9.0, 0.0, 0.0))))
+        self.photo('11.jpg', '2024:06:01 10:00:09')
+        result = self.start('photos', self.images)
+        self.assertIn('1 of 3 photographs have no position', result.stdout, result.stderr)
+        topics = messages(self.output)
+        self.assertEqual([image.header.stamp.to_sec() - GPX_START_S for image in topics[IMAGES]], [5, 7, 9])
+        fix = topics[FIXES][0]
+        self.assertAlmostEqual(fix.latitude, -48.51)
+        self.assertEqual((fix.longitude, fix.altitude, fix.position_covariance[0]), (9.0, 401.5, 16.0))
+
+    def test_a_track_beside_a_camera_of_another_time_zone(self):
+        for seconds in (2, 9):
+            self.photo(f'{seconds}.jpg', f'2024:06:01 12:00:{seconds:02d}')
+        track = self.write('walk.gpx', GPX)
+        result = self.start('photos', self.images, '--gpx', track)
+        self.assertIn('guessed: the clock of the camera is 2 h ahead of', result.stdout, result.stderr)
+        topics = messages(self.output)
+        self.assertEqual([image.header.stamp.to_sec() - GPX_START_S for image in topics[IMAGES]], [2, 9])
+        self.assertEqual([fix.header.stamp.to_sec() - GPX_START_S for fix in topics[FIXES]], [0, 10.5, 20])
+        self.assertEqual(topics[FIXES][2].longitude, 9.0001)
+        for seconds in (2, 9):
+            self.photo(f'{seconds}.jpg', f'2024:06:01 12:00:{seconds:02d}', zone='+00:00')
+        self.refused(('walk.gpx', 'no time in common', '--start'), 'photos', self.images, '--gpx', track)
+
+    def test_names_that_are_times(self):
+        for name in ('frame_00_00_21.000.jpg', 'frame_00_00_21.500.jpg', 'frame_00_01_01.000.jpg'):
+            self.picture(name)
+        track = self.write('walk.gpx', GPX)
+        result = self.start('photos', self.images, '--gpx', track)
+        self.assertIn('guessed: the first is of the first point of the track', result.stdout, result.stderr)
+        self.assertEqual([image.header.stamp.to_sec() - GPX_START_S for image in messages(self.output)[IMAGES]],
+                         [0, 0.5, 40])
+        self.refused(('frame_00_01_01.000.jpg', 'both have the number 0', 'photos'), 'numbered_images', self.images,
+                     '--spacing', 1)
+
+    def test_smaller_images_a_calibration_and_a_mounting(self):
+        self.picture('20240601_100001.jpg', size=(60, 80))
+        self.picture('20240601_100002.png', size=(60, 80))
+        calibration = self.write('camera.yaml', CALIBRATION)
+        topics = self.imported('photos', self.images, '--gpx', self.write('walk.gpx', GPX), '--width', 40,
+                               '--camera-info', calibration, '--mount', 'left')
+        shapes = [cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_UNCHANGED).shape
+                  for image in topics[IMAGES]]
+        self.assertEqual(shapes, [(30, 40), (30, 40)])
+        info = topics['/stereo/left/camera_info'][0]
+        self.assertEqual((info.width, info.height, info.K[0], info.K[2], info.K[8]), (40, 30, 50, 19.75, 1))
+        camera, antenna = topics['/tf_static'][0].transforms
+        self.assertEqual((camera.header.frame_id, camera.child_frame_id, antenna.child_frame_id),
+                         ('base_link', 'stereo_left', 'gps'))
+        q = camera.transform.rotation
+        # The optical axis, z of the image, points to the left of the robot.
+        self.assertAlmostEqual(2 * (q.y * q.z - q.x * q.w), 1)
+
+    def test_what_is_wrong_is_named(self):
+        self.picture('a.jpg')
+        self.refused(('a.jpg: has no time', 'frame_00_00_21.000'), 'photos', self.images)
+        (self.images / 'a.jpg').rename(self.images / '20240601_100001.jpg')
+        self.refused(('has no photograph with a position', '--gpx'), 'photos', self.images)
+        for text, words in (('<gpx', 'is not GPX'), ('<gpx/>', 'has no point with a time'),
+                            (GPX.replace('48.5001', '148.5'), 'point 2: lat is not a number from -90 to 90')):
+            self.refused((f'walk.gpx: {words}',), 'photos', self.images, '--gpx', self.write('walk.gpx', text))
+        for mount in (('up',), ('1', '2'), ('0', '0', '0', '7', '0', '0')):
+            self.refused(('--mount',), 'photos', self.images, '--mount', *mount, code=2)
+        self.refused(('a.mcap: is a bag of ROS 2', f'rosbags-convert --src {self.folder} --dst a.bag'), 'photos',
+                     self.folder / 'a.mcap')
+
+
+CALIBRATION = """image_width: 80
+image_height: 60
+camera_name: c
+distortion_model: plumb_bob
+camera_matrix: {rows: 3, cols: 3, data: [100, 0, 40, 0, 100, 30, 0, 0, 1]}
+distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}
+rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}
+projection_matrix: {rows: 3, cols: 4, data: [100, 0, 40, 0, 0, 100, 30, 0, 0, 0, 1, 0]}
+"""
+
+
+def box(kind: bytes, *content: bytes) -> bytes:
+    """Of ISO 14496-12."""
+    data = b''.join(content)
+    return struct.pack('>I4s', len(data) + 8, kind) + data
+
+
+def entry(key: bytes, kind: bytes, size: int, data: bytes) -> bytes:
+    """Of GoPro's metadata format."""
+    return struct.pack('>4scBH', key, kind, size, len(data) // max(1, size)) + data + bytes(-len(data) % 4)
+
+
+def gopro_payload(places: list, fix: int = 3) -> bytes:
+    """A second of positions, latitude and longitude in degrees."""
+    rows = b''.join(struct.pack('>5i', round(1e7 * latitude), round(1e7 * longitude), 400500, 0, 0)
+                    for latitude, longitude in places)
+    scale = struct.pack('>5i', 10**7, 10**7, 1000, 1000, 100)
+    stream = (entry(b'GPSF', b'L', 4, struct.pack('>I', fix)) + entry(b'SCAL', b'l', 4, scale)
+              + entry(b'GPS5', b'l', 20, rows))
+    return entry(b'DEVC', b'\0', 1, entry(b'STRM', b'\0', 1, stream))
+
+
+class VideoTest(ImportTest):
+    """A video as a GoPro writes it."""
+
+    def setUp(self):
+        super().setUp()
+        self.video = self.folder / 'ride.mp4'
+        writer = cv2.VideoWriter(str(self.video), cv2.VideoWriter_fourcc(*'mp4v'), 10, (64, 48))
+        for number in range(30):
+            writer.write(np.full((48, 64, 3), 8 * number, np.uint8))
+        writer.release()
+
+    def add_track(self, payloads: list, created_s: int) -> None:
+        """A track of one sample a second, and when the video was made."""
+        data = self.video.read_bytes()
+        at = data.rindex(b'moov') - 4
+        moov = bytearray(data[at + 8:at + struct.unpack_from('>I', data, at)[0]])
+        struct.pack_into('>I', moov, moov.index(b'mvhd') + 8, created_s + 2082844800)
+        track = b''.join(payloads)
+        count = len(payloads)
+        table = box(b'stbl', box(b'stsd', bytes(4), struct.pack('>I', 1), box(b'gpmd', bytes(8))),
+                    box(b'stts', bytes(4), struct.pack('>III', 1, count, 1000)),
+                    box(b'stsc', bytes(4), struct.pack('>IIII', 1, 1, count, 1)),
+                    box(b'stsz', bytes(4), struct.pack('>II', 0, count),
+                        *(struct.pack('>I', len(one)) for one in payloads)),
+                    box(b'stco', bytes(4), struct.pack('>II', 1, at + 8)))
+        media = box(b'mdia', box(b'mdhd', bytes(12), struct.pack('>II', 1000, 1000 * count), bytes(4)),
+                    box(b'minf', table))
+        self.video.write_bytes(data[:at] + box(b'mdat', track) + box(b'moov', bytes(moov), box(b'trak', media)))
+
+    def test_a_video_with_its_own_track(self):
+        self.add_track([gopro_payload([(48.5, 9.0), (48.6, -9.0)], fix=0),
+                        gopro_payload([(48.5, 9.0), (48.5001, -9.0)]), gopro_payload([(48.5002, 9.0)])], GPX_START_S)
+        result = self.start('video', self.video, '--width', 32)
+        self.assertIn('by the time at which it says to be made', result.stdout, result.stderr)
+        topics = messages(self.output)
+        stamps = [image.header.stamp.to_sec() - GPX_START_S for image in topics[IMAGES]]
+        np.testing.assert_allclose(stamps, [0, 0.5, 1, 1.5, 2, 2.5], atol=1e-3)
+        pictures = [cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_GRAYSCALE) for image in topics[IMAGES]]
+        self.assertEqual({picture.shape for picture in pictures}, {(24, 32)})
+        np.testing.assert_allclose([picture.mean() for picture in pictures], [0, 40, 80, 120, 160, 200], atol=8)
+        np.testing.assert_allclose([(fix.header.stamp.to_sec() - GPX_START_S, fix.latitude, fix.longitude, fix.altitude)
+                                    for fix in topics[FIXES]],
+                                   [(1, 48.5, 9.0, 400.5), (1.5, 48.5001, -9.0, 400.5), (2, 48.5002, 9.0, 400.5)])
+
+    def test_a_video_beside_a_track(self):
+        result = self.start('video', self.video, '--gpx', self.write('ride.gpx', GPX), '--period', 1)
+        self.assertIn('guessed: at the first point of the track', result.stdout, result.stderr)
+        topics = messages(self.output)
+        self.assertEqual([image.header.stamp.to_sec() - GPX_START_S for image in topics[IMAGES]], [0, 1, 2])
+        self.assertEqual(len(topics[FIXES]), 3)
+
+    def test_what_is_wrong_is_named(self):
+        self.refused(('ride.mp4: has no track of its own (GPMF)', '--gpx'), 'video', self.video)
+        self.refused(('none.mp4: there is no such file',), 'video', self.folder / 'none.mp4')
+        track = self.write('ride.gpx', GPX)
+        self.refused(('text.mp4: is not a video',), 'video', self.write('text.mp4', 'no video'), '--gpx', track)
+        self.add_track([entry(b'DEVC', b'\0', 1, b'GPS5l\xff\xff\xff')], GPX_START_S)
+        self.refused(('ride.mp4: is a broken MP4',), 'video', self.video)
+        self.assertEqual(list(Path(tempfile.gettempdir()).glob('import_recording.*')), [])
+
+
 class KittiTest(ImportTest):
     """A sequence: the camera looks north at first, then turns right by 90 degrees."""
 
@@ -344,6 +543,13 @@ class KittiTest(ImportTest):
         fixes = self.imported('kitti_odometry', self.sequence, '--camera', 1)[FIXES]
         # Half a metre to the right: east, and south once it looks east.
         np.testing.assert_allclose(self.places(fixes), [(.5, 0), (.5, 5), (1, 8.5)], atol=2e-3)
+
+    def test_poses_without_times(self):
+        (self.sequence / 'times.txt').unlink()
+        result = self.start('kitti_odometry', self.sequence)
+        self.assertIn('guessed: 10 images a second', result.stdout, result.stderr)
+        stamps = [image.header.stamp.to_sec() for image in messages(self.output)[IMAGES]]
+        np.testing.assert_allclose(np.array(stamps) - stamps[0], [0, 0.1, 0.2], atol=1e-6)
 
     def test_what_is_wrong_is_named(self):
         arguments = ('kitti_odometry', self.sequence)
