@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <stdexcept>
 #include <system_error>
 #include <thread>
 
@@ -18,6 +19,7 @@
 #include "apps/app_support.h"
 #include "base/files.h"
 #include "base/text.h"
+#include "features/vector_target.h"
 
 namespace visual_localization::apps {
 namespace {
@@ -283,14 +285,16 @@ int run(CLI::App& app, int argc, char** argv, void (*body)(const Options&)) {
   std::set_terminate(endWithoutMemory);
   Options options;
   declareOptions(app, options);
-  app.set_version_flag("--version", app.get_name() + " " + VISUAL_LOCALIZATION_VERSION);
   try {
+    app.set_version_flag("--version", app.get_name() + " " + VISUAL_LOCALIZATION_VERSION + " (" + vectorTarget() + ")");
     const auto arguments = withoutRosNames(argc, argv);
     app.parse(static_cast<int>(arguments.size()), arguments.data());
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
     return fail(app, std::string(error.what()) + " (see --help)", kBadUsage);
+  } catch (const std::invalid_argument& error) {
+    return fail(app, error.what(), kBadUsage);
   }
   removePartialFilesOnSignals();
   return ended(runBody(app, body, options));

@@ -267,6 +267,17 @@ class ProgramsTest(ProgramTest):
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertIn(program, result.stdout)
 
+    def test_a_vector_target_is_shown_forced_and_refused(self):
+        def with_target(target, program, *arguments):
+            return run(program, *arguments, env={**os.environ, 'VISUAL_LOCALIZATION_TARGET': target})
+
+        for program in ('map_builder', 'map_edit', 'map_info', 'localize', 'evaluate'):
+            forced = with_target('portable', program, '--version')
+            self.assertRegex(forced.stdout, program + r' [\d.]+ \((portable|SSE2|NEON)\)\n')
+            wrong = with_target('AVX9', program, '--version')
+            self.assert_refused(wrong, 2, "VISUAL_LOCALIZATION_TARGET: 'AVX9' is not one of portable")
+        self.assert_refused(with_target('', 'map_info', MAP), 2, "'' is not one of portable")
+
 
 if __name__ == '__main__':
     os.environ.pop('ROS_MASTER_URI', None)
