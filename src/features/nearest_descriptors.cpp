@@ -4,6 +4,7 @@
 #define HWY_TARGET_INCLUDE "features/nearest_descriptors.cpp"
 #include "features/nearest_descriptors.h"
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -84,25 +85,27 @@ struct Rows {
   }
 };
 
-/// Memory that is kept from call to call: for each descriptor of A, filled up to whole tiles, ...
-template <class Element>
+/// Memory that is kept from call to call. Of A, which is often compared with one B after the other: ...
+template <class Row>
 struct Workspace {
-  hwy::AlignedFreeUniquePtr<Element[]> packed;
-  hwy::AlignedFreeUniquePtr<float[]> y_px;
+  LocalFeatures a;  ///< a copy, by which it is known again
+  bool is_packed = false;
+  hwy::AlignedFreeUniquePtr<typename Row::Packed[]> packed;
+  hwy::AlignedFreeUniquePtr<float[]> y_px;  ///< of each descriptor, filled up to whole tiles, ...
   hwy::AlignedFreeUniquePtr<float[]> inverse_norms;
+  std::vector<Rows> tiles;  ///< ... each tile,
+  std::vector<std::uint32_t> order_a;
+  std::vector<std::uint32_t> order_b;  ///< and of the last pair
   hwy::AlignedFreeUniquePtr<float[]> best;
   hwy::AlignedFreeUniquePtr<float[]> second;
   hwy::AlignedFreeUniquePtr<std::int32_t[]> index;
-  std::vector<Rows> rows;              ///< ... each tile,
-  std::vector<std::uint32_t> order_a;  ///< and each image
-  std::vector<std::uint32_t> order_b;
   std::size_t capacity = 0;
   std::size_t elements = 0;
 
   void reserve(std::size_t count, std::size_t dimension) {
     if (count * dimension > elements) {
       elements = 2 * count * dimension;
-      packed = hwy::AllocateAligned<Element>(elements);
+      packed = hwy::AllocateAligned<typename Row::Packed>(elements);
     }
     if (count <= capacity) return;
     capacity = 2 * count;
@@ -114,34 +117,52 @@ struct Workspace {
   }
 };
 
+/// What is packed of both is the same.
+bool isSame(const LocalFeatures& one, const LocalFeatures& other) {
+  return one.keypoints().y_px() == other.keypoints().y_px() && one.bytes() == other.bytes() &&
+         one.floats() == other.floats();
+}
+
+/// Puts the descriptors of A side by side, unless they are.
+template <bool kWhole, class Row, class InverseNorm>
+void prepare(const LocalFeatures& a, InverseNorm inverse_norm, std::size_t padded, Workspace<Row>& work) {
+  if (work.is_packed && isSame(a, work.a)) return;
+  work.is_packed = false;
+  work.reserve(padded, a.form().dimension);
+  orderBy<kWhole>(a, work.order_a);
+  pack(a, work.order_a, padded, work.packed.get(), static_cast<const Row*>(nullptr));
+  const std::size_t lanes = hn::Lanes(Ints());
+  work.tiles.assign(padded / lanes, Rows());
+  for (std::size_t i = 0; i < padded; ++i) {
+    const bool is_filled = i < a.size();
+    work.y_px[i] = is_filled ? a.keypoints().y_px()[work.order_a[i]] : std::numeric_limits<float>::quiet_NaN();
+    work.inverse_norms[i] = is_filled ? inverse_norm(work.order_a[i]) : 0.0F;
+    if (is_filled) work.tiles[i / lanes].add({work.y_px[i], work.y_px[i]});
+  }
+  work.a = a;
+  work.is_packed = true;
+}
+
 /// Of the whole image, or of rows no farther than `max_dy_px` and then the nearest alone: tiles that lie farther are
-/// passed over. `inverse_norm_a`, `inverse_norm_b`: of a descriptor.
-template <bool kWhole, class RowOf, class InverseNorm>
-void findNearestOf(const LocalFeatures& a, const LocalFeatures& b, InverseNorm inverse_norm_a,
-                   InverseNorm inverse_norm_b, float max_dy_px, NearestDescriptors& nearest) {
+/// passed over. `inverse_norm_a`, `inverse_norm_b`: of a descriptor. Not inlined: where `work` is seen to be a thread's
+/// own, its address is asked for in each tile.
+template <bool kWhole, class Row, class InverseNorm>
+HWY_NOINLINE void findNearestIn(Workspace<Row>& work, const LocalFeatures& a, const LocalFeatures& b,
+                                InverseNorm inverse_norm_a, InverseNorm inverse_norm_b, float max_dy_px,
+                                NearestDescriptors& nearest) {
   const Floats floats;
   const Ints ints;
   const std::size_t lanes = hn::Lanes(ints);
   const std::size_t padded = (a.size() + lanes - 1) / lanes * lanes;
   const std::size_t dimension = a.form().dimension;
-  static thread_local Workspace<typename RowOf::Packed> kept;
-  Workspace<typename RowOf::Packed>& work = kept;
-  work.reserve(padded, dimension);
-  orderBy<kWhole>(a, work.order_a);
+  prepare<kWhole>(a, inverse_norm_a, padded, work);
   orderBy<kWhole>(b, work.order_b);
-  RowOf rows[kRows];
-  pack(a, work.order_a, padded, work.packed.get(), rows);
-  work.rows.assign(padded / lanes, Rows());
-  for (std::size_t i = 0; i < padded; ++i) {
-    const bool is_filled = i < a.size();
-    work.y_px[i] = is_filled ? a.keypoints().y_px()[work.order_a[i]] : std::numeric_limits<float>::quiet_NaN();
-    work.inverse_norms[i] = is_filled ? inverse_norm_a(work.order_a[i]) : 0.0F;
-    if (is_filled) work.rows[i / lanes].add({work.y_px[i], work.y_px[i]});
-    work.best[i] = work.second[i] = -1.0F;
-    work.index[i] = 0;
-  }
+  std::fill_n(work.best.get(), padded, -1.0F);
+  std::fill_n(work.second.get(), padded, -1.0F);
+  std::fill_n(work.index.get(), padded, 0);
   nearest.of_a.assign(a.size(), TwoNearest());
   nearest.of_b.assign(b.size(), TwoNearest());
+  Row rows[kRows];
   float y_px[kRows] = {};
   float inverse_norms[kRows] = {};
   for (std::size_t first = 0; first < b.size() && padded > 0; first += kRows) {
@@ -180,8 +201,8 @@ void findNearestOf(const LocalFeatures& a, const LocalFeatures& b, InverseNorm i
     hn::Vec<Floats> products[2 * kRows];
     for (std::size_t i = 0; i < padded; i += 2 * lanes) {
       const bool has_next = i + lanes < padded;
-      Rows of_tiles = work.rows[i / lanes];
-      if (has_next) of_tiles.add(work.rows[i / lanes + 1]);
+      Rows of_tiles = work.tiles[i / lanes];
+      if (has_next) of_tiles.add(work.tiles[i / lanes + 1]);
       if (!kWhole && !of_tiles.isWithin(max_dy_px, of_rows)) continue;
       if (has_next) {
         multiply<2>(rows, work.packed.get() + i * dimension, dimension, products);
@@ -202,6 +223,13 @@ void findNearestOf(const LocalFeatures& a, const LocalFeatures& b, InverseNorm i
     const std::uint32_t index = work.order_b[static_cast<std::size_t>(work.index[i])];
     nearest.of_a[work.order_a[i]] = {work.best[i], work.second[i], index};
   }
+}
+
+template <bool kWhole, class Row, class InverseNorm>
+void findNearestOf(const LocalFeatures& a, const LocalFeatures& b, InverseNorm inverse_norm_a,
+                   InverseNorm inverse_norm_b, float max_dy_px, NearestDescriptors& nearest) {
+  static thread_local Workspace<Row> work;
+  findNearestIn<kWhole>(work, a, b, inverse_norm_a, inverse_norm_b, max_dy_px, nearest);
 }
 
 struct OwnNorm {

@@ -82,12 +82,20 @@ Eigen::MatrixXf learnWords(Eigen::MatrixXf& descriptors) {
   return Eigen::Map<const Eigen::MatrixXf>(centres.ptr<float>(), descriptors.rows(), VladVocabulary::kWords);
 }
 
+/// Half of the squared length of each.
+Eigen::VectorXf halvedSquares(const Eigen::MatrixXf& words) {
+  Eigen::VectorXf halves(words.cols());
+  for (Eigen::Index i = 0; i < words.cols(); ++i) halves[i] = 0.5F * words.col(i).squaredNorm();
+  return halves;
+}
+
 /// Of a unit descriptor. Half of the squared distance is what is smallest, but for the length of the descriptor.
-Eigen::Index nearestWord(const Eigen::MatrixXf& words, const Eigen::VectorXf& descriptor) {
+Eigen::Index nearestWord(const Eigen::MatrixXf& words, const Eigen::VectorXf& halves,
+                         const Eigen::VectorXf& descriptor) {
   Eigen::Index nearest = 0;
   float least = std::numeric_limits<float>::max();
   for (Eigen::Index i = 0; i < words.cols(); ++i) {
-    const float distance = 0.5F * words.col(i).squaredNorm() - words.col(i).dot(descriptor);
+    const float distance = halves[i] - words.col(i).dot(descriptor);
     if (distance >= least) continue;
     least = distance;
     nearest = i;
@@ -97,9 +105,10 @@ Eigen::Index nearestWord(const Eigen::MatrixXf& words, const Eigen::VectorXf& de
 
 /// Directions in which residuals differ most, a column each, the first the most.
 Eigen::MatrixXf learnComponents(Eigen::MatrixXf descriptors, const Eigen::MatrixXf& words) {
+  const Eigen::VectorXf halves = halvedSquares(words);
   for (auto descriptor : descriptors.colwise()) {
     const Eigen::VectorXf copy = descriptor;
-    descriptor -= words.col(nearestWord(words, copy));
+    descriptor -= words.col(nearestWord(words, halves, copy));
   }
   const Eigen::MatrixXf covariance = descriptors * descriptors.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> solver(covariance);
@@ -203,10 +212,11 @@ Eigen::VectorXf VladVocabulary::sums(const LocalFeatures& features) const {
   }
   Eigen::MatrixXf residuals = Eigen::MatrixXf::Zero(tables_.words.rows(), kBlocks);
   Eigen::VectorXf descriptor(tables_.words.rows());
+  const Eigen::VectorXf halves = halvedSquares(tables_.words);
   std::size_t i = 0;
   for (const Keypoint& keypoint : features.keypoints()) {
     copyUnit(features, i++, descriptor);
-    const Eigen::Index word = nearestWord(tables_.words, descriptor);
+    const Eigen::Index word = nearestWord(tables_.words, halves, descriptor);
     residuals.col(cellOf(keypoint, image_size_) * kWords + word) += descriptor - tables_.words.col(word);
   }
   Eigen::MatrixXf projected = tables_.components.transpose() * residuals;

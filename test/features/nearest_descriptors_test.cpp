@@ -4,6 +4,7 @@
 #include <iterator>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -167,6 +168,27 @@ TEST(NearestDescriptors, WithinRowsLookNoFarther) {
   EXPECT_EQ(nearest.of_b[0].best, -1.0F);
   findNearestWithin(a, b, 41.0F, nearest);
   EXPECT_EQ(nearest.of_a[0].index, 0U);
+}
+
+TEST(NearestDescriptors, TheFirstImageMayStayOrChangeOnEveryCpu) {
+  test::forEachTarget([] {
+    std::mt19937 random(5);
+    LocalFeatures a = placed(randomDescriptors(90, 60, 5, random), random);
+    for (const std::size_t count : {70, 33, 110}) {
+      for (int i = 0; i < 3; ++i) {
+        const LocalFeatures b = placed(randomDescriptors(90, 60, 5, random), random);
+        expectWithinLikePlain(a, b, 40.0F);
+        expectLikePlain(a, b);
+        expectWithinLikePlain(LocalFeatures(a), a, 40.0F);
+      }
+      Keypoints keypoints = placed(randomDescriptors(count, 60, 5, random), random).keypoints();
+      std::vector<std::uint8_t> descriptors = randomDescriptors(count, 60, 5, random).bytes();
+      a.swapIn(keypoints, descriptors);  // in the same memory
+    }
+    const LocalFeatures moved = std::move(a);
+    expectWithinLikePlain(a, moved, 40.0F);  // NOLINT(bugprone-use-after-move): it is empty
+    expectWithinLikePlain(moved, a, 40.0F);
+  });
 }
 
 TEST(NearestDescriptors, NothingHasNoNeighbours) {
