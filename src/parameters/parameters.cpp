@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/text.h"
-#include "parameters/former_parameters.h"
 
 namespace visual_localization {
 namespace {
@@ -116,24 +115,13 @@ class Assigner : public ParameterVisitor {
 
   void refuseUnknown() const {
     for (const auto& [name, value] : values_) {
-      if (known_.count(name) != 0 || isFormer(name, value)) continue;
+      if (known_.count(name) != 0) continue;
       throw ParameterError("parameter '" + name + "' = " + toString(value) + " is unknown; known are " +
                            joined(known_));
     }
   }
 
  private:
-  /// Whether it is a constant now, and has that value.
-  static bool isFormer(const std::string& name, const ParameterValue& value) {
-    const auto former = formerParameters().find(name);
-    if (former == formerParameters().end()) return false;
-    const auto* integer = std::get_if<std::int64_t>(&value);
-    const ParameterValue given = integer == nullptr ? value : static_cast<double>(*integer);
-    if (given == former->second) return true;
-    throw ParameterError("parameter '" + name + "' = " + toString(value) + " can no longer be set: it is always " +
-                         toString(former->second));
-  }
-
   const ParameterValue* find(const std::string& name) {
     known_.insert(name);
     const auto found = values_.find(name);

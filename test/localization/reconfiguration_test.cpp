@@ -1,20 +1,11 @@
-#include <map>
 #include <set>
 #include <string>
 
 #include <gtest/gtest.h>
 
-#include "geometry/rays.h"
-#include "geometry/reconstruction.h"
-#include "geometry/session_geometry.h"
-#include "localization/pose_predictor.h"
-#include "localization/pose_verifier.h"
-#include "parameters/former_parameters.h"
 #include "test/localization/wall_street.h"
 #include "test/support/swarm_config.h"
-#include "visual_localization/features/front_end.h"
 #include "visual_localization/localization/localizer.h"
-#include "visual_localization/map/map_builder.h"
 #include "visual_localization/parameters/parameters.h"
 
 namespace visual_localization {
@@ -117,87 +108,6 @@ TEST(Sweep, AReconfigurationSweepsTheImageAnew) {
   for (int i = 0; i < 200; ++i) drawn.insert(sweep.draw(scores, random));
   EXPECT_EQ(drawn.size(), 5U);
   EXPECT_LT(*drawn.rbegin(), map->size());
-}
-
-TEST(FormerParameters, HaveTheValuesThatAreUsed) {
-  const LocalizerConfig config;
-  const std::map<std::string, double> in_use{
-      {"bayes/comparisons", config.bayes.comparisons},
-      {"bayes/exponent", 0.0},  // what suits the kind of features
-      {"bayes/first_comparisons", config.bayes.first_comparisons},
-      {"bayes/uniform", config.bayes.uniform},
-      {"dpso/best_particles", config.dpso.best_particles},
-      {"dpso/corridor", config.dpso.corridor_m},
-      {"dpso/exclusion_radius", config.dpso.exclusion_radius_m},
-      {"dpso/mode_radius", config.dpso.mode_radius_m},
-      {"dpso/rival_share", config.dpso.rival_share},
-      {"geometry/epipolar_tolerance", PairRule::kTolerance_px},
-      {"geometry/fix_correlation", Reconstruction::kFixCorrelation},
-      {"geometry/fix_loss", Reconstruction::kFixLoss},
-      {"geometry/keypoint_sigma", kKeypointSigma_px},
-      {"geometry/match_ratio", PairRule::kMatchRatio},
-      {"geometry/max_residual", Reconstruction::kMaxResidual},
-      {"geometry/min_landmarks", Reconstruction::kMinLandmarks},
-      {"geometry/min_pair_inliers", PairRule::kMinInliers},
-      {"geometry/window", static_cast<double>(GeometryConfig().window)},
-      {"max_image_gap", kMaxImageGap_s},
-      {"metric/keypoint_sigma", kKeypointSigma_px},
-      {"metric/match_ratio", PoseVerifier::kMatchRatio},
-      {"metric/max_focal_error", config.metric.max_focal_error},
-      {"metric/max_gap", PosePredictor::kMaxGap_s},
-      {"metric/max_prediction_error", config.metric.max_prediction_error_m},
-      {"metric/max_sigma", config.metric.max_sigma_m},
-      {"metric/min_inliers", config.metric.min_inliers},
-      {"metric/min_inliers_predicted", config.metric.min_inliers_predicted},
-      {"metric/sigma_factor", config.metric.sigma_factor},
-      {"metric/tolerance", PoseVerifier::kTolerance_px},
-      {"metric/training_images", config.metric.training_images},
-      {"min_position_std", LocalizerConfig::kMinPositionStd_m},
-      {"min_yaw_std", LocalizerConfig::kMinYawStd_rad},
-      {"odometry/max_distance", config.odometry.max_distance_m},
-      {"odometry/max_gap", config.odometry.max_gap_s},
-      {"odometry/max_speed", config.odometry.max_speed_mps},
-      {"odometry/share", config.odometry.share},
-      {"similarity/global_exponent", config.similarity.global_exponent},
-      {"similarity/global_recognised", config.similarity.global_recognised},
-      {"similarity/votes_exponent", config.similarity.votes_exponent},
-      {"similarity/votes_recognised", config.similarity.votes_recognised},
-      {"state/frozen_time", config.state.frozen_time_s},
-      {"state/images_to_confirm", config.state.images_to_confirm},
-      {"state/max_distance", config.state.max_distance_m},
-      {"state/max_step", config.state.max_step_m},
-      {"state/min_features", config.state.min_features},
-      {"state/min_global_similarity", config.state.min_global_similarity},
-      {"state/min_matches", config.state.min_matches},
-      {"state/min_place_ratio", config.state.min_place_ratio},
-      {"state/min_similarity", config.state.min_similarity},
-      {"state/off_map_images", config.state.off_map_images},
-      {"state/window", config.state.window},
-      {"sift/edge_threshold", SiftConfig().edge_threshold},
-      {"sift/octave_layers", SiftConfig().octave_layers},
-      {"sift/sigma", SiftConfig().sigma_px},
-      {"state/motion_length", StateAssessor::kMotionLength},
-      {"state/sure_similarity", config.state.sure_similarity},
-  };
-  const std::set<std::string> seen_by_one_file_alone{"few_features",      "geometry/pair_span", "hybrid/sift_in_doubt",
-                                                     "learned/min_score", "map/preview_width",  "map/sift_backend",
-                                                     "max_fix_age",       "sift_backend",       "tf_smoothing"};
-  for (const auto& [name, value] : formerParameters()) {
-    if (seen_by_one_file_alone.count(name) > 0) continue;
-    ASSERT_EQ(in_use.count(name), 1U) << name;
-    EXPECT_EQ(std::get<double>(value), in_use.at(name)) << name;
-  }
-  EXPECT_EQ(formerParameters().size(), in_use.size() + seen_by_one_file_alone.size());
-}
-
-TEST(FormerParameters, AreDeclaredNoMore) {
-  LocalizerConfig config;
-  MapBuilderConfig builder;
-  const auto declared = parameters::values([&config](ParameterVisitor& visitor) { config.declare(visitor); });
-  const auto of_builder = parameters::values([&builder](ParameterVisitor& visitor) { builder.declare(visitor); });
-  for (const auto& [name, _] : formerParameters()) {
-    EXPECT_EQ(declared.count(name) + of_builder.count(name), 0U) << name;
-  }
 }
 
 }  // namespace

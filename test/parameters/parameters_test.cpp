@@ -152,23 +152,6 @@ TEST(Parameters, ARenamedParameterIsRefusedWithItsNewName) {
   EXPECT_EQ(refusalOfValues({{"engine/horses", 3.0}}), "parameter 'engine/horses' is renamed to 'engine/power'");
 }
 
-// A file that lists all parameters of an earlier version still starts, unless it sets what is a constant now.
-TEST(Parameters, AFormerParameterMayOnlyHaveItsValue) {
-  Engine engine;
-  assignParameters(engine,
-                   {{"engine/power", 20.0}, {"metric/tolerance", 3.0}, {"state/min_features", std::int64_t{10}}});
-  EXPECT_EQ(engine.power_w, 20.0);
-  assignParameters(engine, {{"metric/tolerance", std::int64_t{3}}});
-  EXPECT_EQ(refusalOfValues({{"metric/tolerance", 3.5}}),
-            "parameter 'metric/tolerance' = 3.5 can no longer be set: it is always 3");
-  EXPECT_EQ(refusalOfValues({{"metric/tolerance", std::string("3")}}),
-            "parameter 'metric/tolerance' = 3 can no longer be set: it is always 3");
-  assignParameters(engine, {{"sift_backend", std::string("native")}});
-  EXPECT_EQ(refusalOfValues({{"sift_backend", std::string("opencv")}}),
-            "parameter 'sift_backend' = opencv can no longer be set: it is always native");
-  EXPECT_THAT(refusalOfValues({{"metric/tolerances", 3.0}}), HasSubstr("is unknown"));
-}
-
 TEST(Parameters, SeveralDocumentsAreRefused) {
   for (const char* text : {"name: a\n---\nname: b\n", "---\n---\nname: b\n", "# nothing\n---\n~\n---\nname: b\n"}) {
     const TemporaryYaml yaml(text);
