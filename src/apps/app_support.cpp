@@ -37,34 +37,6 @@ void requireNoInput(const std::string& option, const std::string& output, const 
   }
 }
 
-NewFolder::NewFolder(std::string path) : path_(std::move(path)) {
-  std::error_code error;
-  made_ = fs::create_directory(path_, error);
-  if (!error && !fs::is_empty(path_, error) && !error) throw FileError(path_ + ": there is something in it already");
-  if (error) throw FileError((path_.empty() ? "''" : path_) + ": cannot be written: " + error.message());
-}
-
-NewFolder::~NewFolder() {
-  if (committed_) return;
-  files_.clear();
-  std::error_code ignored;
-  for (const std::string& name : names_) fs::remove(pathOf(name), ignored);
-  if (made_) fs::remove(path_, ignored);
-}
-
-PartialFile& NewFolder::add(const std::string& name) {
-  files_.push_back(std::make_unique<PartialFile>(pathOf(name)));
-  names_.push_back(name);
-  return *files_.back();
-}
-
-void NewFolder::commit() {
-  for (const auto& file : files_) file->commit();
-  committed_ = true;
-}
-
-std::string NewFolder::pathOf(const std::string& name) const { return (fs::path(path_) / name).string(); }
-
 std::string humanSize(double bytes) {
   static const std::array<const char*, 4> units{"B", "kB", "MB", "GB"};
   std::size_t unit = 0;

@@ -2,12 +2,9 @@
 
 #include <chrono>
 #include <cstddef>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include "base/files.h"
 
 namespace visual_localization::apps {
 
@@ -22,30 +19,6 @@ void warn(const std::string& text);
 
 /// Throws UsageError, naming the option, when the file to write is one of the files to read.
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
-
-/// Files in a folder of their own: all of them, or none and no folder either.
-class NewFolder {
- public:
-  /// Throws FileError unless the folder can be made or is empty.
-  explicit NewFolder(std::string path);
-  ~NewFolder();
-  NewFolder(const NewFolder&) = delete;
-  NewFolder& operator=(const NewFolder&) = delete;
-
-  /// Throws FileError.
-  PartialFile& add(const std::string& name);
-  /// Throws FileError.
-  void commit();
-
- private:
-  std::string pathOf(const std::string& name) const;
-
-  std::string path_;
-  bool made_ = false;
-  bool committed_ = false;
-  std::vector<std::string> names_;
-  std::vector<std::unique_ptr<PartialFile>> files_;
-};
 
 /// "1.2 kB", "3.4 MB".
 std::string humanSize(double bytes);

@@ -168,9 +168,6 @@ void declareOptions(CLI::App& app, MapInfoOptions& options) {
       ->capture_default_str();
   app.add_option("--export-geojson", options.geojson, "Write paths, weak stretches and images as GeoJSON (WGS84)");
   app.add_option("--export-csv", options.csv, "Write one line per image");
-  app.add_option("--export-colmap", options.colmap,
-                 "Write cameras, poses and landmarks into this new folder for COLMAP")
-      ->check(must([](const std::string& path) { return !path.empty(); }, "name a folder"));
 }
 
 void declareOptions(CLI::App& app, LocalizeOptions& options) {

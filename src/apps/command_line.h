@@ -52,7 +52,6 @@ struct MapInfoOptions {
   std::size_t few_features = SurveyConfig().few_features;
   std::string geojson;
   std::string csv;
-  std::string colmap;
 };
 
 struct LocalizeOptions {

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <functional>
-#include <map>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -17,43 +15,6 @@
 #include "visual_localization/map/training_map.h"
 
 namespace visual_localization::apps {
-
-/// What a model in the text format of COLMAP (colmap.github.io/format.html) holds.
-struct ColmapSummary {
-  std::size_t cameras = 0;
-  std::size_t images = 0;
-  std::size_t points = 0;
-  std::size_t observations = 0;
-  double error_px = 0.0;  ///< mean over the points of the mean distance of features and projections; -1: unknown
-};
-
-/// The three texts of a COLMAP model: cameras(), then image() of each image, then points(), which the images gather.
-class ColmapModel {
- public:
-  explicit ColmapModel(const TrainingMap& map);
-
-  std::string cameras();
-  /// Two lines; none for an image without geometry. Throws std::runtime_error when its features cannot be read.
-  std::string image(std::size_t i);
-  std::string points();
-  ColmapSummary summary() const { return summary_; }
-
- private:
-  /// A landmark and what the images that show it say.
-  struct Point {
-    Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-    std::vector<double> errors_px;  ///< of the observations that the lens model can project
-    std::string track;              ///< for each observation the image and its feature
-  };
-
-  void addFeatures(std::size_t i, const LocalFeatures& sift, const ImageGeometry& geometry, std::ostream& out);
-  void addObservation(std::size_t i, const Keypoint& at, const CameraPose& pose, const SeenLandmark& landmark);
-
-  const TrainingMap& map_;
-  std::vector<std::string> folders_;
-  std::map<std::uint32_t, Point> points_;
-  ColmapSummary summary_;
-};
 
 /// What was found out about a map.
 struct MapFindings {
@@ -77,11 +38,6 @@ void writeCsv(const TrainingMap& map, const MapFindings& findings, const TextSin
 
 /// Paths, weak stretches and gaps as lines, images as points; WGS84.
 void writeGeoJson(const TrainingMap& map, const MapFindings& findings, const TextSink& write);
-
-/// Into a folder that is new or empty: a camera for each calibrated session, images with a geometry as
-/// SESSION/STAMP.png, landmarks as points, metres of the map frame. Throws std::runtime_error, in one line, when
-/// something is in the folder, the map has no landmarks or cannot be read; then it leaves nothing.
-ColmapSummary writeColmap(const TrainingMap& map, const std::string& folder);
 
 /// What the builder has to say of a recording, in one line.
 struct Remark {

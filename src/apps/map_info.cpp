@@ -1,8 +1,6 @@
 #include <filesystem>
-#include <iomanip>
 #include <iostream>
 #include <limits>
-#include <sstream>
 #include <string>
 
 #include "apps/app_support.h"
@@ -24,15 +22,6 @@ std::size_t mostImages(const MapInfoOptions& options) {
   constexpr std::size_t kMostOfALargeMap = 2000;
   const bool in_memory = std::filesystem::file_size(options.map) <= MapLoading().cache_bytes;
   return options.check || in_memory ? std::numeric_limits<std::size_t>::max() : kMostOfALargeMap;
-}
-
-std::string exportColmap(const TrainingMap& map, const std::string& folder) {
-  const ColmapSummary model = writeColmap(map, folder);
-  std::ostringstream text;
-  text << "\ncolmap:      " << model.cameras << (model.cameras == 1 ? " camera, " : " cameras, ") << model.images
-       << " images, " << model.points << " points, " << model.observations << " observations, mean reprojection error "
-       << std::setprecision(6) << model.error_px << " px\n";
-  return text.str();
 }
 
 /// Nothing without a path.
@@ -57,7 +46,6 @@ void showMap(const MapInfoOptions& options) {
   if (!options.csv.empty()) requireNoInput("--export-csv", options.csv, {options.map});
   if (options.check) checkMap(options.map);
   const auto map = loadMap(options.map);
-  const std::string exported = options.colmap.empty() ? "" : exportColmap(*map, options.colmap);
   MapFindings findings;
   findings.config.few_features = options.few_features;
   findings.survey = survey(*map, findings.config);
@@ -66,7 +54,6 @@ void showMap(const MapInfoOptions& options) {
   if (options.ambiguity) findings.ambiguity = lookForAmbiguousPlaces(*map);
   printMapReport(std::cout, options.map, *map, findings);
   if (options.check) std::cout << "\ncheck:       ok\n";
-  std::cout << exported;
   exportFile(options.geojson, *map, findings, writeGeoJson);
   exportFile(options.csv, *map, findings, writeCsv);
 }

@@ -251,15 +251,6 @@ class ProgramsTest(ProgramTest):
         self.assertIn('%d of 320x240' % kept, result.stdout)
         self.assertIn('FeatureCollection', geojson.read_text(encoding='utf-8'))
 
-    def test_the_colmap_model_is_new_and_whole(self):
-        model = self.folder / 'model'
-        result = run('map_info', MAP, '--export-colmap', model)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn('colmap:      1 camera, ', result.stdout)
-        self.assertEqual(sorted(path.name for path in model.iterdir()), ['cameras.txt', 'images.txt', 'points3D.txt'])
-        self.assert_refused(run('map_info', MAP, '--export-colmap', model), 1, 'something in it')
-        self.assert_refused(run('map_info', MAP, '--export-colmap', ''), 2, '--export-colmap')
-
     def test_help_and_version(self):
         for program in ('map_builder', 'map_info', 'localize', 'evaluate'):
             for option in ('--help', '--version'):
