@@ -1,6 +1,7 @@
 #include <functional>
 #include <iostream>
 #include <map>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include <ros/spinner.h>
 #include <ros/this_node.h>
 
+#include "features/vector_target.h"
 #include "node/localizer_nodelet.h"
 #include "node/node_config.h"
 
@@ -43,7 +45,8 @@ int answer(const std::string& argument) {
   const std::map<std::string, std::function<std::string()>> answers = {
       {"--help", [] { return kHelp; }},
       {"-h", [] { return kHelp; }},
-      {"--version", [] { return "localizer_node " VISUAL_LOCALIZATION_VERSION "\n"; }},
+      {"--version",
+       [] { return "localizer_node " VISUAL_LOCALIZATION_VERSION " (" + visual_localization::vectorTarget() + ")\n"; }},
       {"--parameters", visual_localization::parametersPage},
       {"--localizer-config", visual_localization::localizerYaml},
       {"--map-builder-config", visual_localization::mapBuilderYaml},
@@ -53,7 +56,12 @@ int answer(const std::string& argument) {
     std::cerr << "localizer_node: unknown argument '" << argument << "'; see --help\n";
     return kBadUsage;
   }
-  std::cout << found->second();
+  try {
+    std::cout << found->second();
+  } catch (const std::invalid_argument& error) {
+    std::cerr << "localizer_node: " << error.what() << "\n";
+    return kBadUsage;
+  }
   return 0;
 }
 

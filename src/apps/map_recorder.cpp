@@ -10,6 +10,7 @@
 
 #include "base/process.h"
 #include "base/text.h"
+#include "features/vector_target.h"
 
 namespace {
 
@@ -31,11 +32,11 @@ const char* const kHelp =
     "  --version  the version\n\n"
     "Topics, services and parameters: doc/recording.md.\n";
 
-int answer(const std::string& argument) {
+int answer(const std::string& argument, const std::string& version) {
   if (argument == "--help" || argument == "-h") {
     std::cout << kHelp;
   } else if (argument == "--version") {
-    std::cout << "map_recorder " VISUAL_LOCALIZATION_VERSION "\n";
+    std::cout << version << "\n";
   } else {
     std::cerr << "map_recorder: unknown argument '" << argument << "'; see --help\n";
     return kBadUsage;
@@ -60,9 +61,11 @@ void buildMap(const RecordedSession& session) {
 int main(int argc, char** argv) {
   std::vector<std::string> arguments;
   ros::removeROSArgs(argc, argv, arguments);
-  if (arguments.size() > 1) return answer(arguments[1]);
-  ros::init(argc, argv, "map_recorder");
   try {
+    const std::string version =
+        "map_recorder " VISUAL_LOCALIZATION_VERSION " (" + visual_localization::vectorTarget() + ")";
+    if (arguments.size() > 1) return answer(arguments[1], version);
+    ros::init(argc, argv, "map_recorder");
     MapRecorder recorder(ros::NodeHandle(), ros::NodeHandle("~"), buildMap);
     ros::spin();
   } catch (const std::exception& error) {

@@ -11,6 +11,7 @@
 
 #include "base/process.h"
 #include "base/text.h"
+#include "features/vector_target.h"
 #include "node/message_conversions.h"
 #include "node/node_config.h"
 #include "node/stamps.h"
@@ -92,6 +93,7 @@ void LocalizerNodelet::stop() {
 void LocalizerNodelet::start() {
   ros::NodeHandle& node = getNodeHandle();
   ros::NodeHandle& private_node = getPrivateNodeHandle();
+  NODELET_INFO_STREAM(getName() << " compares features by " << vectorTarget());
   parameters_ = loadParameters(private_node);
   localizer_ = std::make_unique<SharedLocalizer>(parameters_.localizer);
   diagnostics_ = std::make_unique<LocalizerDiagnostics>(

@@ -262,11 +262,13 @@ class ProgramsTest(ProgramTest):
         def with_target(target, program, *arguments):
             return run(program, *arguments, env={**os.environ, 'VISUAL_LOCALIZATION_TARGET': target})
 
-        for program in ('map_builder', 'map_edit', 'map_info', 'localize', 'evaluate'):
+        for program in ('map_builder', 'map_edit', 'map_info', 'localize', 'evaluate', 'localizer_node',
+                        'map_recorder'):
             forced = with_target('portable', program, '--version')
             self.assertRegex(forced.stdout, program + r' [\d.]+ \((portable|SSE2|NEON)\)\n')
             wrong = with_target('AVX9', program, '--version')
-            self.assert_refused(wrong, 2, "VISUAL_LOCALIZATION_TARGET: 'AVX9' is not one of portable")
+            self.assert_refused(wrong, 1 if program == 'map_recorder' else 2,
+                                "VISUAL_LOCALIZATION_TARGET: 'AVX9' is not one of portable")
         self.assert_refused(with_target('', 'map_info', MAP), 2, "'' is not one of portable")
 
 
