@@ -114,6 +114,8 @@ class Reconstruction {
   void adjustAndPrune(double tolerance, std::size_t min_views);
   void moveAsOne();
   /// Images where little of what they match fits start again where the landmarks of others have them, and so on from
+  /// Whether landmarks explain too little of most images.
+  bool mostAreLost() const;
   /// there: fixes that are metres off let no landmark begin beside them. `gate_px`, `max_views`: see triangulateAll().
   void resect(double gate_px, std::size_t max_views);
   /// A single image may end in a minimum of its own, metres off. It starts again among its neighbours.
@@ -154,6 +156,7 @@ class Reconstruction {
   Eigen::Vector3d usualTurn_rad(std::size_t image) const;
   bool isAstray(std::size_t image, const std::optional<double>& explained) const;
   std::vector<std::optional<double>> explainedShares() const;
+  std::vector<bool> lostImages() const;
   std::vector<std::vector<LandmarkMatch>> landmarksOf(const std::vector<bool>& some) const;
   void triangulateWithout(const std::vector<bool>& left_out, double gate_px, std::size_t max_views);
   double distance_m(const Landmark& landmark) const;

@@ -111,10 +111,22 @@ std::vector<std::vector<LandmarkMatch>> Reconstruction::landmarksOf(const std::v
   return matches;
 }
 
+/// Images of which landmarks explain too little.
+std::vector<bool> Reconstruction::lostImages() const {
+  std::vector<bool> lost;
+  for (const auto& explained : explainedShares()) lost.push_back(explained.value_or(1.0) < kMostExplained);
+  return lost;
+}
+
+bool Reconstruction::mostAreLost() const {
+  const std::vector<bool> lost = lostImages();
+  return 2 * static_cast<std::size_t>(std::count(lost.begin(), lost.end(), true)) > lost.size();
+}
+
+/// By the landmarks of the other images: these must be the most.
 void Reconstruction::resect(double gate_px, std::size_t max_views) {
-  for (int round = 0; round < kResections; ++round) {
-    std::vector<bool> lost;
-    for (const auto& explained : explainedShares()) lost.push_back(explained.value_or(1.0) < kMostExplained);
+  for (int round = 0; round < kResections && !mostAreLost(); ++round) {
+    const std::vector<bool> lost = lostImages();
     if (std::none_of(lost.begin(), lost.end(), [](bool is_lost) { return is_lost; })) return;
     triangulateWithout(lost, gate_px, max_views);
     const std::vector<std::vector<LandmarkMatch>> matches = landmarksOf(lost);

@@ -204,6 +204,10 @@ class SessionAdjuster {
     reconstruction_.useFixes(Reconstruction::kBelievedFix_m, kCoarseLoss);
     reconstruction_.triangulateAll(20.0, kCoarseViews);
     reconstruction_.adjustAndPrune(kRough, 2);
+    if (reconstruction_.mostAreLost()) {  // far off as well, yet nearer
+      reconstruction_.triangulateAll(20.0, kCoarseViews);
+      reconstruction_.adjustAndPrune(kCoarse, 2);
+    }
     reconstruction_.resect(20.0, kCoarseViews);
     reconstruction_.restartAmongNeighbours();
     reconstruction_.useFixes(kAllFixes_m, Reconstruction::kFixLoss);
