@@ -171,6 +171,8 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
   Eigen::Vector2d claimed_m = predicted ? predicted->position_m : tracked.position_m;
   if (metric) claimed_m = metric->base.translation().head<2>();
   evidence.probability = probabilityOf(tracked, claimed_m);
+  const double most_m = std::max(state.max_sigma_m, posterior().around_m());
+  evidence.vague = evidence.probability && claimedSigma_m(tracked, metric, predicted) > most_m;
   if (evidence.probability && evidence.verified)
     missPose(metric.has_value(), predicted.has_value(), *evidence.probability);
   if (evidence.blind && evidence.probability) evidence.probability = 0.0;  // it shows no place

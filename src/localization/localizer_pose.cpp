@@ -32,6 +32,14 @@ double Localizer::hereRadius_m(std::size_t image) const {
   return std::max(posterior().around_m(), kSigmas * std::sqrt(placeVariance_m2(image)));
 }
 
+/// Of the position that is published if the image confirms it.
+double Localizer::claimedSigma_m(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric,
+                                 const std::optional<PredictedPose>& predicted) const {
+  if (metric) return largerSigma((metric->covariance + metric->map_covariance).topLeftCorner<2, 2>());
+  if (predicted) return largerSigma(predicted->covariance_m2);
+  return largerSigma(tracked.mode_covariance_m2 + placeVariance_m2(tracked.best_image) * Eigen::Matrix2d::Identity());
+}
+
 /// The solved pose; without one where the verified motion leads to, whatever looks alike elsewhere; or what the tracker
 /// has.
 void Localizer::choosePose(Estimate& estimate, const std::optional<PredictedPose>& predicted) {

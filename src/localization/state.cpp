@@ -111,7 +111,8 @@ LocalizationState StateAssessor::update(std::int64_t stamp_ns, const TrackerEsti
                                         const Evidence& evidence) {
   remember(stamp_ns, estimate, evidence);
   const bool verified = evidence.verified.value_or(false);
-  const bool certain = verified || (evidence.probability ? lastConfirms() : !evidence.verified && isCertain());
+  const bool confirmed = verified || (evidence.probability ? lastConfirms() : !evidence.verified && isCertain());
+  const bool certain = confirmed && !evidence.vague;
   ever_confirmed_ = ever_confirmed_ || certain;
   // Matched local features are of a mapped place, even while the position is not certain.
   const bool sees_map =

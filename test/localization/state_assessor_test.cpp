@@ -282,6 +282,18 @@ TEST(StateAssessor, AVerifiedPoseDecidesAlone) {
   EXPECT_EQ(assess(assessor, kBad, verified), LocalizationState::kTracking);
 }
 
+// A map that says of itself that it may be 30 m off.
+TEST(StateAssessor, APositionThatIsHardlyKnownIsNotClaimed) {
+  StateAssessor assessor{StateConfig()};
+  Said vague = sift();
+  vague.evidence.verified = true;
+  vague.evidence.probability = 0.999;
+  vague.evidence.vague = true;
+  EXPECT_NE(assess(assessor, kGood, vague), LocalizationState::kTracking);
+  vague.evidence.vague = false;
+  EXPECT_EQ(assess(assessor, kGood, vague), LocalizationState::kTracking);
+}
+
 TEST(StateAssessor, OffTheMapAfterExactlySoManyImages) {
   StateConfig config;
   config.off_map_images = 7;

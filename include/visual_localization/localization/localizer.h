@@ -116,6 +116,8 @@ class Localizer {
   std::optional<double> probabilityOf(const TrackerEstimate& tracked, const Eigen::Vector2d& position_m) const;
   const PlaceFilter& posterior() const;
   double placeVariance_m2(std::size_t image) const;
+  double claimedSigma_m(const TrackerEstimate& tracked, const std::optional<MetricPose>& metric,
+                        const std::optional<PredictedPose>& predicted) const;
   double hereRadius_m(std::size_t image) const;
   void missPose(bool has_pose, bool is_predicted, double& probability);
   bool isThroughOtherLens(std::size_t training_image) const;

@@ -36,9 +36,10 @@ struct StateConfig {
   double max_scale = 1.2;
   double min_global_similarity = 0.65;  ///< of a best match by global features
   double max_distance_m = 5.0;          ///< between a best match that confirms the estimate and it
-  int window = 5;                       ///< how many of the last images decide
-  int images_to_confirm = 4;            ///< how many of them must confirm
-  double max_step_m = 10.0;             ///< a larger jump of the estimate voids earlier confirmations
+  double max_sigma_m = 5.0;   ///< of a claimed position, where training images are not farther apart than that
+  int window = 5;             ///< how many of the last images decide
+  int images_to_confirm = 4;  ///< how many of them must confirm
+  double max_step_m = 10.0;   ///< a larger jump of the estimate voids earlier confirmations
   bool place_check = true;
   double sure_similarity = 0.2;    ///< a stronger match of local features needs no place check
   double min_place_ratio = 0.985;  ///< mean over the window; below, the images look more like another place
@@ -61,6 +62,8 @@ struct Evidence {
   /// How likely the robot is around the estimate, by a filter over the training images; nothing where the similarity
   /// of the image decides.
   std::optional<double> probability = {};
+  /// The position is known too badly to claim it, however probable it is.
+  bool vague = false;
 };
 
 /// Whether the last estimates follow one motion. A robot moves steadily between a few images; an estimate that jumps
