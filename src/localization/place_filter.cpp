@@ -188,6 +188,21 @@ PlaceLikelihood PlaceFilter::around(const Eigen::Vector2d& position_m, const std
   return likelihood;
 }
 
+std::vector<std::size_t> PlaceFilter::mostProbableImages(std::size_t count) const {
+  constexpr std::size_t kBeyond = 256;  // places beyond the ends that may be among the most probable
+  std::vector<std::size_t> places;
+  places_.mostProbable(count + kBeyond, 0.0, places);
+  std::sort(places.begin(), places.end(), [this](std::size_t a, std::size_t b) {
+    return places_[a] != places_[b] ? places_[a] > places_[b] : a < b;
+  });
+  std::vector<std::size_t> images;
+  for (auto place = places.begin(); place != places.end() && images.size() < count; ++place) {
+    const std::size_t image = where_.image(*place);
+    if (std::find(images.begin(), images.end(), image) == images.end()) images.push_back(image);
+  }
+  return images;
+}
+
 CloudMoments PlaceFilter::mode() const {
   constexpr std::size_t kCandidates = 16;
   const double radius_m = around_m();

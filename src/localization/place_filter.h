@@ -78,6 +78,8 @@ class PlaceFilter {
   /// How likely an image is taken at each place by its distance from a position. `seen`: what it is like there.
   PlaceLikelihood around(const Eigen::Vector2d& position_m, const std::optional<Fitness>& seen = {}) const;
 
+  /// The training images that the most probable places show, at most `count` distinct ones.
+  std::vector<std::size_t> mostProbableImages(std::size_t count) const;
   /// The position with most probability around, and its covariance there.
   CloudMoments mode() const;
   /// Of everything that is possible, about `centre_m`.
@@ -117,6 +119,7 @@ class PlaceFilter {
   void moveFrom(std::size_t image, const Motion& motion);
   Arrival& arrivalAt(std::size_t image);
   double expectedSpeed() const;
+  double followedShare() const;
   void learnSpeed(double elsewhere);
   double leavingFrom(std::size_t image, const Motion& motion) const;
   void updateOffMap(const PlaceLikelihood& likelihood);
@@ -134,7 +137,8 @@ class PlaceFilter {
   Eigen::Vector2d centroid_m_ = Eigen::Vector2d::Zero();  ///< of the places
   Eigen::Matrix2d scatter_m2_ = Eigen::Matrix2d::Zero();  ///< about it, not divided by their number
   PlaceProbabilities places_;
-  PerSpeed speeds_{};  ///< how likely each of kSpeeds is
+  PerSpeed speeds_{};               ///< how likely each of kSpeeds is
+  std::optional<double> odometry_;  ///< how likely it tells the way; wherever the robot is, so that no reset changes it
   std::vector<Arrival> arrivals_;
   std::optional<double> log_best_;  ///< of the likelihoods of late, smoothed
   double independence_ = 1.0;       ///< of the image from the one before, (0, 1]

@@ -11,10 +11,14 @@
 namespace visual_localization {
 namespace {
 
-constexpr double kSpeedSigma = 0.5;     ///< of the logarithm of the speed, as a share of the session's
-constexpr double kStands = 0.05;        ///< how likely the robot stands
-constexpr double kReverses = 0.02;      ///< or drives backwards
-constexpr double kSpeedMemory = 0.95;   ///< what is left of the knowledge of the speed after an image
+constexpr double kSpeedSigma = 0.5;    ///< of the logarithm of the speed, as a share of the session's
+constexpr double kStands = 0.05;       ///< how likely the robot stands
+constexpr double kReverses = 0.02;     ///< or drives backwards
+constexpr double kSpeedMemory = 0.95;  ///< what is left of the knowledge of the speed after an image
+// How far odometry is believed is learnt, as how well each speed predicted the images.
+constexpr double kSlips = 0.02;         ///< an image, wheels slip although odometry is right
+constexpr double kBreaks = 0.002;       ///< an image, it goes wrong for long
+constexpr double kMends = 0.02;         ///< and comes right again
 constexpr double kDistanceSigma = 0.2;  ///< of a distance at a known speed, as a share: half the step to the next speed
 constexpr double kPlaceSigma = 0.3;     ///< of where a place is seen best, share of the spacing
 constexpr double kSlowest = 0.3;        ///< pace of a session that stood, share of its usual one
@@ -109,6 +113,11 @@ void PlaceFilter::predict(const Motion& motion) {
   independence_ = std::clamp(way_m / spacing_m_, kLeastIndependence, 1.0);
   arrivals_.clear();
   leaving_ = 0.0;
+  if (motion.share() > 0.0) {
+    const double before = odometry_.value_or(motion.share());
+    odometry_ = before * (1.0 - kBreaks) + (1.0 - before) * kMends;
+  }
+  const double followed = motion.share() > 0.0 ? followedShare() : 0.0;
   places_.forEach([](Place& place) {
     place.stayed = place.probability;
     place.arrival = PlaceProbabilities::kNone;
@@ -136,7 +145,7 @@ void PlaceFilter::predict(const Motion& motion) {
     if (place.arrival != PlaceProbabilities::kNone) {
       const Arrival& arrival = arrivals_[place.arrival];
       const double by_speed = std::inner_product(speeds_.begin(), speeds_.end(), arrival.by_speed.begin(), 0.0);
-      place.probability += (1.0 - motion.share()) * by_speed + motion.share() * arrival.by_odometry;
+      place.probability += (1.0 - followed) * by_speed + followed * arrival.by_odometry;
     }
     place.probability = (1.0 - carried_away) * place.probability + anywhere;
   });
@@ -200,22 +209,29 @@ double PlaceFilter::leavingFrom(std::size_t image, const Motion& motion) const {
   double leaving = 0.0;
   for (std::size_t k = 0; k < kSpeeds.size(); ++k) leaving += speeds_[k] * beyond(wayAt(kSpeeds[k], image, motion));
   if (motion.share() <= 0.0) return leaving;
-  return (1.0 - motion.share()) * leaving + motion.share() * beyond(wayBy(motion));
+  return (1.0 - followedShare()) * leaving + followedShare() * beyond(wayBy(motion));
 }
+
+/// Of the hypotheses, those that odometry moves.
+double PlaceFilter::followedShare() const { return (1.0 - kSlips) * odometry_.value_or(0.0); }
 
 /// By how well each predicted the image. `elsewhere`: where none was asked.
 void PlaceFilter::learnSpeed(double elsewhere) {
   if (arrivals_.empty()) return;
   PerSpeed evidence{};
   evidence.fill(elsewhere);
+  double of_odometry = elsewhere;
+  bool by_odometry = false;
   for (const Arrival& arrival : arrivals_) {
-    for (std::size_t k = 0; k < evidence.size(); ++k) {
-      evidence[k] += arrival.by_speed[k] * places_.own(arrival.training_image).likelihood;
-    }
+    const double likelihood = places_.own(arrival.training_image).likelihood;
+    for (std::size_t k = 0; k < evidence.size(); ++k) evidence[k] += arrival.by_speed[k] * likelihood;
+    of_odometry += arrival.by_odometry * likelihood;
+    by_odometry = by_odometry || arrival.by_odometry > 0.0;
   }
   const double sum = std::inner_product(speeds_.begin(), speeds_.end(), evidence.begin(), 0.0);
   if (!(sum > 0.0)) return;
   for (std::size_t k = 0; k < speeds_.size(); ++k) speeds_[k] *= evidence[k] / sum;
+  if (by_odometry) odometry_ = *odometry_ * of_odometry / (*odometry_ * of_odometry + (1.0 - *odometry_) * sum);
 }
 
 /// As a share of the session's.

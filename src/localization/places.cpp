@@ -9,7 +9,11 @@
 namespace visual_localization {
 namespace {
 
-constexpr std::size_t kChain = 20;  ///< places beyond an end: far enough that none of them is near it
+// Places beyond an end: as far as a robot drives on before nothing of the end's image is left to match.
+constexpr double kBeyond_m = 40.0;
+constexpr std::size_t kLeast = 20;
+constexpr std::size_t kMost = 100;
+constexpr std::size_t kFarInOrder = 20;  ///< training images from one on, of which a round that closes comes back
 
 Eigen::Vector2d directionOf(double yaw_rad) { return {std::cos(yaw_rad), std::sin(yaw_rad)}; }
 
@@ -36,8 +40,9 @@ class PathEnds {
     return std::any_of(around_.begin(), around_.end(), [&](std::uint32_t other) {
       const Eigen::Vector2d offset_m = map_.position_m(other) - map_.position_m(image);
       // One of another session; of the same one a round that closes.
-      const bool is_far_in_order = map_.pose(other).session != map_.pose(image).session ||
-                                   std::max<std::size_t>(other, image) - std::min<std::size_t>(other, image) > kChain;
+      const bool is_far_in_order =
+          map_.pose(other).session != map_.pose(image).session ||
+          std::max<std::size_t>(other, image) - std::min<std::size_t>(other, image) > kFarInOrder;
       return is_far_in_order && ahead.dot(offset_m) > kAhead * offset_m.norm() &&
              faceAlike(map_.yaw_rad(image), map_.yaw_rad(other));
     });
@@ -57,11 +62,13 @@ Places::Places(const TrainingMap& map, double spacing_m, double gap_m) : map_(ma
 
 void Places::findEnds(double spacing_m, double gap_m) {
   PathEnds ends(map_, gap_m);
+  const double wanted = std::ceil(kBeyond_m / spacing_m);
+  const auto chain = static_cast<std::size_t>(std::clamp(wanted, 1.0 * kLeast, 1.0 * kMost));
   for (std::size_t i = 0; i < map_.size(); ++i) {
     for (const int step : {-1, 1}) {
       const double room_m = ends.room_m(i, step);
       const Eigen::Vector2d step_m = step * spacing_m * directionOf(map_.yaw_rad(i));
-      for (std::size_t k = 1; k <= kChain && static_cast<double>(k) * spacing_m < room_m; ++k) {
+      for (std::size_t k = 1; k <= chain && static_cast<double>(k) * spacing_m < room_m; ++k) {
         positions_m_.emplace_back(map_.position_m(i) + static_cast<double>(k) * step_m);
         ends_.push_back(i);
       }

@@ -41,8 +41,8 @@ class StreetDrive {
   explicit StreetDrive(std::shared_ptr<const TrainingMap> map) : map_(std::move(map)), filter_(*map_, {}) {}
 
   /// A second on; the training image `place` and those beside it match best: `matches`.
-  void see(std::size_t place, std::size_t matches) {
-    filter_.predict(Motion(1.0));
+  void see(std::size_t place, std::size_t matches, const Motion& motion = Motion(1.0)) {
+    filter_.predict(motion);
     PlaceLikelihood likelihood;
     for (std::size_t i = 0; i < kStreetImages; ++i) {
       const auto apart = static_cast<double>(std::max(i, place) - std::min(i, place));
@@ -112,6 +112,19 @@ TEST(OffMap, ARobotThatStopsAtTheEndMayHaveDrivenOn) {
   drive.goTo(40, kStreetImages, 100);
   for (int i = 0; i < 10; ++i) drive.see(kStreetImages - 1, 100);
   EXPECT_LT(drive.filter().probabilityWithin({kEnd_m, 0.0}, 5.0), 0.97);
+}
+
+// How far odometry is believed is learnt on the way there; wheels that turn on the spot are found out.
+TEST(OffMap, OdometryTellsARobotThatDocksAtTheEnd) {
+  const auto driven = [](double metres) { return Motion(1.0, OdometryIncrement{{metres, 0.0}, 0.0, metres}); };
+  const auto inMapAfterDocking = [&](double said_m) {
+    StreetDrive drive(longStreet());
+    for (std::size_t i = 40; i < kStreetImages; ++i) drive.see(i, 100, driven(said_m));
+    for (int i = 0; i < 10; ++i) drive.see(kStreetImages - 1, 100, driven(0.0));
+    return drive.filter().probabilityWithin({kEnd_m, 0.0}, 5.0);
+  };
+  EXPECT_GT(inMapAfterDocking(1.0), 0.97);
+  EXPECT_LT(inMapAfterDocking(3.0), 0.97) << "it was wrong all the way";
 }
 
 TEST(OffMap, AClosedRoundHasNoEnd) {

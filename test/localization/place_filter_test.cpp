@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <memory>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -99,6 +100,18 @@ TEST(PlaceFilter, OdometrySaysHowFar) {
   filter.reset({{20.0, 0.0}});
   filter.predict(afterSeconds(1.0));
   EXPECT_LT(filter.within({26.0, 0.0}, 1.5), 0.05);
+}
+
+// Many places beyond the end show its image: it is compared once.
+TEST(PlaceFilter, TheMostProbableImagesAreDistinct) {
+  const auto map = mapOf(streetSession(80));
+  PlaceFilter filter(*map, {});
+  filter.reset({{79.0, 0.0}});
+  for (int i = 0; i < 10; ++i) filter.predict(afterSeconds(1.0));
+  const std::vector<std::size_t> images = filter.mostProbableImages(10);
+  EXPECT_EQ(images.size(), 10U);
+  EXPECT_EQ(std::set<std::size_t>(images.begin(), images.end()).size(), 10U);
+  EXPECT_EQ(images.front(), 79U);
 }
 
 TEST(PlaceFilter, FindsARobotThatWasCarriedAway) {

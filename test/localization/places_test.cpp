@@ -45,17 +45,25 @@ TEST(Places, AStreetGoesOnBeyondBothEnds) {
   driveOn(0.0, 99.0, 0, poses);
   const auto map = mapAt(poses);
   const Places places(*map, kSpacing_m, kGap_m);
-  EXPECT_EQ(places.size(), 140U);
+  EXPECT_EQ(places.size(), 180U);
   const auto [first, last] = places.beyond(99);
-  ASSERT_EQ(last - first, 20U);
+  ASSERT_EQ(last - first, 40U);
   EXPECT_FALSE(places.hasImage(first));
   EXPECT_EQ(places.image(first), 99U);
   EXPECT_NEAR((places.position_m(first) - Eigen::Vector2d(100.0, 0.0)).norm(), 0.0, 1e-9);
-  EXPECT_NEAR((places.position_m(last - 1) - Eigen::Vector2d(119.0, 0.0)).norm(), 0.0, 1e-9);
+  EXPECT_NEAR((places.position_m(last - 1) - Eigen::Vector2d(139.0, 0.0)).norm(), 0.0, 1e-9);
   EXPECT_NEAR((places.position_m(places.beyond(0).first) - Eigen::Vector2d(-1.0, 0.0)).norm(), 0.0, 1e-9);
   EXPECT_EQ(countBeyond(places, 50), 0U);
   EXPECT_TRUE(places.hasImage(50));
   EXPECT_EQ(places.nearest({105.2, 0.0}).image, first + 5);
+}
+
+TEST(Places, OfADenseAndOfASparsePath) {
+  std::vector<TrainingPose> poses;
+  driveOn(0.0, 29.0, 0, poses);
+  const auto map = mapAt(poses);
+  EXPECT_EQ(countBeyond(Places(*map, 0.1, kGap_m), 29), 100U);
+  EXPECT_EQ(countBeyond(Places(*map, 10.0, kGap_m), 29), 20U);
 }
 
 TEST(Places, ARoundThatClosesHasNoEnd) {
@@ -97,7 +105,7 @@ TEST(Places, AnotherSessionLeadsOn) {
   const Places places(*map, kSpacing_m, kGap_m);
   EXPECT_EQ(countBeyond(places, 29), 0U);
   EXPECT_EQ(countBeyond(places, 30), 0U) << "behind the second session's first image";
-  EXPECT_EQ(countBeyond(places, 70), 20U);
+  EXPECT_EQ(countBeyond(places, 70), 40U);
 }
 
 TEST(Places, OneThatFacesTheOtherWayDoesNot) {
@@ -106,7 +114,7 @@ TEST(Places, OneThatFacesTheOtherWayDoesNot) {
   driveOn(20.0, 60.0, 1, poses);
   for (TrainingPose& pose : poses) pose.yaw_rad = pose.session == 1 ? M_PI : 0.0;
   const auto map = mapAt(poses, 2);
-  EXPECT_EQ(countBeyond(Places(*map, kSpacing_m, kGap_m), 29), 20U);
+  EXPECT_EQ(countBeyond(Places(*map, kSpacing_m, kGap_m), 29), 40U);
 }
 
 }  // namespace
