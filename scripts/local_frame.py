@@ -1,5 +1,6 @@
 """East and north near a position of the WGS84 ellipsoid, and those of a map."""
 import math
+from pathlib import Path
 from typing import Dict, Sequence, Tuple
 
 import numpy as np
@@ -17,6 +18,17 @@ def metres_per_degree(latitude: float, altitude: float = 0.0) -> Tuple[float, fl
     meridian = SEMI_MAJOR_M * (1 - ECCENTRICITY2) / ratio ** 1.5
     return (math.radians((prime_vertical + altitude) * math.cos(math.radians(latitude))),
             math.radians(meridian + altitude))
+
+
+def fixes_of(bag: Path, topic: str) -> np.ndarray:
+    """Rows of stamp (s), latitude and longitude (degrees) of the NavSatFix on `topic`."""
+    import rosbag  # pylint: disable=import-outside-toplevel
+    with rosbag.Bag(str(bag)) as recording:
+        fixes = np.array([(message.header.stamp.to_sec(), message.latitude, message.longitude)
+                          for _, message, _ in recording.read_messages([topic])])
+    if not len(fixes):
+        raise ValueError(f'{bag}: there is nothing on {topic}')
+    return fixes
 
 
 class LocalFrame:

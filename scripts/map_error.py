@@ -15,9 +15,8 @@ from typing import Dict, List
 
 import matplotlib
 import numpy as np
-import rosbag
 from matplotlib import pyplot
-from local_frame import LocalFrame
+from local_frame import LocalFrame, fixes_of
 
 NEAR_M = 3.0
 matplotlib.use('Agg')
@@ -35,11 +34,7 @@ def images_of(map_file: Path, programs: Path) -> List[Dict[str, str]]:
 
 def truth_of(bag: Path, topic: str, frame: LocalFrame) -> np.ndarray:
     """Rows of stamp, east and north."""
-    with rosbag.Bag(str(bag)) as recording:
-        fixes = np.array([(message.header.stamp.to_sec(), message.latitude, message.longitude)
-                          for _, message, _ in recording.read_messages([topic])])
-    if not len(fixes):
-        raise ValueError(f'{bag}: there is nothing on {topic}')
+    fixes = fixes_of(bag, topic)
     return np.column_stack((fixes[:, 0], frame.position(fixes[:, 1], fixes[:, 2])))
 
 
