@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kOthers = 10;   ///< training images that are compared in turn
 constexpr double kKnown = 0.9;        ///< probability around the estimate, from which on few are compared
+constexpr double kSure = 0.97;        ///< and fewer, where that is in the map
 constexpr std::size_t kProposed = 6;  ///< every so-many-th looks alike as a whole
 
 }  // namespace
@@ -32,7 +33,7 @@ void BayesTracker::reset(const Prior& prior) {
     while (drawn_m.size() < kDraws) drawn_m.push_back(prior(random_));
     filter_.reset(drawn_m);
   }
-  seen_an_image_ = is_known_ = false;
+  seen_an_image_ = is_known_ = is_sure_ = false;
   belief_ = {};
   drawParticles();
 }
@@ -63,14 +64,14 @@ void BayesTracker::update(Likelihood& likelihood) {
 }
 
 void BayesTracker::choose(Likelihood& likelihood) {
-  const auto most = static_cast<std::size_t>(is_known_ ? config_.comparisons : config_.first_comparisons);
+  const int count = is_sure_ ? config_.sure_comparisons : is_known_ ? config_.comparisons : config_.first_comparisons;
+  const auto most = static_cast<std::size_t>(count);
   others_ = std::min({kOthers, most / 2, map_.size()});
   const std::size_t rest = most - others_;
   const bool sees_all = map_.size() <= static_cast<std::size_t>(config_.first_comparisons);
   std::vector<std::size_t> proposed;
   if (!sees_all) proposed = likelihood.mostSimilar(is_known_ ? rest / kProposed : rest / 2);
-  filter_.probabilities().mostProbable(rest - std::min(rest, proposed.size()), 0.0, chosen_);
-  for (std::size_t& place : chosen_) place = filter_.places().image(place);
+  chosen_ = filter_.mostProbableImages(rest - std::min(rest, proposed.size()));
   chosen_.insert(chosen_.end(), proposed.begin(), proposed.end());
   std::sort(chosen_.begin(), chosen_.end());
   chosen_.erase(std::unique(chosen_.begin(), chosen_.end()), chosen_.end());
@@ -101,6 +102,7 @@ TrackerEstimate BayesTracker::estimate(Likelihood& likelihood) {
   const CloudMoments mode = filter_.mode();
   const double around_m = filter_.around_m();
   is_known_ = filter_.within(mode.mean_m, around_m) >= kKnown;
+  is_sure_ = filter_.probabilityWithin(mode.mean_m, around_m) >= kSure;
   TrackerEstimate result;
   result.position_m = mode.mean_m;
   result.mode_covariance_m2 = mode.covariance_m2;

@@ -42,7 +42,8 @@ class BayesTracker final : public Tracker {
   std::vector<Particle> particles_;
   TrackerEstimate belief_;
   bool seen_an_image_ = false;
-  bool is_known_ = false;            ///< most of the probability is around the last estimate
+  bool is_known_ = false;
+  bool is_sure_ = false;             ///< most of the probability is around the last estimate
   std::size_t images_ = 0;           ///< since the start
   std::vector<std::size_t> chosen_;  ///< training images to be compared; the last kOthers of them in turn
   std::size_t others_ = 0;

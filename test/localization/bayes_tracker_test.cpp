@@ -38,6 +38,8 @@ TEST(BayesTracker, ComparesAsManyAsIsSaid) {
   World world = roundWorld();
   TrackerConfig few = config();
   few.bayes.comparisons = 40;
+  few.bayes.sure_comparisons = 15;
+  few.bayes.first_comparisons = 400;
   BayesTracker tracker(world.map(), few, 1);
   for (int step = 0; step < 60; ++step) {
     test::Seen input = world.from(onCircle(0.94 * step));
@@ -47,7 +49,7 @@ TEST(BayesTracker, ComparesAsManyAsIsSaid) {
       EXPECT_EQ(comparisons, 200U);
     }
     if (step >= 10) {
-      EXPECT_LE(comparisons, 40U) << step;
+      EXPECT_LE(comparisons, 15U) << step;
     }
   }
 }

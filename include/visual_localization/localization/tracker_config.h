@@ -79,8 +79,9 @@ struct ParticleFilterConfig {
 struct BayesConfig {
   double anywhere = 0.02;
   double uniform = 0.03;        ///< share of the likelihood that is the same everywhere; no parameter
-  int comparisons = 60;         ///< of an image while the position is known; no parameter
-  int first_comparisons = 400;  ///< while it is not; no parameter
+  int sure_comparisons = 20;    ///< of an image while the position is sure; no parameter, as the next two
+  int comparisons = 60;         ///< while it is known
+  int first_comparisons = 120;  ///< while it is not
 
   void declare(ParameterVisitor& visitor);
 };
