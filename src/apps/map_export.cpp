@@ -21,8 +21,9 @@ namespace {
 
 using nlohmann::json;
 
-const std::string& sessionOf(const TrainingMap& map, int session) {
-  return map.header().sessions[static_cast<std::size_t>(session)].name;
+std::string sessionOf(const TrainingMap& map, int session) {
+  const std::string& name = map.header().sessions[static_cast<std::size_t>(session)].name;
+  return oneLine(name, name.size());
 }
 
 /// With this many significant digits: more would only pretend.
@@ -72,7 +73,7 @@ class FeatureCollection {
 
   void addPoint(std::size_t image, json properties) {
     begin();
-    write_(text(feature("Point", coordinates(map_, image), std::move(properties))));
+    write_(feature("Point", coordinates(map_, image), std::move(properties)).dump());
   }
 
   /// Through images from `first` to `last`, neither of them the end.
@@ -85,15 +86,12 @@ class FeatureCollection {
       if (image != last) ++image;
       write_("," + coordinates(map_, *image).dump());
     } while (image != last);
-    write_("],\"type\":\"LineString\"},\"properties\":" + text(properties) + ",\"type\":\"Feature\"}");
+    write_("],\"type\":\"LineString\"},\"properties\":" + properties.dump() + ",\"type\":\"Feature\"}");
   }
 
   void end() { write_("\n]}\n"); }
 
  private:
-  /// The name of a session need not be UTF-8.
-  static std::string text(const json& value) { return value.dump(-1, ' ', false, json::error_handler_t::replace); }
-
   void begin() {
     if (!first_) write_(",\n");
     first_ = false;
