@@ -18,6 +18,7 @@ namespace {
 /// what receivers send that know nothing.
 constexpr GeodeticPoint kNowhere{0.1, 0.1, 0.0};
 constexpr int kSomeZone = 31;                 ///< of UTM, which the message does not tell
+constexpr double kNorthernmost_m = 9.5e6;     ///< a larger northing is of the south, which counts from 1e7 down
 constexpr double kLargestLocal_m = 50'000.0;  ///< a UTM northing is beyond it but for the equator
 
 bool isUtm(double x_m, double y_m) {
@@ -35,8 +36,8 @@ Fix toFix(const nav_msgs::Odometry& message, std::int64_t stamp_ns) {
   fix.has_fix = std::isfinite(position.x) && std::isfinite(position.y) && std::isfinite(position.z);
   if (!fix.has_fix) return fix;
   if (isUtm(position.x, position.y)) {
-    GeographicLib::UTMUPS::Reverse(kSomeZone, true, position.x, position.y, fix.position.latitude_deg,
-                                   fix.position.longitude_deg);
+    GeographicLib::UTMUPS::Reverse(kSomeZone, position.y <= kNorthernmost_m, position.x, position.y,
+                                   fix.position.latitude_deg, fix.position.longitude_deg);
   } else if (std::hypot(position.x, position.y) <= kLargestCoordinate_m) {
     fix.position = LocalFrame(kNowhere).toGeodetic({position.x, position.y});
   } else {
@@ -54,7 +55,7 @@ std::string saidOf(const nav_msgs::Odometry& message) {
   const std::string frame = "positions of nav_msgs/Odometry in the frame '" + oneLine(message.header.frame_id) + "'";
   if (isUtm(position.x, position.y)) {
     return frame + ", taken for UTM of zone " + std::to_string(kSomeZone) +
-           " north: metres are right, the longitude is not known";
+           (position.y <= kNorthernmost_m ? " north" : " south") + ": metres are right, the longitude is not known";
   }
   return frame + ", laid about latitude 0.1, longitude 0.1: metres are right, where on the earth is not known";
 }

@@ -206,15 +206,21 @@ class ReceiversTest(RecordingTest):
 
     def test_odometry_is_a_source_of_positions(self):
         def odometry(x_m, y_m):
+            count = iter(range(10000))
+
             def change(fix):
                 message = Odometry()
                 message.header.stamp, message.header.frame_id, message.child_frame_id = fix.header.stamp, 'map', 'gps'
                 message.pose.pose.orientation.w = 1.0
                 message.pose.pose.position.x = x_m + 73700.0 * (fix.longitude - 9.0713)
                 message.pose.pose.position.y = y_m + 111200.0 * (fix.latitude - 48.5345)
+                if next(count) == 50:
+                    message.pose.pose.position.x, message.pose.pose.position.y = 505267.0, 9.65e6  # beyond the pole
                 return [message]
             return change
-        for offset_m, words in (((0.0, 0.0), 'laid about latitude 0.1'), ((505267.0, 5375670.0), 'taken for UTM')):
+        for offset_m, words in (((0.0, 0.0), 'laid about latitude 0.1'),
+                                ((505267.0, 5375670.0), 'taken for UTM of zone 31 north'),
+                                ((505267.0, 9.9e6), 'taken for UTM of zone 31 south')):
             self.check_same(self.with_fixes(odometry(*offset_m)), words)
 
     def test_another_type_is_named(self):
