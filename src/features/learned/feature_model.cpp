@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <mutex>
 #include <new>
+#include <set>
 #include <stdexcept>
 
 #include <opencv2/core/utils/logger.hpp>
@@ -85,27 +87,6 @@ bool isPlane(const cv::Mat& output) { return output.dims == 4 && output.size[0] 
 
 }  // namespace
 
-void requireHarmlessModel(const std::string& path) {
-  constexpr unsigned kLongest_s = 60;
-  // ALIKE-s takes a tenth; the largest file half, since OpenCV copies it until the network runs.
-  constexpr std::size_t kMost_bytes = std::size_t{2} << 30U;
-  const auto try_it = [&path] {
-    try {
-      FeatureModel(path).setImage(cv::Mat::zeros(480, 640, CV_8U));
-    } catch (const std::bad_alloc& error) {
-      throw std::runtime_error(named(path) + inWords(error));
-    }
-  };
-  std::string end;
-  try {
-    end = howCopyEnds(try_it, kLongest_s, kMost_bytes);
-  } catch (const std::runtime_error& error) {
-    throw ParameterError(error.what());
-  }
-  if (end.empty()) return;
-  throw ParameterError(named(path) + "is damaged: OpenCV " CV_VERSION " ends " + end);
-}
-
 FeatureModel::FeatureModel(const std::string& path, const std::optional<std::string>& checksum) : name_(named(path)) {
   const Silence silence;
   try {
@@ -117,15 +98,42 @@ FeatureModel::FeatureModel(const std::string& path, const std::optional<std::str
                                " is not that of the model that the map's features were made with, " +
                                oneLine(*checksum, 20));
     }
-    net_ = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
-    names_ = outputsOf(net_);
-    for (const int width_px : {2 * kStride_px, 3 * kStride_px}) {
-      cv::Mat ramp(2 * kStride_px, width_px, CV_8U);
-      for (int row = 0; row < ramp.rows; ++row) ramp.row(row).setTo(cv::Scalar(2 * row));
-      forward(ramp);
-    }
+    tryInCopy(bytes);
+    load(bytes);
   } catch (const std::exception& error) {
     throw ParameterError(name_ + inWords(error));
+  }
+}
+
+/// Each file once: the threads of a program have the same one. A map's checksum is its author's, and no proof.
+void FeatureModel::tryInCopy(const std::string& bytes) {
+  constexpr unsigned kLongest_s = 60;
+  // ALIKE-s takes a tenth; the largest file half, since OpenCV copies it until the network runs.
+  constexpr std::size_t kMost_bytes = std::size_t{2} << 30U;
+  static std::mutex mutex;
+  static std::set<std::string> harmless;
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (harmless.count(checksum_) != 0) return;
+  const auto try_it = [&] {
+    try {
+      load(bytes);
+      forward(cv::Mat::zeros(480, 640, CV_8U));
+    } catch (const std::exception& error) {
+      throw std::runtime_error(inWords(error));
+    }
+  };
+  const std::string end = howCopyEnds(try_it, kLongest_s, kMost_bytes);
+  if (!end.empty()) throw std::runtime_error("is damaged: OpenCV " CV_VERSION " ends " + end);
+  harmless.insert(checksum_);
+}
+
+void FeatureModel::load(const std::string& bytes) {
+  net_ = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
+  names_ = outputsOf(net_);
+  for (const int width_px : {2 * kStride_px, 3 * kStride_px}) {
+    cv::Mat ramp(2 * kStride_px, width_px, CV_8U);
+    for (int row = 0; row < ramp.rows; ++row) ramp.row(row).setTo(cv::Scalar(2 * row));
+    forward(ramp);
   }
 }
 

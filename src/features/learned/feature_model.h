@@ -11,15 +11,13 @@
 
 namespace visual_localization {
 
-/// Throws ParameterError when OpenCV does not survive the file: it refuses many damaged models, and is ended by others.
-void requireHarmlessModel(const std::string& path);
-
 /// A network that finds and describes local features, from an ONNX file; what it must be like stands in
 /// doc/programs.md. Not thread-safe.
 class FeatureModel {
  public:
-  /// Reads the file and tries it on two small images. Throws ParameterError, naming file and fault; when the file has
-  /// another checksum than the one given, before OpenCV sees it.
+  /// Reads the file and tries it on two small images and a usual one, the first time in a copy of this process: OpenCV
+  /// refuses many damaged models, and is ended by others. Throws ParameterError, naming file and fault; when the file
+  /// has another checksum than the one given, before OpenCV sees it.
   explicit FeatureModel(const std::string& path, const std::optional<std::string>& checksum = std::nullopt);
 
   /// Of a descriptor.
@@ -43,6 +41,8 @@ class FeatureModel {
     int width = 0;
   };
 
+  void tryInCopy(const std::string& bytes);
+  void load(const std::string& bytes);
   void forward(const cv::Mat& grey);
   void takeHead();
   void sample(const Level& level, double x, double y, float* to) const;
