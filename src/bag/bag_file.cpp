@@ -31,6 +31,11 @@ std::uint32_t word(const Fields& fields, const char* name) {
 void requireVersion(const Bytes& bytes) {
   const Range start{0, std::min<std::uint64_t>(bytes.size(), kVersion.size())};
   const std::string version = readRange(bytes, start, kVersion.size(), "the version");
+  constexpr const char* kConvert =
+      ": rosbags-convert --src FOLDER --dst NAME.bag converts the folder of it (pip install rosbags)";
+  if (version.substr(1, 4) == "MCAP") throw UnsupportedBag(std::string("is a bag of ROS 2, MCAP") + kConvert);
+  if (version == "SQLite format")
+    throw UnsupportedBag(std::string("is SQLite, as a map or a .db3 of ROS 2") + kConvert);
   if (version.substr(0, 8) != kVersion.substr(0, 8)) throw UnsupportedBag("is not a bag");
   if (version != kVersion) throw UnsupportedBag("is a bag of another format than 2.0");
 }

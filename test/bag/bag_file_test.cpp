@@ -35,6 +35,14 @@ TEST_F(BagFileTest, OtherVersionsAndFilesAreRefused) {
   bytes[9] = '1';
   EXPECT_THROW(BagFile(inMemory(bytes)), UnsupportedBag);
   EXPECT_THROW(BagFile(inMemory("no bag at all")), UnsupportedBag);
+  for (const char* of_ros_2 : {"\x89MCAP0\r\nand so on", "SQLite format 3 and so on"}) {
+    try {
+      BagFile(inMemory(of_ros_2));
+      FAIL() << of_ros_2;
+    } catch (const UnsupportedBag& error) {
+      EXPECT_NE(std::string(error.what()).find("rosbags-convert"), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST_F(BagFileTest, EveryCutIsRefused) {
