@@ -25,10 +25,6 @@ bool isUtm(double x_m, double y_m) {
   return x_m >= 1e5 && x_m <= 9e5 && y_m >= 0.0 && y_m <= 1e7 && std::max(x_m, y_m) > kLargestLocal_m;
 }
 
-double deviationOf(double variance_m2) {
-  return std::isfinite(variance_m2) && variance_m2 > 0.0 ? std::sqrt(variance_m2) : 0.0;
-}
-
 Fix toFix(const nav_msgs::Odometry& message, std::int64_t stamp_ns) {
   const auto& position = message.pose.pose.position;
   Fix fix;

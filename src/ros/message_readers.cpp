@@ -95,7 +95,7 @@ void bin(std::uint32_t binning, int& side_px, double& focal_length, double& cent
 using parameters::YamlMap;
 
 /// What camera_calibration_parsers takes for granted and does not check.
-void requireMatrix(YamlMap& file, const std::string& key, std::size_t rows, std::size_t columns) {
+std::size_t requireMatrix(YamlMap& file, const std::string& key, std::size_t rows, std::size_t columns) {
   YamlMap matrix = file.map(key);
   const auto side = [&matrix](const char* name, std::size_t most) {
     if (!matrix.has(name)) matrix.refuse(name, "is missing");
@@ -110,19 +110,32 @@ void requireMatrix(YamlMap& file, const std::string& key, std::size_t rows, std:
   if (matrix.numbers("data", found_rows * found_columns) != found_rows * found_columns) {
     file.refuse(key, "must have as many values in 'data' as 'rows' times 'cols'");
   }
+  return found_rows * found_columns;
 }
 
-void requireCalibrationYaml(const std::string& text, const std::string& path) {
+/// A file of camera_calibration, checked; or one of OpenCV, which has the same names but neither all of them nor the
+/// first line of YAML, with what camera_calibration would add.
+std::string completed(std::string text, const std::string& path) {
+  constexpr std::size_t kPlumbBob = 5;
+  if (text.compare(0, 6, "%YAML:") == 0) text.erase(0, text.find('\n'));
   YamlMap file = YamlMap::parse(text, path);
   for (const char* side : {"image_width", "image_height"}) {
     if (!file.has(side)) file.refuse(side, "is missing");
     file.count(side, 0, 1, kLargestSide_px);
   }
-  for (const char* name : {"camera_name", "distortion_model"}) file.text(name, "");
   requireMatrix(file, "camera_matrix", 3, 3);
-  requireMatrix(file, "distortion_coefficients", 0, 0);
-  requireMatrix(file, "rectification_matrix", 3, 3);
-  requireMatrix(file, "projection_matrix", 3, 4);
+  const bool wide = requireMatrix(file, "distortion_coefficients", 0, 0) > kPlumbBob;
+  const auto complete = [&](const std::string& key, const std::string& value) {
+    if (!file.has(key)) text += '\n' + key + ": " + value + '\n';
+    return file.has(key);
+  };
+  if (complete("camera_name", "camera")) file.text("camera_name");
+  if (complete("distortion_model", wide ? "rational_polynomial" : "plumb_bob")) file.text("distortion_model");
+  if (complete("rectification_matrix", "{rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}"))
+    requireMatrix(file, "rectification_matrix", 3, 3);
+  if (complete("projection_matrix", "{rows: 3, cols: 4, data: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}"))
+    requireMatrix(file, "projection_matrix", 3, 4);
+  return text;
 }
 
 bool endsIn(const std::string& text, const std::string& ending) {
@@ -132,10 +145,9 @@ bool endsIn(const std::string& text, const std::string& ending) {
 sensor_msgs::CameraInfo parse(const std::string& content, const std::string& path) {
   const bool yaml = endsIn(path, ".yaml") || endsIn(path, ".yml");
   requireValue(yaml || endsIn(path, ".ini"), "must end in .yaml, .yml or .ini");
-  if (yaml) requireCalibrationYaml(content, path);
   sensor_msgs::CameraInfo info;
   std::string name;
-  std::istringstream in(content);
+  std::istringstream in(yaml ? completed(content, path) : content);
   const bool parsed = yaml ? camera_calibration_parsers::readCalibrationYml(in, name, info)
                            : camera_calibration_parsers::parseCalibrationIni(content, name, info);
   requireValue(parsed, "is no camera calibration");
@@ -238,13 +250,17 @@ bool isRectified(const std::string& image_topic) { return image_topic.find("/ima
 
 namespace {
 
-/// 0 for none, or what cannot be.
 double sigmaOf(const sensor_msgs::NavSatFix& message, double variance_m2) {
-  if (message.position_covariance_type == sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN) return 0.0;
-  return std::isfinite(variance_m2) && variance_m2 > 0.0 ? std::sqrt(variance_m2) : 0.0;
+  const bool unknown = message.position_covariance_type == sensor_msgs::NavSatFix::COVARIANCE_TYPE_UNKNOWN;
+  return unknown ? 0.0 : deviationOf(variance_m2);
 }
 
 }  // namespace
+
+double deviationOf(double variance_m2) {
+  constexpr double kUnknown_m2 = 9999.0;
+  return variance_m2 > 0.0 && variance_m2 < kUnknown_m2 ? std::sqrt(variance_m2) : 0.0;
+}
 
 Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns) {
   return {stamp_ns,

@@ -57,6 +57,10 @@ std::string cameraInfoTopic(const std::string& image_topic);
 /// By image_proc's naming: "/left/image_rect", "/left/image_rect_color".
 bool isRectified(const std::string& image_topic);
 
+/// Standard deviation of a variance in a message; 0 for none, for what cannot be, and from 9999 on, by which drivers
+/// say that they do not know.
+double deviationOf(double variance_m2);
+
 /// What the receiver cannot know, or claims without sense, is 0.
 Fix toFix(const sensor_msgs::NavSatFix& message, std::int64_t stamp_ns);
 

@@ -211,6 +211,26 @@ TEST_F(CameraFile, OfCameraCalibrationIsRead) {
   EXPECT_NO_THROW(readCameraFile(std::string(TEST_DATA_DIR) + "/calibration/campus.yaml"));
 }
 
+TEST_F(CameraFile, OfOpenCvIsRead) {
+  test::writeAll(folder_ / "camera.yml",
+                 "%YAML:1.0\n---\ncalibration_time: \"Mon\"\nimage_width: 640\nimage_height: 480\nflags: 0\n"
+                 "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 5.0e+02, 0., 320., 0.,\n"
+                 "       501., 240., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n"
+                 "   dt: d\n   data: [ -0.1, 0.01, 0., 0., 0. ]\navg_reprojection_error: 2.1e-01\n");
+  const CameraModel camera = readCameraFile(folder_ / "camera.yml");
+  EXPECT_EQ(camera.intrinsics().fx, 500.0);
+  EXPECT_EQ(camera.intrinsics().cy, 240.0);
+  EXPECT_EQ(camera.intrinsics().coefficients.at(0), -0.1);
+  EXPECT_EQ(camera.intrinsics().distortion, Distortion::kPlumbBob);
+}
+
+TEST_F(CameraFile, NeedsNoMoreThanSizeMatrixAndDistortion) {
+  const std::string whole = yaml();
+  EXPECT_EQ(refusal(whole.substr(0, whole.find("rectification_matrix"))), "accepted");
+  EXPECT_THAT(refusal("%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"), HasSubstr("camera_matrix"));
+  EXPECT_THAT(refusal("%YAML:1.0"), HasSubstr("must be a mapping"));
+}
+
 TEST_F(CameraFile, MayBeAnIniFile) {
   test::writeAll(folder_ / "camera.ini",
                  "# Camera intrinsics\n\n[image]\n\nwidth\n640\n\nheight\n480\n\n[left]\n\ncamera matrix\n500 0 320 \n"
