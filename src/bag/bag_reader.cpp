@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "base/time.h"
 #include "ros/message_readers.h"
+#include "ros/static_transforms.h"
 #include "visual_localization/ros/image_conversion.h"
 
 namespace visual_localization {
@@ -36,10 +37,20 @@ cv::Size claimedSize(const Message& message) {
   }
 }
 
+/// Two cameras on one topic make no map. `frame`: that of the images before.
+void requireSame(std::string& frame, const std::string& other, const std::string& topic) {
+  const std::string plain = withoutSlash(other);
+  if (frame.empty()) frame = plain;
+  if (plain.empty() || plain == frame) return;
+  throw bag::UnsupportedBag("topic '" + topic + "' has images of two cameras, frames '" + frame + "' and '" + plain +
+                            "': record each on a topic of its own");
+}
+
 template <class Message>
-BagImage readImage(std::string bytes, const bag::Message& from) {
+BagImage readImage(std::string bytes, const bag::Message& from, std::string& frame, const std::string& topic) {
   try {
     const auto message = deserialize<Message>(std::move(bytes));
+    requireSame(frame, message->header.frame_id, topic);
     return {stampOf(message->header, from), [message] { return toGrey(*message); }, claimedSize(*message)};
   } catch (const ImageError& error) {
     return {from.stamp_ns, [error]() -> cv::Mat { throw error; }, {}};
@@ -67,6 +78,7 @@ struct BagImages::Content {
   std::string topic;
   bool is_compressed = false;
   std::vector<bag::Message> messages;
+  mutable std::string frame;  ///< of the first image that has one
 };
 
 std::size_t BagImages::size() const { return content_->messages.size(); }
@@ -77,8 +89,9 @@ BagImage BagImages::read(std::size_t i) const {
   return withBag(content_->path, [&] {
     const bag::Message& message = content_->messages.at(i);
     std::string bytes = content_->file->read(message);
-    return content_->is_compressed ? readImage<sensor_msgs::CompressedImage>(std::move(bytes), message)
-                                   : readImage<sensor_msgs::Image>(std::move(bytes), message);
+    const auto read_it =
+        content_->is_compressed ? readImage<sensor_msgs::CompressedImage> : readImage<sensor_msgs::Image>;
+    return read_it(std::move(bytes), message, content_->frame, content_->topic);
   });
 }
 
