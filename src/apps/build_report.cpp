@@ -218,7 +218,7 @@ void printReport(const MapBuilderOptions& options, const MapBuildReport& report,
             << " left out after the adjustment, " << report.images_disordered << " out of order, "
             << report.images_unusable << " unusable";
   printIfAny(report.images_of_other_shape, "of another shape than most, left out");
-  printIfAny(report.images_standing, "left out while the robot stood (within 0.5 m for more than 10 s)");
+  printIfAny(report.images_standing, "left out while the robot stood (for more than 10 s)");
   std::cout << '\n';
   const double dropped = report.features_extracted == 0 ? 0.0
                                                         : 100.0 - 100.0 * static_cast<double>(report.features_kept) /
@@ -242,8 +242,16 @@ void printSummary(const MapBuilderOptions& options, const MapBuildReport& report
 
 namespace {
 
+constexpr std::size_t kFewFeatures = 50;  ///< an image, on average
+
 std::vector<std::string> disagreementsOf(const MapBuildReport& report, const std::vector<PlottedSession>& sessions) {
   std::vector<std::string> found;
+  if (report.features_extracted < kFewFeatures * report.images_kept) {
+    found.push_back("only " + std::to_string(report.features_extracted / report.images_kept) +
+                    " features an image, at " + std::to_string(report.image_size.width) + "x" +
+                    std::to_string(report.image_size.height) + " px: places look alike; from " +
+                    std::to_string(kFewFeatures) + " on, and from 320x240 px, they can be told apart");
+  }
   for (const PlottedSession& session : sessions) {
     for (const Remark& remark : session.remarks) {
       if (remark.disagrees) found.push_back(session.name + ": " + remark.text);

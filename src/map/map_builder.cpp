@@ -133,10 +133,19 @@ bool MapBuilder::wants(std::int64_t stamp_ns, cv::Size recorded) {
   return recorded.empty() || fits(recorded);
 }
 
-/// Also of a robot that turns on its spot, kStandingTime_s of images are wanted.
+/// Also of a robot that turns on its spot, kStandingTime_s of images are wanted. One that crawls has come half as far
+/// by then as its recording does on average.
 bool MapBuilder::stands(const TrajectoryPoint& at) {
-  if (!came_to_ || (at.position_m - came_to_->position_m).norm() >= kStandingReach_m) came_to_ = at;
-  return secondsBetween(came_to_->stamp_ns, at.stamp_ns) > kStandingTime_s;
+  if (!came_to_) came_to_ = at;
+  const double way_m = (at.position_m - came_to_->position_m).norm();
+  const auto rested = [&] { return secondsBetween(came_to_->stamp_ns, at.stamp_ns) > kStandingTime_s; };
+  const auto usual_m = [this] {
+    const Trajectory& path = report_.sessions.back().trajectory;
+    const double time_s = secondsBetween(path.points().front().stamp_ns, path.points().back().stamp_ns);
+    return 0.5 * kStandingTime_s * path.length() / time_s;
+  };
+  if (way_m >= kStandingReach_m || (rested() && way_m >= usual_m())) came_to_ = at;
+  return rested();
 }
 
 /// Whether an image of this size belongs into the session. Counts it when it does not.
