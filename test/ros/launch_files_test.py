@@ -52,6 +52,11 @@ class LaunchFilesTest(unittest.TestCase):
                     self.assertEqual(read.returncode, 0, read.stdout)
                     self.assertIn('/', read.stdout)
 
+    def test_a_replayed_bag_does_not_broadcast(self):
+        """Its odom to base_link would be a second parent."""
+        read = roslaunch('--args', 'player', str(LAUNCH / 'replay.launch'), 'bag:=/a.bag', 'map:=/a.map')
+        self.assertIn('/tf:=/recorded/tf', read.stdout)
+
     def test_an_unknown_mode_is_refused(self):
         for name in ('atrv_jr.launch', 'robot_template.launch'):
             read = roslaunch('--nodes', str(LAUNCH / name), 'mode:=locate')
