@@ -48,15 +48,16 @@ cv::Mat decode(const BagImage& image, const std::string& where, bool& warned) {
   }
 }
 
-/// `wanted`: whether the image of this time is.
-void addImages(MapBuilder& builder, const BagReader& bag, const std::string& topic,
-               const std::function<bool(std::int64_t)>& wanted) {
+/// Which images are, by their place in the recording and their time.
+using Wanted = std::function<bool(std::size_t, std::int64_t)>;
+
+void addImages(MapBuilder& builder, const BagReader& bag, const std::string& topic, const Wanted& wanted) {
   const BagImages images = bag.images(topic);
   ProgressBar bar("extracting features");
   bool warned = false;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const BagImage image = images.read(i);
-    if (wanted(image.stamp_ns) && builder.wants(image.stamp_ns, image.size)) {
+    if (wanted(i, image.stamp_ns) && builder.wants(image.stamp_ns, image.size)) {
       builder.addImage(image.stamp_ns, decode(image, bag.path() + ": " + images.topic(), warned));
     }
     bar.show(i + 1, images.size());
@@ -130,8 +131,7 @@ SessionCamera cameraOf(const BagReader& bag, const MapBuilderOptions& options,
 }
 
 void addTo(MapBuilder& builder, const BagReader& bag, const MapBuilderOptions& options, PlottedSession session,
-           const SessionCamera& camera, std::vector<PlottedSession>& sessions,
-           const std::function<bool(std::int64_t)>& wanted) {
+           const SessionCamera& camera, std::vector<PlottedSession>& sessions, const Wanted& wanted) {
   try {
     builder.beginSession(session.name, session.fixes, camera);
   } catch (const std::exception& error) {
@@ -225,13 +225,15 @@ void addSession(MapBuilder& builder, const std::string& path, const MapBuilderOp
   Receiver receiver = receiverOf(bag, options, config, session.remarks);
   SessionCamera camera = cameraOf(bag, options, mountOf(bag, options, config, receiver.frame, session.remarks));
   for (const Remark& pause : breaksOf(receiver.fixes, config.trajectory)) session.remarks.push_back(pause);
-  const ClockCheck clock =
-      checkClock(bag, bag.images(options.image_topic), receiver.fixes, config, camera.mount, options.threads);
-  if (clock.went_back) session.remarks.push_back(*clock.went_back);
+  const BagImages images = bag.images(options.image_topic);
+  const ImageOrder order = orderOf(bag, images);
+  if (order.remark) session.remarks.push_back(*order.remark);
+  const ClockCheck clock = checkClock(bag, images, order, receiver.fixes, config, camera.mount, options.threads);
   session.remarks.push_back(clock.remark);
   session.fixes = putRight(std::move(receiver.fixes), clock);
   camera.clock_sigma_s = std::max(camera.clock_sigma_s, clock.sigma_s);
-  addTo(builder, bag, options, std::move(session), camera, sessions, [](std::int64_t) { return true; });
+  addTo(builder, bag, options, std::move(session), camera, sessions,
+        [&order](std::size_t i, std::int64_t) { return order.used[i]; });
 }
 
 void addVerifiedSession(MapBuilder& builder, const std::string& path, const VerifiedDrive& drive,
@@ -242,7 +244,7 @@ void addVerifiedSession(MapBuilder& builder, const std::string& path, const Veri
   SessionCamera camera = drive.camera;
   camera.image_size = bag.images(options.image_topic).usualSize();
   addTo(builder, bag, options, {sessionName(path, sessions), drive.poses, {}}, camera, sessions,
-        [&](std::int64_t stamp_ns) { return verified.count(stamp_ns) != 0; });
+        [&](std::size_t, std::int64_t stamp_ns) { return verified.count(stamp_ns) != 0; });
 }
 
 namespace {

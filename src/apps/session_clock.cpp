@@ -106,6 +106,11 @@ bool isOffset(const ClockOffset& found) {
          found.at_zero_sigmas > kSignificant;
 }
 
+/// Whether the camera is said to be upside down: then pictures turn against the path.
+bool isUpsideDown(const std::optional<SensorMount>& mount) {
+  return mount && (mount->camera.rotation * Eigen::Vector3d::UnitY()).z() > 0.0;
+}
+
 ClockCheck judged(const std::optional<ClockOffset>& found) {
   ClockCheck check;
   if (!found) {
@@ -185,26 +190,27 @@ Remark goesBack(const std::string& of, double step_s, std::int64_t latest_ns) {
           true};
 }
 
-/// Stamps in the order of the recording, of which the first that goes back is named.
-class StampOrder {
- public:
-  void add(std::int64_t stamp_ns) {
-    const double back_s = latest_ns_ ? secondsBetween(stamp_ns, *latest_ns_) : 0.0;
-    const bool went_back = std::exchange(is_back_, back_s > kGoesBack_s);
-    if (is_back_ && !went_back && times_++ == 0) first_ = goesBack("images", back_s, *latest_ns_);
-    latest_ns_ = std::max(latest_ns_.value_or(stamp_ns), stamp_ns);
+/// Marks the longest strictly increasing sequence of the stamps from `begin` to `end`.
+void useLongest(const std::vector<std::int64_t>& stamps_ns, std::size_t begin, std::size_t end,
+                std::vector<bool>& used) {
+  std::vector<std::size_t> ends;  // of the sequences of each length, that which ends earliest
+  std::vector<std::size_t> before(stamps_ns.size());
+  for (std::size_t i = begin; i < end; ++i) {
+    const auto longer =
+        std::lower_bound(ends.begin(), ends.end(), stamps_ns[i],
+                         [&](std::size_t at, std::int64_t stamp_ns) { return stamps_ns[at] < stamp_ns; });
+    before[i] = longer == ends.begin() ? i : *std::prev(longer);
+    if (longer == ends.end()) {
+      ends.push_back(i);
+    } else {
+      *longer = i;
+    }
   }
-  std::optional<Remark> remark() const {
-    if (times_ < 2) return first_;
-    return Remark{first_->text + " (" + std::to_string(times_) + " times)", true};
-  }
-
- private:
-  std::optional<std::int64_t> latest_ns_;
-  std::optional<Remark> first_;
-  bool is_back_ = false;
-  std::size_t times_ = 0;
-};
+  used.assign(stamps_ns.size(), false);
+  if (ends.empty()) return;
+  std::size_t at = ends.back();
+  for (used[at] = true; before[at] != at; used[at] = true) at = before[at];
+}
 
 /// Exchanged coordinates make the mirror image of a path, stretched.
 std::vector<Fix> exchangedIn(std::vector<Fix> fixes) {
@@ -214,20 +220,71 @@ std::vector<Fix> exchangedIn(std::vector<Fix> fixes) {
 
 }  // namespace
 
-ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::vector<Fix>& fixes,
-                      const MapBuilderConfig& config, const std::optional<SensorMount>& mount, std::size_t threads) {
+ImageOrder orderOf(const std::vector<std::int64_t>& stamps_ns) {
+  constexpr double kMany = 0.05;
+  const std::size_t count = stamps_ns.size();
+  ImageOrder order;
+  useLongest(stamps_ns, 0, count, order.used);
+  // Where the clock goes back; behind a single stamp far ahead it does not.
+  std::vector<std::size_t> steps;
+  double back_s = 0.0;
+  for (std::size_t i = 1; i < count; ++i) {
+    const double step_s = secondsBetween(stamps_ns[i], stamps_ns[i - 1]);
+    const bool stray = i == 1 || stamps_ns[i] > stamps_ns[i - 2];
+    if (step_s <= kGoesBack_s || stray) continue;
+    if (steps.empty()) back_s = step_s;
+    steps.push_back(i);
+  }
+  if (steps.size() == 1) {
+    const std::size_t step = steps.front();
+    const bool first = 2 * step >= count;
+    useLongest(stamps_ns, first ? 0 : step, first ? step : count, order.used);
+  }
+  const auto out = static_cast<std::size_t>(std::count(order.used.begin(), order.used.end(), false));
+  if (out == 0) return order;
+  const std::string left = std::to_string(out) + " of " + std::to_string(count) + " images are left out";
+  const bool many = static_cast<double>(out) > kMany * static_cast<double>(count);
+  if (steps.empty()) {
+    order.remark = Remark{"stamps of images are not in order: " + left, many};
+  } else {
+    order.remark = goesBack("images", back_s, stamps_ns[steps.front() - 1]);
+    if (steps.size() > 1) order.remark->text += " (" + std::to_string(steps.size()) + " times)";
+    order.remark->text += ": " + left;
+  }
+  return order;
+}
+
+ImageOrder orderOf(const BagReader& bag, const BagImages& images) {
+  std::vector<std::int64_t> stamps_ns;
+  ProgressBar bar("reading stamps");
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    stamps_ns.push_back(images.read(i).stamp_ns);
+    bar.show(i + 1, images.size());
+  }
+  ImageOrder order = orderOf(stamps_ns);
+  const auto used = static_cast<std::size_t>(std::count(order.used.begin(), order.used.end(), true));
+  if (2 * used < order.used.size()) {
+    throw BagError(bag.path() + ": images of " + oneLine(images.topic()) +
+                   " are out of order: " + std::to_string(order.used.size() - used) + " of " +
+                   std::to_string(order.used.size()) + " are stamped not after the one that was recorded before");
+  }
+  return order;
+}
+
+ClockCheck checkClock(const BagReader& bag, const BagImages& images, const ImageOrder& order,
+                      const std::vector<Fix>& fixes, const MapBuilderConfig& config,
+                      const std::optional<SensorMount>& mount, std::size_t threads) {
   TimeRange of_images;
   TimeRange of_fixes;
   for (const Fix& fix : fixes) {
     if (hasPosition(fix)) of_fixes.extend(fix.stamp_ns);
   }
   PictureMotion motion(threads);
-  StampOrder order;
   {
     ProgressBar bar("comparing clocks");
     for (std::size_t i = 0; i < images.size(); ++i) {
+      if (!order.used[i]) continue;
       const BagImage image = images.read(i);
-      order.add(image.stamp_ns);
       of_images.extend(image.stamp_ns);
       if (motion.wants(image.stamp_ns)) {
         try {
@@ -239,9 +296,12 @@ ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::
     }
   }
   requireCommonTime(bag, images, of_images, of_fixes);
-  const std::vector<PictureShift> pictures = motion.finish();
+  std::vector<PictureShift> pictures = motion.finish();
+  if (isUpsideDown(mount)) {
+    for (PictureShift& picture : pictures) picture.shift = -picture.shift;
+  }
   const Paths paths = pathsOf(fixes, config.trajectory);
-  if (const auto step = stepOf(pictures, paths)) return {0.0, 0.0, false, *step, order.remark()};
+  if (const auto step = stepOf(pictures, paths)) return {0.0, 0.0, false, *step};
   std::optional<ClockOffset> found = offsetOf(pictures, paths);
   const auto exchanged =
       agrees(found) ? std::nullopt : offsetOf(pictures, pathsOf(exchangedIn(fixes), config.trajectory));
@@ -251,7 +311,6 @@ ClockCheck checkClock(const BagReader& bag, const BagImages& images, const std::
   if (found && mount) found->offset_s += mount->antenna_m.x() / std::max(0.1, medianSpeed_mps(paths.front()));
   ClockCheck check = judged(found);
   check.exchanged = is_exchanged;
-  check.went_back = order.remark();
   if (is_exchanged)
     check.remark.text = "fixes: latitude and longitude are exchanged, by the turns: put right; " + check.remark.text;
   return check;

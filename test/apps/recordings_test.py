@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import rosbag
 import rospy
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped
 from nav_msgs.msg import Odometry
 from program_runner import ProgramTest, run
 from tf2_msgs.msg import TFMessage
@@ -152,6 +152,63 @@ class ClocksTest(RecordingTest):
             self.assertIn('check before use', said.splitlines()[-1])
 
 
+class ImagesTest(RecordingTest):
+    """Images as cameras and drivers send them: the first 100 s."""
+
+    def with_images(self, change) -> Path:
+        """`change`: gets an image and its place among them, and changes it."""
+        count = iter(range(10000))
+
+        def one(topic, message, stamp):
+            if stamp.to_sec() >= FIRST_S + 100:
+                return []
+            if topic == IMAGES:
+                change(message, next(count))
+            return [(topic, message, stamp)]
+        return self.record(one)
+
+    def test_a_stamp_that_cannot_be_costs_one_image(self):
+        kept = self.kept(self.said(self.with_images(lambda image, place: None)))
+        for strange in (0, 60):
+            def change(image, place, at=strange):
+                if place == at:
+                    image.header.stamp += rospy.Duration(3600)
+            said = self.said(self.with_images(change))
+            self.assertRegex(said, r'stamps of images are not in order: 1 of \d+ images are left out')
+            self.assertGreaterEqual(self.kept(said), kept - 1)
+            self.assertNotIn('not in order', said.splitlines()[-1])
+
+    def test_behind_a_clock_that_was_set_back_nothing_is_mixed(self):
+        def change(image, place):
+            if image.header.stamp.to_sec() > FIRST_S + 70:
+                image.header.stamp -= rospy.Duration(60)
+        said = self.said(self.with_images(change))
+        self.assertRegex(said, r'the stamps of images go back by (59|60)\.\d s after 12212100(69|70)')
+        left = int(re.search(r'(\d+) of \d+ images are left out', said).group(1))
+        self.assertGreater(left, 10)
+        self.assertIn('check before use', said.splitlines()[-1])
+
+    def test_two_cameras_on_one_topic_are_refused_by_name(self):
+        def change(image, place):
+            image.header.frame_id = ('/left', 'left', 'right')[0 if place < 5 else place % 2 + 1]
+        self.assert_refused(self.build(self.with_images(change)), 1, IMAGES, "frames 'left' and 'right'")
+
+    def test_images_too_small_to_tell_places_apart_are_named(self):
+        def change(image, place):
+            small = cv2.resize(cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_GRAYSCALE), (64, 48))
+            image.data = cv2.imencode('.png', small)[1].tobytes()
+        said = self.said(self.with_images(change))
+        self.assertRegex(said.splitlines()[-1], r'check before use.*only \d+ features an image, at 64x48 px')
+
+    def test_a_crawler_does_not_stand(self):
+        def slower(topic, message, stamp):
+            if stamp.to_sec() >= FIRST_S + 60:
+                return []
+            message.header.stamp = rospy.Time(FIRST_S) + 40 * (message.header.stamp - rospy.Time(FIRST_S))
+            return [(topic, message, message.header.stamp)]
+        self.assertNotIn('while the robot stood', self.said(self.record(slower)))
+
+
 def copy_of(message, **changes):
     other = copy.deepcopy(message)
     for name, value in changes.items():
@@ -223,6 +280,15 @@ class ReceiversTest(RecordingTest):
                                 ((505267.0, 9.9e6), 'taken for UTM of zone 31 south')):
             self.check_same(self.with_fixes(odometry(*offset_m)), words)
 
+    def test_a_variance_of_9999_is_none(self):
+        def change(fix):
+            return [copy_of(fix, position_covariance=[9999.0, 0, 0, 0, 9999.0, 0, 0, 0, 9999.0],
+                            position_covariance_type=1)]
+        expected = r'expected error of its positions .*'
+        unknown = self.said(self.with_fixes(lambda fix: [copy_of(fix, position_covariance_type=0)]))
+        said = self.said(self.with_fixes(change))
+        self.assertEqual(re.search(expected, said).group(0), re.search(expected, unknown).group(0))
+
     def test_another_type_is_named(self):
         result = self.build(SUNNY, '--fix-topic', CAMERA_INFO)
         self.assert_refused(result, 1, f"topic '{CAMERA_INFO}' has sensor_msgs/CameraInfo", FIXES)
@@ -257,6 +323,26 @@ class FramesTest(RecordingTest):
         self.assertRegex(said, r"camera by frames 'base_footprint' to 'mast', taken for one of a body .*antenna 'gps'")
         self.assertRegex(said, r'camera at 0\.30 0\.00 1\.00 m, looking -?0\.0 degrees to the left and -?0\.0 up; '
                          r'antenna at -0\.20 0\.00 0\.50 m')
+
+    def test_a_camera_that_is_said_to_be_upside_down_is_no_mirrored_one(self):
+        def turned(topic, message, stamp):
+            if topic == IMAGES:
+                image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_GRAYSCALE)
+                message.data = cv2.imencode('.jpg', cv2.rotate(image, cv2.ROTATE_180))[1].tobytes()
+            messages = [(topic, message, stamp)]
+            if not self.framed:
+                self.framed = True
+                camera, antenna = TransformStamped(child_frame_id='stereo_left'), TransformStamped(child_frame_id='gps')
+                # x of the image to the left of the robot, y up, z ahead.
+                camera.transform.rotation = Quaternion(0.5, 0.5, 0.5, 0.5)
+                antenna.transform.rotation.w = 1.0
+                camera.header.frame_id = antenna.header.frame_id = 'base_link'
+                messages.insert(0, ('/tf_static', TFMessage([camera, antenna]), stamp))
+            return messages
+        self.framed = False
+        said = self.said(self.record(turned))
+        self.assertIn("camera by frames 'base_link' to 'stereo_left'", said)
+        self.assertRegex(said, 'clocks: by the turns, fixes and images agree')
 
     def test_unknown_frames_are_refused_by_name(self):
         links = ('base_link', 'mast', (0.3, 0.0, 1.0)), ('base_link', 'gps', (0.0, 0.0, 0.5))
