@@ -44,6 +44,14 @@ cv::Size requireBounded(const std::string& session, cv::Size size) {
   return size;
 }
 
+/// Half of both sides, as often as it takes; 0: as recorded.
+cv::Size halvedTo(double max_megapixels, cv::Size size) {
+  const auto isTooLarge = [&] { return max_megapixels > 0.0 && size.area() > 1e6 * max_megapixels; };
+  while (isTooLarge() && std::min(size.width, size.height) >= 2 * kSmallestImageSide_px)
+    size = (size + cv::Size(1, 1)) / 2;
+  return size;
+}
+
 /// The unpruned features of the images that tell what is noise in image `i`.
 std::vector<std::shared_ptr<const LocalFeatures>> neighboursOf(std::size_t i, const PruningNeighbours& neighbours,
                                                                const TrainingMap& unpruned) {
@@ -168,7 +176,8 @@ void MapBuilder::addImage(std::int64_t stamp_ns, const cv::Mat& grey) {
   SessionImages& session = report_.session_images.back();
   if (session.recorded.empty()) session.recorded = grey.size();
   if (header_.image_size.empty()) {
-    header_.image_size = report_.image_size = requireBounded(session.name, session.recorded);
+    const cv::Size recorded = requireBounded(session.name, session.recorded);
+    header_.image_size = report_.image_size = halvedTo(config_.max_megapixels, recorded);
   }
   if (session.kept == 0) fitCamera();
   if (grey.size() != session.recorded) ++session.other_sizes[{grey.cols, grey.rows}];
@@ -351,6 +360,11 @@ void MapBuilderConfig::declare(ParameterVisitor& visitor) {
        "keep, after all images were pruned and adjusted, only those at least this far from the last kept one of their "
        "session"},
       spacing_m, 0.0, 1000.0);
+  visitor.real(
+      {"map/max_megapixels", "Mpx",
+       "the map has images of half of the width and height, or a quarter and so on, of a camera that has more, "
+       "and live images are resized to them; 0: as recorded"},
+      max_megapixels, 0.0, 1000.0);
   visitor.flag(
       {"map/prune", "", "keep only features that one of the two nearest training images of its session shows too"},
       prune);

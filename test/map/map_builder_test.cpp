@@ -122,6 +122,28 @@ TEST(MapBuilder, OtherSizesAreResizedToTheFirst) {
   for (const Keypoint& keypoint : map->local(1)->keypoints()) EXPECT_LT(keypoint.x_px, 320.0F);
 }
 
+TEST(MapBuilder, ImagesOfALargeCameraAreHalvedUntilTheyAreSmallEnough) {
+  const auto sizeOf = [](double max_megapixels) {
+    MapBuilderConfig config;
+    config.max_megapixels = max_megapixels;
+    config.geometry.enabled = false;
+    MapBuilder builder(config);
+    CameraModel camera({{320, 240}, 300.0, 300.0, 159.5, 119.5, Distortion::kPlumbBob, {}});
+    builder.beginSession("round", straightRound(), {camera});
+    for (int i = 0; i < 2; ++i) builder.addImage(i * kSecond_ns, scene(1, 4 * i));
+    const auto map = builder.build();
+    EXPECT_EQ(builder.report().session_images.front().recorded, cv::Size(320, 240));
+    EXPECT_EQ(map->header().sessions.front().camera->intrinsics().size, map->header().image_size);
+    return map->header().image_size;
+  };
+  EXPECT_EQ(sizeOf(MapBuilderConfig().max_megapixels), cv::Size(320, 240));
+  EXPECT_EQ(sizeOf(0.0769), cv::Size(320, 240));
+  EXPECT_EQ(sizeOf(0.076), cv::Size(160, 120));
+  EXPECT_EQ(sizeOf(0.019), cv::Size(80, 60));
+  EXPECT_EQ(sizeOf(1e-9), cv::Size(40, 30)) << "not smaller than features need";
+  EXPECT_EQ(sizeOf(0.0), cv::Size(320, 240)) << "as recorded";
+}
+
 TEST(MapBuilder, TheFirstImagesDoNotDecideASizeThatIsGiven) {
   MapBuilder builder({});
   builder.beginSession("round", straightRound(), {{}, {}, {}, {320, 240}});

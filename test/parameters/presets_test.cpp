@@ -106,6 +106,7 @@ TEST(Presets, MapsAreNeitherAdjustedNorThinned) {
   EXPECT_FALSE(config.geometry.enabled);
   EXPECT_TRUE(config.prune);
   EXPECT_DOUBLE_EQ(config.spacing_m, 0.0);
+  EXPECT_DOUBLE_EQ(config.max_megapixels, 0.0);
   EXPECT_DOUBLE_EQ(config.trajectory.speed_tolerance, 0.05);
   EXPECT_THAT(test::refusalOf<ParameterError>([] {
                 builderOf({{"preset", std::string("paper")}, {"sift/contrast_threshold", 0.02}});

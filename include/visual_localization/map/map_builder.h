@@ -35,6 +35,7 @@ struct MapBuilderConfig {
   std::string preset;
   double min_spacing_m = 0.0;
   double spacing_m = 0.0;
+  double max_megapixels = 1.0;
   bool prune = false;
   std::string model;
   std::string base_frame = "base_link";
@@ -132,7 +133,8 @@ class MapBuilder {
   /// shape. Counts the reasons otherwise.
   bool wants(std::int64_t stamp_ns, cv::Size recorded = {});
   /// `grey`: 8-bit, one channel; an empty one counts as unusable. The map's images have the size of the first
-  /// session's: its SessionCamera::image_size, without which its first image decides. Others are resized to it, and
+  /// session's, halved until they have no more than max_megapixels: its SessionCamera::image_size, without which its
+  /// first image decides. Others are resized to it, and
   /// counted where their session has another size. Where SessionCamera::image_size is given, images of another aspect
   /// ratio are left out: no calibration holds for them. Throws CameraError when the session's camera or mask is for
   /// images of another shape, and std::runtime_error when the map's images would be too large.
