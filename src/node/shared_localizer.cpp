@@ -12,13 +12,12 @@
 namespace visual_localization {
 namespace {
 
-/// A disc without area, or one that does not touch the map, leaves nothing to search.
-void requireSearchable(const Eigen::Vector2d& centre_m, double radius_m, const Area& area) {
-  if (radius_m == 0.0) throw std::invalid_argument("the radius must be above 0, in metres");
+/// A disc that does not touch the map leaves nothing to search. `what`: for the message.
+void requireNear(const char* what, const Eigen::Vector2d& centre_m, double radius_m, const Area& area) {
   const Eigen::Vector2d nearest_m = centre_m.cwiseMax(area.min_m).cwiseMin(area.max_m);
   if ((nearest_m - centre_m).norm() <= radius_m) return;
   std::ostringstream text;
-  text << std::fixed << std::setprecision(1) << "the disc lies outside the map, which covers x from " << area.min_m.x()
+  text << std::fixed << std::setprecision(1) << what << " lies outside the map, which covers x from " << area.min_m.x()
        << " to " << area.max_m.x() << " m and y from " << area.min_m.y() << " to " << area.max_m.y() << " m";
   throw std::invalid_argument(text.str());
 }
@@ -141,15 +140,20 @@ bool SharedLocalizer::relocalizeAround(const Eigen::Vector2d& centre_m, double r
   const Prior prior = around(centre_m, radius_m);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!localizer_) return false;
-  requireSearchable(centre_m, radius_m, localizer_->map().area());
+  if (radius_m == 0.0) throw std::invalid_argument("the radius must be above 0, in metres");
+  requireNear("the disc", centre_m, radius_m, localizer_->map().area());
   localizer_->relocalize(prior);
   return true;
 }
 
 bool SharedLocalizer::relocalizeAt(const Guess& guess) {
+  constexpr double kNear_m = 10.0;
+  constexpr double kSigmas = 3.0;
   const Prior prior = normallyDistributed(guess.mean_m, guess.covariance_m2);
   const std::lock_guard<std::mutex> lock(mutex_);
   if (localizer_) {
+    const double radius_m = std::max(kNear_m, kSigmas * largerSigma(guess.covariance_m2));
+    requireNear("the pose", guess.mean_m, radius_m, localizer_->map().area());
     localizer_->relocalize(prior);
   } else {
     waiting_prior_ = prior;

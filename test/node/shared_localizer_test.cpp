@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "test/node/small_map.h"
+#include "test/support/refusal.h"
 #include "test/support/stamps.h"
 #include "test/support/swarm_config.h"
 #include "visual_localization/parameters/parameters.h"
@@ -109,6 +110,17 @@ TEST(SharedLocalizer, ADiscThatIsNoneIsRefusedWithTheReason) {
 TEST(SharedLocalizer, ADiscMustTouchTheMap) {
   EXPECT_EQ(refusalOfDisc({500.0, 0.0}, 600.0), "");
   EXPECT_THAT(refusalOfDisc({500.0, 0.0}, 10.0), testing::HasSubstr("outside the map, which covers x from "));
+}
+
+TEST(SharedLocalizer, AGuessMustBeNearTheMap) {
+  SharedLocalizer localizer{test::swarmConfig()};
+  localizer.setMap(test::smallMap());
+  const Eigen::Matrix2d near_m2 = Eigen::Matrix2d::Identity();
+  EXPECT_THAT(test::refusalOf<std::invalid_argument>([&] {
+                localizer.relocalizeAt({{500.0, 0.0}, near_m2});
+              }),
+              testing::HasSubstr("the pose lies outside the map, which covers x from "));
+  EXPECT_TRUE(localizer.relocalizeAt({{500.0, 0.0}, 200.0 * 200.0 * near_m2}));
 }
 
 TEST(SharedLocalizer, AnUnusableImageChangesNothing) {
