@@ -5,7 +5,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,37 +13,7 @@
 
 namespace visual_localization {
 
-/// The nearest of a few thousand positions in constant time: a grid of cells, each with the positions that are the
-/// nearest of some position in it. Exact; a position that has no cell, or a cell with too many candidates, has no
-/// answer here.
-class NearestGrid {
- public:
-  /// All positions within `radius_m` of `centre_m`, in order of index; when those are too many for a cell, too many.
-  using Within = std::function<std::vector<std::uint32_t>(const Eigen::Vector2d& centre_m, double radius_m)>;
-  /// Distance to the nearest position, up to a billionth more.
-  using Distance = std::function<double(const Eigen::Vector2d& position_m)>;
-
-  /// `positions_m` must outlive the grid.
-  NearestGrid(const std::vector<Eigen::Vector2d>& positions_m, const Distance& distance, const Within& within);
-
-  /// The nearest position, the first of equals, with its squared distance.
-  struct Found {
-    std::uint32_t index = 0;
-    double squared_m2 = 0.0;
-  };
-  std::optional<Found> nearest(const Eigen::Vector2d& position_m) const;
-
- private:
-  const std::vector<Eigen::Vector2d>& positions_m_;
-  Eigen::Vector2d min_m_ = Eigen::Vector2d::Zero();
-  double cell_m_ = 1.0;
-  std::size_t columns_ = 0;
-  std::size_t rows_ = 0;
-  std::vector<std::uint32_t> begins_;      ///< of each cell's candidates, and the end of the last
-  std::vector<std::uint32_t> candidates_;  ///< cell by cell, in order of index
-};
-
-/// Finds the nearest of many positions: a k-d tree, and for small maps a grid. Of equally distant positions the one
+/// Finds the nearest of many positions: a k-d tree. Of equally distant positions the one
 /// with the lower index comes first, so that the answer does not depend on how the tree was split.
 class PositionIndex {
  public:
@@ -77,7 +46,6 @@ class PositionIndex {
  private:
   class Tree;
   std::unique_ptr<Tree> tree_;
-  std::unique_ptr<const NearestGrid> grid_;  ///< of small maps
 };
 
 }  // namespace visual_localization

@@ -1,3 +1,5 @@
+#include "map/position_index.h"
+
 #include <algorithm>
 #include <limits>
 #include <random>
@@ -5,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "base/time.h"
-#include "map/position_index.h"
 #include "test/support/synthetic.h"
 
 namespace visual_localization {
@@ -22,93 +23,40 @@ std::uint32_t nearestOf(const Positions& positions_m, const Eigen::Vector2d& pla
   return static_cast<std::uint32_t>(first - positions_m.begin());
 }
 
-NearestGrid gridOf(const Positions& positions_m) {
-  return NearestGrid(
-      positions_m,
-      [&](const Eigen::Vector2d& place_m) { return (positions_m[nearestOf(positions_m, place_m)] - place_m).norm(); },
-      [&](const Eigen::Vector2d& centre_m, double radius_m) {
-        std::vector<std::uint32_t> found;
-        for (std::uint32_t i = 0; i < positions_m.size(); ++i) {
-          if ((positions_m[i] - centre_m).norm() < radius_m) found.push_back(i);
-        }
-        return found;
-      });
-}
-
-/// Compares with all positions at random places in the square around the origin. Returns the share of answers.
-double shareAnsweredRightly(const Positions& positions_m, double half_side_m) {
-  const NearestGrid grid = gridOf(positions_m);
+/// At random places in the square around the origin the answer is that of looking at all positions.
+void expectNearest(const Positions& positions_m, double half_side_m) {
+  const PositionIndex index(positions_m);
   std::mt19937 random(7);
   std::uniform_real_distribution<double> coordinate_m(-half_side_m, half_side_m);
-  constexpr int kPlaces = 2000;
-  int answered = 0;
-  for (int i = 0; i < kPlaces; ++i) {
+  for (int i = 0; i < 2000; ++i) {
     const Eigen::Vector2d place_m(coordinate_m(random), coordinate_m(random));
-    const auto found = grid.nearest(place_m);
-    if (!found) continue;
-    ++answered;
+    const Neighbour found = index.nearest(place_m);
     const std::uint32_t expected = nearestOf(positions_m, place_m);
-    EXPECT_EQ(found->index, expected) << place_m.transpose();
-    EXPECT_EQ(found->squared_m2, (positions_m[expected] - place_m).squaredNorm());
+    EXPECT_EQ(found.image, expected) << place_m.transpose();
+    EXPECT_DOUBLE_EQ(found.distance_m, (positions_m[expected] - place_m).norm());
   }
-  return static_cast<double>(answered) / kPlaces;
 }
 
-TEST(NearestGrid, AnswersOnARoundAsAllPositionsWould) {
-  EXPECT_GT(shareAnsweredRightly(test::circle(150, 30.0), 32.0), 0.9);  // all are near the middle
-}
-
-TEST(NearestGrid, AnswersOnACloudAsAllPositionsWould) {
+TEST(PositionIndex, AnswersAsLookingAtAllPositionsWould) {
+  expectNearest(test::circle(150, 30.0), 32.0);
   std::mt19937 random(3);
   std::normal_distribution<double> coordinate_m(0.0, 10.0);
   Positions cloud(200);
   for (auto& position : cloud) position = {coordinate_m(random), coordinate_m(random)};
-  EXPECT_GT(shareAnsweredRightly(cloud, 20.0), 0.9);
-}
-
-TEST(NearestGrid, AnswersAlongALine) {
+  expectNearest(cloud, 20.0);
   Positions line = test::street(100, 1.0);
-  for (auto& position : line) position.x() -= 50.0;
-  EXPECT_GT(shareAnsweredRightly(line, 5.0), 0.9);
+  expectNearest(line, 5.0);
   for (auto& position : line) std::swap(position.x(), position.y());
-  EXPECT_GT(shareAnsweredRightly(line, 5.0), 0.9);
+  expectNearest(line, 5.0);
+  expectNearest({{-1e6, -1e6}, {1e6, 1e6}, {1e6, -1e6}}, 1e6);
 }
 
-TEST(NearestGrid, GivesTheFirstOfEquals) {
-  const Positions twice{{0.0, 0.0}, {2.0, 0.0}, {2.0, 0.0}, {0.0, 0.0}, {4.0, 0.0}};
-  const NearestGrid grid = gridOf(twice);
-  EXPECT_EQ(grid.nearest({0.1, 0.1})->index, 0U);
-  EXPECT_EQ(grid.nearest({1.0, 0.0})->index, 0U);
-  EXPECT_EQ(grid.nearest({1.5, 0.0})->index, 1U);
-  EXPECT_EQ(grid.nearest({3.0, 0.25})->index, 1U);
-}
-
-TEST(NearestGrid, HasNoAnswerFarOutsideOrNowhere) {
-  const Positions round = test::circle(20, 10.0);
-  const NearestGrid grid = gridOf(round);
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  for (const Eigen::Vector2d& place_m :
-       Positions{{100.0, 0.0}, {-100.0, 0.0}, {0.0, 1e300}, {kNan, 0.0}, {0.0, kNan}, {kInfinity, 0.0}}) {
-    EXPECT_FALSE(grid.nearest(place_m)) << place_m.transpose();
-  }
-  EXPECT_TRUE(grid.nearest({10.5, 0.0}));
-}
-
-TEST(NearestGrid, KnowsTheOnlyPosition) {
-  const Positions one{{3.0, -4.0}};
-  const NearestGrid grid = gridOf(one);
-  const auto found = grid.nearest({3.0, -4.0});
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->index, 0U);
-  EXPECT_EQ(found->squared_m2, 0.0);
-}
-
-TEST(NearestGrid, GivesTheFirstOfAFewOnOneSpotAndNoneOfMany) {
-  const Positions few(20, Eigen::Vector2d(1.0, 1.0));
-  EXPECT_EQ(gridOf(few).nearest({1.0, 1.0})->index, 0U);
-  const Positions many(100, Eigen::Vector2d(1.0, 1.0));
-  EXPECT_FALSE(gridOf(many).nearest({1.0, 1.0}));
+TEST(PositionIndex, GivesTheFirstOfEquals) {
+  const PositionIndex index({{0.0, 0.0}, {2.0, 0.0}, {2.0, 0.0}, {0.0, 0.0}, {4.0, 0.0}});
+  EXPECT_EQ(index.nearest({0.1, 0.1}).image, 0U);
+  EXPECT_EQ(index.nearest({1.0, 0.0}).image, 0U);
+  EXPECT_EQ(index.nearest({1.5, 0.0}).image, 1U);
+  EXPECT_EQ(index.nearest({3.0, 0.25}).image, 1U);
 }
 
 /// A street of 100 m in whose middle the robot was parked: `parked` images within `reach_m`.
@@ -125,14 +73,14 @@ TEST(PositionIndex, ManyImagesOnOneSpotTakeNoLongerThanOthers) {
     const Positions positions_m = parkedOnStreet(19000, reach_m);
     const CpuStopwatch watch;
     const PositionIndex index(positions_m);
-    EXPECT_LT(watch.elapsed_ms(), 10000.0) << "half a second; it was an hour";
+    EXPECT_LT(watch.elapsed_ms(), 10000.0) << "the tree alone takes milliseconds";
     for (const Eigen::Vector2d& place_m : Positions{{50.0, 0.0}, {50.4, 3.0}, {10.2, 0.3}, {50.001, 0.002}}) {
       EXPECT_EQ(index.nearest(place_m).image, nearestOf(positions_m, place_m)) << place_m.transpose();
     }
   }
 }
 
-TEST(PositionIndex, OfMoreImagesOnOneSpotThanAGridTakesTheFirstAreFound) {
+TEST(PositionIndex, OfMoreImagesOnOneSpotThanAreSoughtTheFirstAreFound) {
   const Positions positions_m = parkedOnStreet(200'000, 0.0);
   const PositionIndex index(positions_m);
   constexpr std::size_t kFirstParked = 100;
@@ -147,11 +95,6 @@ TEST(PositionIndex, OfMoreImagesOnOneSpotThanAGridTakesTheFirstAreFound) {
     EXPECT_EQ(found.back().image, kFirstParked + 30) << "one of the street is on the same spot";
   }
   EXPECT_LT(watch.elapsed_ms(), 1000.0) << "to look at all of them each time takes seconds";
-}
-
-TEST(NearestGrid, AnswersBetweenPositionsThatAreFarApart) {
-  const Positions apart{{-1e6, -1e6}, {1e6, 1e6}, {1e6, -1e6}};
-  EXPECT_EQ(shareAnsweredRightly(apart, 1e6), 1.0);
 }
 
 TEST(PositionIndex, WithinARadiusAreAllAndInOrder) {
