@@ -89,9 +89,8 @@ std::string whereItsFeaturesAre(double file_bytes) {
 void printFile(std::ostream& out, const std::string& path, const TrainingMap& map) {
   const MapHeader& header = map.header();
   const auto bytes = static_cast<double>(std::filesystem::file_size(path));
-  const MapOrigin origin = originOf(path);
-  out << key("map") << oneLine(path) << ", version " << origin.schema_version << ", written by visual_localization "
-      << origin.package_version << '\n'
+  out << key("map") << oneLine(path) << ", version " << kMapSchemaVersion << ", written by visual_localization "
+      << packageVersionOf(path) << '\n'
       << key("size") << humanSize(bytes) << " on disk, " << whereItsFeaturesAre(bytes) << '\n'
       << key("datum") << std::setprecision(9) << header.datum.latitude_deg << " deg, " << header.datum.longitude_deg
       << " deg, " << header.datum.altitude_m << " m; positions below are metres (east, north) from it\n"
@@ -200,7 +199,7 @@ void printErrors(std::ostream& out, const TrainingMap& map, const std::vector<Er
   for (std::size_t s = 0; s < std::min(sessions.size(), kMostSessions); ++s) {
     out << key(s == 0 ? "errors" : "");
     if (sessions.size() > 1) out << s << ": ";
-    out << (sessions[s].fixes ? describe(*sessions[s].fixes) : "not known: built before map version 8") << '\n';
+    out << (sessions[s].fixes ? describe(*sessions[s].fixes) : "not known") << '\n';
     std::vector<ErrorStretch> of_session;
     std::copy_if(errors.begin(), errors.end(), std::back_inserter(of_session),
                  [s](const ErrorStretch& stretch) { return stretch.session == static_cast<int>(s); });

@@ -56,7 +56,6 @@ FileFeatureStore::FileFeatureStore(sqlite::Database database, std::string path, 
       global_rows_(database_, std::string(map_rows::kSelectGlobal) + kOfOneImage),
       preview_rows_(database_, std::string(map_rows::kSelectPreview) + kOfOneImage),
       cache_(cache_bytes) {
-  // A map of an older version has no such table.
   if (stored_.geometry_count > 0)
     geometry_rows_.emplace(database_, std::string(map_rows::kSelectGeometry) + kOfOneImage);
   if (stored_.vlad_bytes > 0) vlad_rows_.emplace(database_, std::string(map_rows::kSelectVlad) + kOfOneImage);

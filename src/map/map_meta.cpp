@@ -62,15 +62,13 @@ bool takeFlag(ParameterValues& meta, const std::string& key) {
   throw std::runtime_error("meta value '" + key + "' = " + std::to_string(flag) + " is not 0 or 1");
 }
 
-/// The kind of local features and its parameters. Before kSinceKinds all are SIFT; before kSinceUpright they have the
-/// orientation and the distance of the papers.
-std::shared_ptr<const LocalFeatureKind> takeKind(ParameterValues& meta, int version) {
-  std::unique_ptr<LocalFeatureKind> kind = std::make_unique<Sift>();
-  if (version >= kSinceKinds) kind = makeLocalFeatureKind(take<std::string>(meta, kKind));
+/// The kind of local features and its parameters.
+std::shared_ptr<const LocalFeatureKind> takeKind(ParameterValues& meta) {
+  std::unique_ptr<LocalFeatureKind> kind = makeLocalFeatureKind(take<std::string>(meta, kKind));
   ParameterValues values = kind->parameters();
   for (auto& [name, value] : values) {
     if (std::holds_alternative<bool>(value)) {
-      if (version >= kSinceUpright) value = takeFlag(meta, name);
+      value = takeFlag(meta, name);
       continue;
     }
     const auto found = meta.find(name);
@@ -82,7 +80,7 @@ std::shared_ptr<const LocalFeatureKind> takeKind(ParameterValues& meta, int vers
   const auto wrong = parameters::violations([&kind](ParameterVisitor& visitor) { kind->declareStored(visitor); });
   if (!wrong.empty()) throw ParameterError(wrong.front());
   const auto dimension = static_cast<std::int64_t>(kind->form().dimension);
-  if (version < kSinceKinds || take<std::int64_t>(meta, kDimension) == dimension) return kind;
+  if (take<std::int64_t>(meta, kDimension) == dimension) return kind;
   throw std::runtime_error("its features '" + kind->name() + "' are not of dimension " + std::to_string(dimension));
 }
 
@@ -258,7 +256,7 @@ void requireSessions(std::size_t count) {
   throw std::runtime_error("it has more than the " + std::to_string(kMaxSessions) + " sessions that are allowed");
 }
 
-std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::Size& size, const MaskBits& masks) {
+std::vector<Session> takeSessions(ParameterValues& meta, const cv::Size& size, const MaskBits& masks) {
   std::vector<Session> sessions;
   DecodedMasks decoded(size);
   std::size_t used = 0;
@@ -267,14 +265,12 @@ std::vector<Session> takeSessions(ParameterValues& meta, int version, const cv::
     const std::string key = sessionKey(sessions.size());
     Session session{take<std::string>(meta, key)};
     requireName(key, session.name);
-    if (version >= kSinceCameras) {
-      session.camera = takeCamera(meta, key, kCamera);
-      session.mount = takeMount(meta, key);
-      session.mask = takeMask(meta, sessions.size(), masks, decoded);
-    }
-    if (version >= kSincePublished) session.published = takeCamera(meta, key, kPublished);
-    if (version >= kSinceFixes) session.fixes = takeFixes(meta, key);
-    if (version >= kSinceDoubts) session.doubtful = takeDoubtful(meta, key);
+    session.camera = takeCamera(meta, key, kCamera);
+    session.mount = takeMount(meta, key);
+    session.mask = takeMask(meta, sessions.size(), masks, decoded);
+    session.published = takeCamera(meta, key, kPublished);
+    session.fixes = takeFixes(meta, key);
+    session.doubtful = takeDoubtful(meta, key);
     if (!session.mask.empty()) ++used;
     sessions.push_back(std::move(session));
   }
@@ -362,27 +358,25 @@ ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count) {
   return meta;
 }
 
-std::size_t takeGeometryCount(ParameterValues& meta, int version) {
-  if (version < kSinceLandmarks) return 0;
+std::size_t takeGeometryCount(ParameterValues& meta) {
   const auto count = take<std::int64_t>(meta, kGeometryCount);
   if (count >= 0 && count <= kMaxImages) return static_cast<std::size_t>(count);
   throw std::runtime_error("meta value '" + std::string(kGeometryCount) + "' = " + std::to_string(count) +
                            " is not in [0, " + std::to_string(kMaxImages) + "]");
 }
 
-MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks,
-                   const std::vector<std::uint8_t>& vocabulary) {
+MapHeader toHeader(ParameterValues meta, const MaskBits& masks, const std::vector<std::uint8_t>& vocabulary) {
   MapHeader header;
   header.datum.latitude_deg = take<double>(meta, "datum/latitude_deg");
   header.datum.longitude_deg = take<double>(meta, "datum/longitude_deg");
   header.datum.altitude_m = take<double>(meta, "datum/altitude_m");
   header.image_size = takeImageSize(meta);
   take<std::string>(meta, "package_version");
-  header.kind = takeKind(meta, version);
-  header.sessions = takeSessions(meta, version, header.image_size, masks);
-  if (version >= kSinceVlad) header.vocabulary = takeVocabulary(meta, header, vocabulary);
+  header.kind = takeKind(meta);
+  header.sessions = takeSessions(meta, header.image_size, masks);
+  header.vocabulary = takeVocabulary(meta, header, vocabulary);
   if (meta.count(kPreset) != 0) header.preset = presetNamed(take<std::string>(meta, kPreset)).name;
-  if (version >= kSinceHistory) header.history = takeHistory(meta);
+  header.history = takeHistory(meta);
   if (!meta.empty()) throw std::runtime_error("meta value '" + meta.begin()->first + "' is unknown");
   return header;
 }

@@ -124,10 +124,9 @@ struct Opened {
   map_rows::Budget budget;               ///< for the rest
 };
 
-map_schema::MaskBits readMasks(const map_rows::MapDatabase& map, map_rows::Budget& budget) {
+map_schema::MaskBits readMasks(const sqlite::Database& map, map_rows::Budget& budget) {
   map_schema::MaskBits masks;
-  if (map.version < map_schema::kSinceCameras) return masks;
-  Statement row(map.database, "SELECT session, bits FROM masks ORDER BY session");
+  Statement row(map, "SELECT session, bits FROM masks ORDER BY session");
   while (row.step()) {
     const std::int64_t session = row.integer(0);
     if (!masks.empty() && session <= masks.rbegin()->first) throw Refusal("is damaged: its masks are not in order");
@@ -139,9 +138,8 @@ map_schema::MaskBits readMasks(const map_rows::MapDatabase& map, map_rows::Budge
 }
 
 /// As it is stored; empty: there is none.
-std::vector<std::uint8_t> readVocabulary(const map_rows::MapDatabase& map, map_rows::Budget& budget) {
-  if (map.version < map_schema::kSinceVlad) return {};
-  Statement row(map.database, "SELECT id, learnt FROM vocabulary");
+std::vector<std::uint8_t> readVocabulary(const sqlite::Database& map, map_rows::Budget& budget) {
+  Statement row(map, "SELECT id, learnt FROM vocabulary");
   if (!row.step()) return {};
   const sqlite::Bytes learnt = row.blob(1);
   budget.spend(learnt.size);
@@ -150,18 +148,17 @@ std::vector<std::uint8_t> readVocabulary(const map_rows::MapDatabase& map, map_r
   return bytes;
 }
 
-Opened readPosesAndHeader(const map_rows::MapDatabase& map, std::int64_t file_size) {
+Opened readPosesAndHeader(const sqlite::Database& map, std::int64_t file_size) {
   map_rows::Budget budget(file_size);
-  ParameterValues meta = readMeta(map.database, budget);
+  ParameterValues meta = readMeta(map, budget);
   const std::int64_t expected = takeChecksum(meta);
   map_schema::Checksum checksum;
   ParameterValues of_header = meta;
-  const std::size_t geometry_count = map_schema::takeGeometryCount(of_header, map.version);
-  MapHeader header =
-      map_schema::toHeader(std::move(of_header), map.version, readMasks(map, budget), readVocabulary(map, budget));
+  const std::size_t geometry_count = map_schema::takeGeometryCount(of_header);
+  MapHeader header = map_schema::toHeader(std::move(of_header), readMasks(map, budget), readVocabulary(map, budget));
   Opened opened{std::move(header), {}, {}, geometry_count, budget};
-  opened.poses = readPoses(map.database, file_size, opened.header.sessions.size(), checksum);
-  opened.row_seeds = map_schema::rowSeeds(opened.poses, map.version);
+  opened.poses = readPoses(map, file_size, opened.header.sessions.size(), checksum);
+  opened.row_seeds = map_schema::rowSeeds(opened.poses);
   checksum.add(meta);
   if (checksum.value() != expected) throw Refusal("is damaged: its content does not agree with its checksum");
   if (geometry_count > opened.poses.size()) throw Refusal("is damaged: more images have landmarks than there are");
@@ -179,17 +176,14 @@ void stepTo(std::size_t image, Statement& row, const char* what) {
 /// The rows of the landmarks, while the images pass by in their order.
 class GeometryRows {
  public:
-  explicit GeometryRows(const map_rows::MapDatabase& map) {
-    if (map.version < map_schema::kSinceLandmarks) return;
-    row_.emplace(map.database, map_rows::kSelectGeometry + std::string(" ORDER BY image"));
-    has_row_ = row_->step();
-  }
+  explicit GeometryRows(const sqlite::Database& map)
+      : row_(map, map_rows::kSelectGeometry + std::string(" ORDER BY image")), has_row_(row_.step()) {}
 
   std::optional<ImageGeometry> of(std::size_t image, std::int64_t seed, std::size_t feature_count) {
-    if (!has_row_ || row_->integer(0) != static_cast<std::int64_t>(image)) return std::nullopt;
-    std::optional<ImageGeometry> geometry = map_rows::geometryOf(*row_, seed, feature_count);
+    if (!has_row_ || row_.integer(0) != static_cast<std::int64_t>(image)) return std::nullopt;
+    std::optional<ImageGeometry> geometry = map_rows::geometryOf(row_, seed, feature_count);
     ++found_;
-    has_row_ = row_->step();
+    has_row_ = row_.step();
     return geometry;
   }
 
@@ -202,8 +196,8 @@ class GeometryRows {
   }
 
  private:
-  std::optional<Statement> row_;
-  bool has_row_ = false;
+  Statement row_;
+  bool has_row_;
   std::size_t found_ = 0;
 };
 
@@ -219,36 +213,33 @@ std::uint64_t storedBytes(const TrainingImage& image, const LocalFeatureKind& ki
 class VladRows {
  public:
   /// `bytes`: of each row; 0: there are none.
-  VladRows(const map_rows::MapDatabase& map, std::size_t bytes) : bytes_(bytes) {
-    if (map.version < map_schema::kSinceVlad) return;
-    row_.emplace(map.database, map_rows::kSelectVlad + std::string(" ORDER BY image"));
-  }
+  VladRows(const sqlite::Database& map, std::size_t bytes)
+      : bytes_(bytes), row_(map, map_rows::kSelectVlad + std::string(" ORDER BY image")) {}
 
   VladDescriptor of(std::size_t image, std::int64_t seed) {
     if (bytes_ == 0) return {};
-    stepTo(image, *row_, "bytes of the VLAD");
-    return map_rows::vladOf(*row_, seed, bytes_);
+    stepTo(image, row_, "bytes of the VLAD");
+    return map_rows::vladOf(row_, seed, bytes_);
   }
 
   /// After the last image.
   void requireEnd() {
-    if (row_ && row_->step()) throw Refusal("is damaged: it has VLAD without an image or a vocabulary");
+    if (row_.step()) throw Refusal("is damaged: it has VLAD without an image or a vocabulary");
   }
 
  private:
   std::size_t bytes_;
-  std::optional<Statement> row_;
+  Statement row_;
 };
 
 /// Reads and verifies what all images looked like, one after the other.
-void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
-  const sqlite::Database& database = map.database;
+void forEachImage(const sqlite::Database& map, Opened& opened, const std::function<void(TrainingImage&&)>& use) {
   const TrainingPoses& poses = opened.poses;
   const std::string in_order = " ORDER BY image";
   const LocalFeatureKind& kind = *opened.header.kind;
-  Statement local(database, map_rows::kSelectLocal + in_order);
-  Statement global(database, map_rows::kSelectGlobal + in_order);
-  Statement preview(database, map_rows::kSelectPreview + in_order);
+  Statement local(map, map_rows::kSelectLocal + in_order);
+  Statement global(map, map_rows::kSelectGlobal + in_order);
+  Statement preview(map, map_rows::kSelectPreview + in_order);
   GeometryRows geometry(map);
   VladRows vlads(map, opened.header.vocabulary ? opened.header.vocabulary->bytes() : 0);
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -272,7 +263,7 @@ void forEachImage(const map_rows::MapDatabase& map, Opened& opened, const std::f
   vlads.requireEnd();
 }
 
-std::shared_ptr<const TrainingMap> readWhole(const map_rows::MapDatabase& map, Opened opened) {
+std::shared_ptr<const TrainingMap> readWhole(const sqlite::Database& map, Opened opened) {
   std::vector<TrainingImage> images;
   images.reserve(opened.poses.size());
   forEachImage(map, opened, [&images](TrainingImage&& image) { images.push_back(std::move(image)); });
@@ -305,35 +296,35 @@ auto withMapFile(const std::string& path, Read read) {
 }  // namespace
 
 std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoading& loading) {
-  return withMapFile(path, [&](map_rows::MapDatabase&& map, std::int64_t size) {
+  return withMapFile(path, [&](sqlite::Database&& map, std::int64_t size) {
     Opened opened = readPosesAndHeader(map, size);
     if (static_cast<std::uint64_t>(size) <= loading.cache_bytes) return readWhole(map, std::move(opened));
     StoredRows rows{opened.poses.feature_counts, std::move(opened.row_seeds), opened.geometry_count, opened.header.kind,
                     opened.header.vocabulary ? opened.header.vocabulary->bytes() : 0};
-    auto store = std::make_unique<FileFeatureStore>(std::move(map.database), path, std::move(rows), loading.cache_bytes,
-                                                    loading.warn);
+    auto store =
+        std::make_unique<FileFeatureStore>(std::move(map), path, std::move(rows), loading.cache_bytes, loading.warn);
     return std::make_shared<const TrainingMap>(std::move(opened.header), std::move(opened.poses), std::move(store));
   });
 }
 
 void checkMap(const std::string& path) {
-  withMapFile(path, [](const map_rows::MapDatabase& file, std::int64_t size) {
+  withMapFile(path, [](const sqlite::Database& file, std::int64_t size) {
     Opened opened = readPosesAndHeader(file, size);
     forEachImage(file, opened, [](TrainingImage&&) {});
-    requireIntegrity(file.database);
+    requireIntegrity(file);
     // What a map may not be besides.
     const TrainingMap map(std::move(opened.header), std::move(opened.poses),
                           std::make_unique<MemoryFeatureStore>(std::vector<TrainingImage>()));
   });
 }
 
-MapOrigin originOf(const std::string& path) {
-  return withMapFile(path, [](const map_rows::MapDatabase& map, std::int64_t size) {
+std::string packageVersionOf(const std::string& path) {
+  return withMapFile(path, [](const sqlite::Database& map, std::int64_t size) {
     map_rows::Budget budget(size);
-    const ParameterValues meta = readMeta(map.database, budget);
+    const ParameterValues meta = readMeta(map, budget);
     const auto found = meta.find("package_version");
     if (found == meta.end()) throw Refusal("is damaged: it has no package version");
-    return MapOrigin{map.version, oneLine(parameters::toString(found->second))};
+    return oneLine(parameters::toString(found->second));
   });
 }
 

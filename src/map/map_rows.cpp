@@ -55,31 +55,29 @@ class FileHeader {
   bool complete_ = false;
 };
 
-/// The version of the schema. Refuses what is not a complete map of one that we know, before SQLite looks at it.
-int requireMapFile(const std::string& path, std::int64_t size) {
+/// Refuses what is not a complete map of our version, before SQLite looks at it.
+void requireMapFile(const std::string& path, std::int64_t size) {
   if (size == 0) throw Refusal("is empty");
   const FileHeader header(path);
   if (!header.isSqlite()) throw Refusal("is not a map");
   if (header.applicationId() != map_schema::kApplicationId) throw Refusal("is an SQLite file, but not a map");
-  if (header.userVersion() < kOldestMapSchemaVersion || header.userVersion() > kMapSchemaVersion) {
-    throw Refusal("has map version " + std::to_string(header.userVersion()) + ", but only versions " +
-                  std::to_string(kOldestMapSchemaVersion) + " to " + std::to_string(kMapSchemaVersion) +
-                  " can be read; build it again");
+  if (header.userVersion() != kMapSchemaVersion) {
+    throw Refusal("has map version " + std::to_string(header.userVersion()) + ", but only version " +
+                  std::to_string(kMapSchemaVersion) + " can be read; build it again");
   }
   if (header.hasLog()) throw Refusal("is damaged: it expects a write-ahead log, which no map has");
   if (!header.isUtf8()) throw Refusal("is damaged: its text is not UTF-8");
   if (header.size() != size) {
     throw Refusal("is damaged: has " + std::to_string(size) + " bytes instead of " + std::to_string(header.size()));
   }
-  return static_cast<int>(header.userVersion());
 }
 
 /// A row of sqlite_master: name, type, sql.
 using Definition = std::array<std::string, 3>;
 
-/// Refuses any schema but that of this version: no view or trigger, no other table, no other definition.
-void requireSchema(const sqlite::Database& database, int version) {
-  const std::vector<map_schema::Table> tables = map_schema::tablesOf(version);
+/// Refuses any schema but ours: no view or trigger, no other table, no other definition.
+void requireSchema(const sqlite::Database& database) {
+  const auto& tables = map_schema::kTables;
   std::vector<Definition> found;
   // Not ordered by SQLite, which would read all of them first.
   Statement row(database, "SELECT name, type, sql FROM sqlite_master LIMIT " + std::to_string(tables.size() + 1));
@@ -120,11 +118,11 @@ std::int64_t fileSize(const std::string& path) {
   return static_cast<std::int64_t>(status.st_size);
 }
 
-MapDatabase open(const std::string& path, std::int64_t size) {
-  const int version = requireMapFile(path, size);
+sqlite::Database open(const std::string& path, std::int64_t size) {
+  requireMapFile(path, size);
   sqlite::Database database = sqlite::Database::openUntrusted(path, std::min(size, map_schema::kMaxRowBytes));
-  requireSchema(database, version);
-  return {std::move(database), version};
+  requireSchema(database);
+  return database;
 }
 
 void Budget::spend(std::uint64_t bytes) {

@@ -29,15 +29,8 @@ std::string imageName(std::int64_t id);
 /// Size in bytes of the regular file at `path`. Throws Refusal.
 std::int64_t fileSize(const std::string& path);
 
-/// An open map file.
-struct MapDatabase {
-  sqlite::Database database;
-  int version = 0;  ///< of its schema
-};
-
-/// Opens what is a complete map of a version that we know, without any schema but that. Throws Refusal or
-/// sqlite::Error.
-MapDatabase open(const std::string& path, std::int64_t size);
+/// Opens what is a complete map, without any schema but its own. Throws Refusal or sqlite::Error.
+sqlite::Database open(const std::string& path, std::int64_t size);
 
 /// What may be read of a file: no more than it has. Rows of a damaged one may claim the same bytes again and again.
 class Budget {
@@ -54,9 +47,9 @@ class Budget {
 constexpr const char* kSelectLocal = "SELECT image, keypoints, descriptors, crc32 FROM features";
 constexpr const char* kSelectGlobal = "SELECT image, wgoh, wgii, crc32 FROM globals";
 constexpr const char* kSelectPreview = "SELECT image, jpeg, crc32 FROM previews";
-/// Since kSinceVlad; without a vocabulary there is no row.
+/// Without a vocabulary there is no row.
 constexpr const char* kSelectVlad = "SELECT image, descriptor, crc32 FROM vlads";
-/// Since kSinceLandmarks; an image without geometry has no row.
+/// An image without geometry has no row.
 constexpr const char* kSelectGeometry = "SELECT image, pose, points, crc32 FROM landmarks";
 
 // What is in the current row of such a statement. Each throws Refusal when it does not agree with its checksum, which

@@ -1,9 +1,7 @@
 #include "map/map_schema.h"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -11,28 +9,6 @@
 
 namespace visual_localization::map_schema {
 namespace {
-
-/// Of every version, in order of name.
-constexpr std::array<Table, 9> kTables{{
-    {"features",
-     "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL, "
-     "crc32 INTEGER NOT NULL)"},
-    {"globals",
-     "CREATE TABLE globals(image INTEGER PRIMARY KEY, wgoh BLOB NOT NULL, wgii BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
-    {"images",
-     "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
-     "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL)"},
-    {"landmarks",
-     "CREATE TABLE landmarks(image INTEGER PRIMARY KEY, pose BLOB NOT NULL, points BLOB NOT NULL, "
-     "crc32 INTEGER NOT NULL)",
-     kSinceLandmarks},
-    {"masks", "CREATE TABLE masks(session INTEGER PRIMARY KEY, bits BLOB NOT NULL)", kSinceCameras},
-    {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
-    {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
-    {"vlads", "CREATE TABLE vlads(image INTEGER PRIMARY KEY, descriptor BLOB NOT NULL, crc32 INTEGER NOT NULL)",
-     kSinceVlad},
-    {"vocabulary", "CREATE TABLE vocabulary(id INTEGER PRIMARY KEY, learnt BLOB NOT NULL)", kSinceVlad},
-}};
 
 std::uint64_t bitsOf(double value) {
   // SQLite does not keep the sign of zero.
@@ -43,13 +19,6 @@ std::uint64_t bitsOf(double value) {
 }
 
 }  // namespace
-
-std::vector<Table> tablesOf(int version) {
-  std::vector<Table> tables;
-  std::copy_if(kTables.begin(), kTables.end(), std::back_inserter(tables),
-               [version](const Table& table) { return table.since <= version; });
-  return tables;
-}
 
 std::int64_t crc32Of(sqlite::Bytes bytes, std::int64_t previous) {
   // SQLite's own limit of 2 GiB a value keeps every size within zlib's 32 bits.
@@ -113,20 +82,16 @@ ImageRow rowOf(const TrainingPoses& poses, std::size_t i) {
           poses.feature_counts[i]};
 }
 
-std::int64_t rowSeed(const ImageRow& image, int version) {
+std::int64_t rowSeed(const ImageRow& image) {
   Checksum checksum;
-  if (version >= kSinceBoundRows) {
-    image.addTo(checksum);
-  } else {
-    checksum.add(image.id);
-  }
+  image.addTo(checksum);
   return checksum.value();
 }
 
-std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses, int version) {
+std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses) {
   std::vector<std::uint32_t> seeds(poses.size());
   for (std::size_t i = 0; i < seeds.size(); ++i) {
-    seeds[i] = static_cast<std::uint32_t>(rowSeed(rowOf(poses, i), version));
+    seeds[i] = static_cast<std::uint32_t>(rowSeed(rowOf(poses, i)));
   }
   return seeds;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -36,36 +37,30 @@ constexpr std::size_t kKeypointBytes = 16;
 constexpr std::int64_t kMaxRowBytes =
     kMaxFeaturesPerImage * (static_cast<std::int64_t>(kKeypointBytes) + kMaxDescriptorBytes) + 4096;
 
-/// From this version on sessions have a camera and a mask.
-constexpr int kSinceCameras = 4;
-/// From this version on images have a geometry.
-constexpr int kSinceLandmarks = 4;
-/// From this version on the checksum of a row covers all that the table `images` says of its image.
-constexpr int kSinceBoundRows = 5;
-/// From this version on a map has a history.
-constexpr int kSinceHistory = 6;
-/// Upright and Hellinger features, and as many values to say so.
-constexpr int kSinceUpright = 7;
-
-/// From this version on a map says which kind of local features it holds.
-constexpr int kSinceKinds = 8;
-/// From this version on a session says how far off its positions may be.
-constexpr int kSinceFixes = 8;
-/// From this version on a map may have a vocabulary, and its images a VLAD.
-constexpr int kSinceVlad = 9;
-/// From this version on a session says where its recording contradicts itself.
-constexpr int kSinceDoubts = 10;
-/// From this version on a session's camera may differ from the calibration that was published for it.
-constexpr int kSincePublished = 7;
-
 struct Table {
   const char* name;
   const char* sql;
-  int since = kOldestMapSchemaVersion;  ///< the version of the schema that it came with
 };
 
-/// All that may be in the schema of a map of this version, in order of name.
-std::vector<Table> tablesOf(int version);
+/// All that is in the schema of a map, in order of name.
+constexpr std::array<Table, 9> kTables{{
+    {"features",
+     "CREATE TABLE features(image INTEGER PRIMARY KEY, keypoints BLOB NOT NULL, descriptors BLOB NOT NULL, "
+     "crc32 INTEGER NOT NULL)"},
+    {"globals",
+     "CREATE TABLE globals(image INTEGER PRIMARY KEY, wgoh BLOB NOT NULL, wgii BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
+    {"images",
+     "CREATE TABLE images(id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, "
+     "east_m REAL NOT NULL, north_m REAL NOT NULL, yaw_rad REAL NOT NULL, feature_count INTEGER NOT NULL)"},
+    {"landmarks",
+     "CREATE TABLE landmarks(image INTEGER PRIMARY KEY, pose BLOB NOT NULL, points BLOB NOT NULL, "
+     "crc32 INTEGER NOT NULL)"},
+    {"masks", "CREATE TABLE masks(session INTEGER PRIMARY KEY, bits BLOB NOT NULL)"},
+    {"meta", "CREATE TABLE meta(key TEXT PRIMARY KEY, value NOT NULL) WITHOUT ROWID"},
+    {"previews", "CREATE TABLE previews(image INTEGER PRIMARY KEY, jpeg BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
+    {"vlads", "CREATE TABLE vlads(image INTEGER PRIMARY KEY, descriptor BLOB NOT NULL, crc32 INTEGER NOT NULL)"},
+    {"vocabulary", "CREATE TABLE vocabulary(id INTEGER PRIMARY KEY, learnt BLOB NOT NULL)"},
+}};
 
 /// CRC-32 over a sequence of values, each in one byte order on every machine.
 class Checksum {
@@ -102,11 +97,11 @@ struct ImageRow {
 ImageRow rowOf(const TrainingPoses& poses, std::size_t i);
 
 /// What the checksums of an image's rows in the wide tables begin with, so that exchanged rows are found, and those of
-/// another map that was copied over an open one. Before kSinceBoundRows it is of the image's number alone.
-std::int64_t rowSeed(const ImageRow& image, int version = kMapSchemaVersion);
+/// another map that was copied over an open one.
+std::int64_t rowSeed(const ImageRow& image);
 
 /// Those of all images.
-std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses, int version);
+std::vector<std::uint32_t> rowSeeds(const TrainingPoses& poses);
 
 /// CRC-32 of a row of a wide table: its blobs, continuing from rowSeed().
 std::int64_t rowChecksum(std::int64_t seed, std::initializer_list<sqlite::Bytes> blobs);
@@ -136,16 +131,15 @@ std::shared_ptr<const VladVocabulary> unpackVocabulary(sqlite::Bytes bytes, std:
 /// The header as rows of the table `meta`, without the checksum. Of a mask they hold the checksum of its bits, of the
 /// table of landmarks the number of its rows: to count them all of it would have to be read.
 ParameterValues toMeta(const MapHeader& header, std::size_t geometry_count);
-/// Removes from `meta` how many images of a map of this version have a geometry, and returns it. Throws
+/// Removes from `meta` how many images have a geometry, and returns it. Throws
 /// std::runtime_error when it is missing or not in [0, kMaxImages].
-std::size_t takeGeometryCount(ParameterValues& meta, int version);
+std::size_t takeGeometryCount(ParameterValues& meta);
 /// Masks as they are stored, by the number of their session.
 using MaskBits = std::map<std::int64_t, std::vector<std::uint8_t>>;
-/// Inverse of toMeta() for a map of this version, but for what takeGeometryCount() takes. Throws std::runtime_error
+/// Inverse of toMeta(), but for what takeGeometryCount() takes. Throws std::runtime_error
 /// when a value, a mask or the vocabulary is missing, unknown, of the wrong type or out of range, and when a mask or
 /// the vocabulary does not agree with its checksum. `vocabulary`: as it is stored, empty without one.
-MapHeader toHeader(ParameterValues meta, int version, const MaskBits& masks,
-                   const std::vector<std::uint8_t>& vocabulary);
+MapHeader toHeader(ParameterValues meta, const MaskBits& masks, const std::vector<std::uint8_t>& vocabulary);
 
 // Geometry as bytes, in one order on every machine.
 

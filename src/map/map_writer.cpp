@@ -36,7 +36,7 @@ sqlite::Database createTables(const std::string& path) {
   database.execute("BEGIN");
   database.execute("PRAGMA application_id = " + std::to_string(map_schema::kApplicationId));
   database.execute("PRAGMA user_version = " + std::to_string(kMapSchemaVersion));
-  for (const map_schema::Table& table : map_schema::tablesOf(kMapSchemaVersion)) {
+  for (const map_schema::Table& table : map_schema::kTables) {
     database.execute(table.sql);
   }
   return database;

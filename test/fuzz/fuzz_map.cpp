@@ -103,7 +103,7 @@ void requireTheSame(const std::string& path, bool whole) {
   if (whole && !lazy) fuzz::fail("the whole map is fine, its places are not");
   const bool checked = fuzz::expect<MapStoreError>([&] { checkMap(path); });
   if (checked && !whole) fuzz::fail("checked and found good, but refused");
-  fuzz::expect<MapStoreError>([&] { originOf(path); });
+  fuzz::expect<MapStoreError>([&] { packageVersionOf(path); });
 }
 
 /// What is read can be written, and then it is whole.

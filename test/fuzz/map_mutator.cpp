@@ -68,11 +68,7 @@ class Editor {
 
   /// To be called before repairRows().
   void computeSeeds() {
-    const Row version = prepare("PRAGMA user_version");
-    sqlite3_step(version.get());
-    for (const map_schema::ImageRow& image : images_) {
-      seeds_[image.id] = map_schema::rowSeed(image, sqlite3_column_int(version.get(), 0));
-    }
+    for (const map_schema::ImageRow& image : images_) seeds_[image.id] = map_schema::rowSeed(image);
   }
 
   /// `select`: the image, its blobs and their checksum.
@@ -300,10 +296,7 @@ void repairHeader(std::vector<std::uint8_t>& bytes) {
   const std::size_t page = declared == 1 ? 65536 : std::max<std::size_t>(declared, 512);
   bytes.resize((bytes.size() + page - 1) / page * page);
   putBigEndian(bytes, 28, bytes.size() / page);
-  if (bytes[60] != 0 || bytes[61] != 0 || bytes[62] != 0 || bytes[63] < kOldestMapSchemaVersion ||
-      bytes[63] > kMapSchemaVersion) {
-    putBigEndian(bytes, 60, kMapSchemaVersion);
-  }
+  putBigEndian(bytes, 60, kMapSchemaVersion);
   putBigEndian(bytes, 68, static_cast<std::uint64_t>(map_schema::kApplicationId));
 }
 

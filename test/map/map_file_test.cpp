@@ -32,8 +32,7 @@ std::string saveRefusal(const std::string& path) {
 TEST_F(MapStore, RoundTripIsIdentical) {
   expectSame(exampleMap(), *loadMap(path_));
   EXPECT_NO_THROW(checkMap(path_));
-  EXPECT_EQ(originOf(path_).schema_version, kMapSchemaVersion);
-  EXPECT_FALSE(originOf(path_).package_version.empty());
+  EXPECT_FALSE(packageVersionOf(path_).empty());
 }
 
 TEST_F(MapStore, SavingAgainWritesTheSameBytes) {
@@ -66,38 +65,6 @@ TEST_F(MapStore, SaysWhyAFileIsNoMap) {
   test::writeAll(folder_ / "text", std::string(5000, 'x'));
   EXPECT_THAT(refusal(folder_ / "text"), HasSubstr("is not a map"));
   EXPECT_THAT(refusal("/dev/null"), HasSubstr("not a regular file"));
-}
-
-TEST_F(MapStore, MapsOfVersion3HaveNoCamerasAndNoLandmarks) {
-  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/accepted/pages_of_2048.map";
-  EXPECT_EQ(originOf(old).schema_version, 3);
-  const auto map = loadMap(old);
-  ASSERT_FALSE(map->header().sessions.empty());
-  for (const Session& session : map->header().sessions) {
-    EXPECT_FALSE(session.camera);
-    EXPECT_TRUE(session.mask.empty());
-  }
-  for (const auto& opened : {map, loadMap(old, {0, [](const std::string& reason) { FAIL() << reason; }})}) {
-    EXPECT_FALSE(opened->hasGeometry());
-    EXPECT_EQ(opened->geometry(0), nullptr);
-  }
-  EXPECT_NO_THROW(checkMap(old));
-  // Saved again it is a map of today.
-  saveMap(*map, path_);
-  EXPECT_EQ(originOf(path_).schema_version, kMapSchemaVersion);
-  expectSame(*map, *loadMap(path_));
-}
-
-TEST_F(MapStore, MapsOfVersion4HaveLandmarks) {
-  const std::string old = std::string(TEST_DATA_DIR) + "/../fuzz/corpus/map/accepted/landmarks_and_mount.map";
-  EXPECT_EQ(originOf(old).schema_version, 4);
-  const auto map = loadMap(old);
-  EXPECT_TRUE(map->hasGeometry());
-  expectSame(*map, *loadMap(old, {0, [](const std::string& reason) { FAIL() << reason; }}));
-  EXPECT_NO_THROW(checkMap(old));
-  saveMap(*map, path_);
-  EXPECT_EQ(originOf(path_).schema_version, kMapSchemaVersion);
-  expectSame(*map, *loadMap(path_));
 }
 
 TEST_F(MapStore, SaysWhyAFileCannotBeWritten) {

@@ -42,19 +42,6 @@ TEST_F(VocabularyStore, ComesBackToTheLastBit) {
   EXPECT_TRUE(warnings_.empty());
 }
 
-TEST_F(VocabularyStore, MapsOfVersion8HaveNone) {
-  saveMap(test::exampleMap(), path_);
-  tamper("DROP TABLE vlads");
-  tamper("DROP TABLE vocabulary");
-  tamper("PRAGMA user_version = 8");
-  EXPECT_NO_THROW(checkMap(path_));
-  for (const auto& read : {loadMap(path_), openLazily()}) {
-    EXPECT_FALSE(read->header().vocabulary);
-    EXPECT_TRUE(read->vlad(3)->empty());
-  }
-  EXPECT_TRUE(warnings_.empty());
-}
-
 TEST_F(VocabularyStore, ADamagedVladIsRefusedOrLeftOut) {
   tamper("UPDATE vlads SET descriptor = (SELECT descriptor FROM vlads WHERE image = 5) WHERE image = 4");
   EXPECT_THAT(refusal(path_), HasSubstr("VLAD of image 4 do not agree with their checksum"));

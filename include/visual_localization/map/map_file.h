@@ -16,13 +16,8 @@ class MapStoreError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Version of the schema that this build writes.
+/// Version of the schema: the only one that this build reads and writes.
 constexpr int kMapSchemaVersion = 10;
-/// The oldest one that it reads. Version 3 knows neither cameras nor masks; until version 4 the rows of an image could
-/// belong to another map; until version 5 a map has no history; until version 6 its features
-/// are not upright; until version 7 they are all SIFT; until version 8 they have no VLAD; until version 9 no stretch of
-/// a session is doubtful.
-constexpr int kOldestMapSchemaVersion = 3;
 
 /// Megabytes (2^20 bytes) of features that are kept in memory unless someone says otherwise.
 constexpr int kDefaultMapCache_mb = 256;
@@ -49,13 +44,7 @@ std::shared_ptr<const TrainingMap> loadMap(const std::string& path, const MapLoa
 /// image: in little memory, however large the map is. Throws MapStoreError.
 void checkMap(const std::string& path);
 
-/// What wrote a map.
-struct MapOrigin {
-  int schema_version = 0;
-  std::string package_version;
-};
-
-/// Throws MapStoreError.
-MapOrigin originOf(const std::string& path);
+/// Version of the package that wrote a map. Throws MapStoreError.
+std::string packageVersionOf(const std::string& path);
 
 }  // namespace visual_localization
