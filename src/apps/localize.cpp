@@ -1,8 +1,10 @@
 // Localises a recorded drive against a map: what the robot does, without a robot.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +13,7 @@
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/command_line.h"
+#include "apps/track_header.h"
 #include "bag/recorded_mount.h"
 #include "base/files.h"
 #include "editing/map_selection.h"
@@ -118,7 +121,7 @@ std::vector<std::size_t> orderOf(const LocalizeOptions& options, std::size_t ima
 struct Totals {
   std::size_t images = 0;
   std::size_t unusable = 0;
-  std::size_t tracking = 0;
+  std::map<LocalizationState, std::map<StateReason, std::size_t>> states;  ///< images
   std::size_t metric = 0;
   std::string camera_trouble;
   double comparisons = 0.0;
@@ -129,7 +132,7 @@ struct Totals {
 
   void add(const Estimate& estimate) {
     ++images;
-    if (estimate.state == LocalizationState::kTracking) ++tracking;
+    ++states[estimate.state][estimate.why.reason];
     if (estimate.source == PoseSource::kMetric) ++metric;
     camera_trouble = estimate.cameraTrouble();
     comparisons += static_cast<double>(estimate.comparisons);
@@ -140,11 +143,32 @@ struct Totals {
   }
 };
 
+/// A line for each state: its share, and those of its reasons, the largest first.
+void printStates(const Totals& totals) {
+  const auto share = [&totals](std::size_t count) {
+    return 100.0 * static_cast<double>(count) / static_cast<double>(totals.images);
+  };
+  for (const auto& [state, reasons] : totals.states) {
+    std::vector<std::pair<std::size_t, StateReason>> largest;
+    std::size_t all = 0;
+    for (const auto& [reason, count] : reasons) largest.emplace_back(count, reason), all += count;
+    std::sort(largest.rbegin(), largest.rend());
+    std::string words;
+    for (const auto& [count, reason] : largest) {
+      std::array<char, 64> text{};
+      std::snprintf(text.data(), text.size(), "%s %s %.1f %%", words.empty() ? ":" : ",", textOf(reason).name,
+                    share(count));
+      words += text.data();
+    }
+    std::printf("%s %.1f %%%s\n", toString(state).c_str(), share(all), words.c_str());
+  }
+}
+
 void print(const Totals& totals) {
   const auto images = static_cast<double>(totals.images);
-  std::printf("images %zu, not usable %zu, TRACKING %.1f %%, METRIC %.1f %%\n", totals.images, totals.unusable,
-              100.0 * static_cast<double>(totals.tracking) / images,
+  std::printf("images %zu, not usable %zu, METRIC %.1f %%\n", totals.images, totals.unusable,
               100.0 * static_cast<double>(totals.metric) / images);
+  printStates(totals);
   std::printf("comparisons per image %.1f, swept %.1f\n", totals.comparisons / images, totals.swept / images);
   std::printf("ms per image %.2f (extract %.2f, match %.2f, update %.3f)\n",
               (totals.extract_ms + totals.match_ms + totals.update_ms) / images, totals.extract_ms / images,
@@ -330,10 +354,14 @@ void print(const DriveResult& result, bool has_truth) {
   if (has_truth) print(summarise(result.errors_m));
 }
 
+constexpr const char* kHeaderSuffix = ".yaml";
+
 void requireOutputs(const LocalizeOptions& options, const LocalizerConfig& config) {
   std::vector<std::string> inputs{options.map, options.bag, options.config, options.camera_info, options.mask};
-  requireNoInput("--output", options.output, inputs);
-  inputs.push_back(options.output);
+  for (const std::string& output : {options.output, options.output + kHeaderSuffix}) {
+    requireNoInput("--output", output, inputs);
+    inputs.push_back(output);
+  }
   if (!options.usage.empty()) requireNoInput("--usage", options.usage, inputs);
   requireExtension(options, config, inputs);
 }
@@ -342,6 +370,7 @@ void run(const LocalizeOptions& options) {
   const NodeParameters config = configOf(options);
   requireOutputs(options, config.localizer);
   PartialFile output(options.output);  // fails now, not after the run
+  PartialFile header(options.output + kHeaderSuffix);
   std::optional<PartialFile> usage_file;
   if (!options.usage.empty()) usage_file.emplace(options.usage);
   const auto warn_of_map = [](const std::string& reason) { warn("localize: " + reason); };
@@ -360,7 +389,9 @@ void run(const LocalizeOptions& options) {
     throw BagError(options.bag + ": no usable image on " + images.topic() + ": " + drive.first_refusal);
   }
   output.write(drive.track);
+  header.write(trackHeader(options, config.localizer, localizer));
   output.commit();
+  header.commit();
   if (usage_file) usage_file->write(drive.usage.toCsv());
   if (usage_file) usage_file->commit();
   print(drive, truth.has_value());

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
+#include <optional>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -123,8 +125,42 @@ std::size_t mergeResults(const ResultFolder& from, const ResultFolder& to, const
 
 std::string trackCsvHeader() {
   return "stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,extract_ms,"
-         "match_ms,update_ms,source,inliers,reprojection_px,sigma_m,sigma_yaw_rad,swept\n";
+         "match_ms,update_ms,source,inliers,reprojection_px,sigma_m,sigma_yaw_rad,swept,probability,off_map,reason,"
+         "best_image,matches,features_kept,threshold,unconfirmed,rival_image,rival_east_m,rival_north_m,"
+         "rival_probability,reason_figure,reason_east_m,reason_north_m,mean_grey,latency_ms,explanation\n";
 }
+
+namespace {
+
+/// A field more; empty for what is not known.
+void addKnown(std::ostringstream& out, double value) {
+  out << ',';
+  if (std::isfinite(value)) out << value;
+}
+
+void addReason(std::ostringstream& out, const Estimate& estimate) {
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  const ImageReport& image = estimate.image;
+  addKnown(out, estimate.evidence.probability.value_or(kUnknown));
+  addKnown(out, estimate.belief.off_map);
+  out << ',' << textOf(estimate.why.reason).name << ',';
+  if (estimate.comparisons > 0) out << estimate.tracked.best_image;
+  out << ',' << estimate.tracked.best.matches << ',' << image.features_kept;
+  addKnown(out, estimate.threshold.value_or(kUnknown));
+  out << ',' << estimate.unconfirmed << ',';
+  const std::optional<PlaceBelief::Place>& rival = estimate.belief.rival;
+  if (rival) out << rival->training_image;
+  addKnown(out, rival ? rival->position_m.x() : kUnknown);
+  addKnown(out, rival ? rival->position_m.y() : kUnknown);
+  addKnown(out, rival ? rival->probability : kUnknown);
+  addKnown(out, estimate.why.figure);
+  addKnown(out, estimate.why.position_m.x());
+  addKnown(out, estimate.why.position_m.y());
+  out << ',' << image.statistics.mean_grey << ',' << image.extract_ms + image.match_ms + estimate.update_ms << ','
+      << csvField(describe(estimate.why));
+}
+
+}  // namespace
 
 std::string trackCsvRow(const Estimate& estimate) {
   std::ostringstream out = numberStream();
@@ -136,7 +172,9 @@ std::string trackCsvRow(const Estimate& estimate) {
       << estimate.comparisons << ',' << estimate.image.extract_ms << ',' << estimate.image.match_ms << ','
       << estimate.update_ms << ',' << toString(estimate.source) << ',' << (metric ? metric->inliers : 0) << ','
       << (metric ? metric->reprojection_px : 0.0) << ',' << largerSigma(pose.covariance_m2) << ','
-      << std::sqrt(pose.yaw_variance_rad2) << ',' << estimate.swept << '\n';
+      << std::sqrt(pose.yaw_variance_rad2) << ',' << estimate.swept;
+  addReason(out, estimate);
+  out << '\n';
   return out.str();
 }
 

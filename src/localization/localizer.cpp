@@ -80,6 +80,7 @@ Estimate Localizer::process(std::int64_t stamp_ns, const cv::Mat& grey) {
 
   last_ = estimateOf(stamp_ns, tracked, metric, evidence, state);
   choosePose(*last_, predicted);
+  explainLast(predicted, is_late);
   return answer(stopwatch.elapsed_ms());
 }
 
@@ -126,7 +127,10 @@ Estimate Localizer::answer(double elapsed_ms) {
   last_->update_ms = elapsed_ms - last_->image.extract_ms - last_->image.match_ms;
   last_->repeats = repeats_.images;
   last_->frozen = isFrozen();
-  if (last_->frozen || isStale()) doubt();
+  if (last_->frozen || isStale()) {
+    doubt();
+    last_->why = {StateReason::kImageRepeated, static_cast<double>(repeats_.images)};
+  }
   return *last_;
 }
 
@@ -173,8 +177,11 @@ Evidence Localizer::verify(const TrackerEstimate& tracked, const std::optional<M
   evidence.probability = probabilityOf(tracked, claimed_m);
   const double most_m = std::max(state.max_sigma_m, posterior().around_m());
   evidence.vague = evidence.probability && claimedSigma_m(tracked, metric, predicted) > most_m;
-  if (evidence.probability && evidence.verified)
+  if (evidence.probability && evidence.verified) {
+    const bool confirms = *evidence.probability >= state.min_probability;
     missPose(metric.has_value(), predicted.has_value(), *evidence.probability);
+    evidence.unverified = confirms && *evidence.probability < state.min_probability;
+  }
   if (evidence.blind && evidence.probability) evidence.probability = 0.0;  // it shows no place
   const bool sure =
       sift && tracked.best.similarity >= state.sure_similarity && tracked.best_distance_m <= state.max_distance_m;

@@ -84,6 +84,7 @@ void Localizer::forgetEvidence() {
   witness_->reset();
   assessor_.reset();
   verifier_->reset();
+  left_at_.reset();
   last_.reset();
 }
 

@@ -15,6 +15,7 @@
 #include "visual_localization/localization/likelihood.h"
 #include "visual_localization/localization/motion.h"
 #include "visual_localization/localization/particles.h"
+#include "visual_localization/localization/reason.h"
 #include "visual_localization/localization/scores.h"
 #include "visual_localization/localization/tracker_config.h"
 #include "visual_localization/map/training_map.h"
@@ -75,6 +76,8 @@ class PlaceFilter {
   }
   /// Of being where the map has no image: beyond an end of its path or elsewhere.
   double offMap() const;
+  /// What it says when the robot is taken to be within `radius_m` of a position.
+  PlaceBelief beliefAround(const Eigen::Vector2d& position_m, double radius_m) const;
   /// How likely an image is taken at each place by its distance from a position. `seen`: what it is like there.
   PlaceLikelihood around(const Eigen::Vector2d& position_m, const std::optional<Fitness>& seen = {}) const;
 
@@ -125,6 +128,8 @@ class PlaceFilter {
   void updateOffMap(const PlaceLikelihood& likelihood);
   double beyond(std::size_t training_image) const;
   double beyond() const;
+  std::optional<PlaceBelief::Place> likelyEnd() const;
+  std::optional<PlaceBelief::Place> rivalOf(const Eigen::Vector2d& position_m, double radius_m) const;
   void setLikelihoodBeyond(const PlaceLikelihood::Compared& compared);
   void learnMatches(const PlaceLikelihood& likelihood);
 

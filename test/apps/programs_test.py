@@ -7,14 +7,20 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 from pathlib import Path
 
 from program_runner import PROGRAMS, ProgramTest, first_images, run
 
 MAP, DRIVE, CONFIG, CALIBRATION = (Path(argument) for argument in sys.argv[2:6])
 HEADER = ('stamp,east_m,north_m,yaw_rad,latitude_deg,longitude_deg,state,similarity,features,comparisons,'
-          'extract_ms,match_ms,update_ms,source,inliers,reprojection_px,sigma_m,sigma_yaw_rad,swept').split(',')
-TIMES = ('extract_ms', 'match_ms', 'update_ms')
+          'extract_ms,match_ms,update_ms,source,inliers,reprojection_px,sigma_m,sigma_yaw_rad,swept,'
+          'probability,off_map,reason,best_image,matches,features_kept,threshold,unconfirmed,rival_image,rival_east_m,'
+          'rival_north_m,rival_probability,reason_figure,reason_east_m,reason_north_m,mean_grey,latency_ms,'
+          'explanation').split(',')
+WORDS = ('state', 'features', 'source', 'reason', 'explanation')
+UNKNOWN = ('rival_image', 'rival_east_m', 'rival_north_m', 'rival_probability', 'reason_east_m', 'reason_north_m')
+TIMES = ('extract_ms', 'match_ms', 'update_ms', 'latency_ms')
 
 
 def read_track(path: Path) -> list:
@@ -50,12 +56,28 @@ class ProgramsTest(ProgramTest):
         self.assertEqual(len(rows), 403)
         for row in rows:
             for name in HEADER:
-                if name not in ('state', 'features', 'source'):
+                if name not in WORDS and (row[name] or name not in UNKNOWN):
                     self.assertTrue(math.isfinite(float(row[name])), row)
+            confirmed = row['reason'] in ('LANDMARKS', 'ALONG_THE_WAY')
+            self.assertEqual(row['state'] == 'TRACKING', confirmed, row)
         self.assertGreater(sum(row['state'] == 'TRACKING' for row in rows), 0.95 * len(rows))
         self.assertGreater(sum(row['source'] == 'METRIC' for row in rows), 0.9 * len(rows))
         error = float(self.output.split('mean ')[1].split(' m')[0])
         self.assertLess(error, 0.25)
+
+    def test_track_says_how_it_came_about_and_why(self):
+        rows = self.localize('--seed', 7, '--pose-source', 'place', bag=self.short)
+        lines = (self.folder / 'track.csv.yaml').read_text(encoding='utf-8').splitlines()
+        header = dict(line.split(': ', 1) for line in lines if ': ' in line)
+        self.assertEqual(header['map'], f'"{MAP}"')
+        self.assertEqual(header['map_crc32'], f'"{zlib.crc32(MAP.read_bytes()):08x}"')
+        self.assertEqual(header['seed'], '7')
+        self.assertEqual(header['  state/min_probability'], '"0.97"')
+        self.assertIn('320x240', header['camera'])
+        share = 100 * sum(row['state'] == 'TRACKING' for row in rows) / len(rows)
+        self.assertIn(f'TRACKING {share:.1f} %: ALONG_THE_WAY {share:.1f} %\n', self.output)
+        self.assertEqual(rows[0]['reason'], 'NOT_SURE_YET')
+        self.assertTrue(rows[0]['explanation'].startswith('Not sure yet'), rows[0])
 
     def test_pose_source_chooses_between_landmarks_and_places(self):
         rows = self.localize('--pose-source', 'place', '--config', CONFIG)

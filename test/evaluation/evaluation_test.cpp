@@ -35,6 +35,9 @@ TEST(TrackCsv, RowHasAFieldForEveryColumnAndReadsBackExactly) {
   EXPECT_EQ(std::stod(fields[2]), -2.0e-7);
   EXPECT_EQ(fields[6], "TRACKING");
   EXPECT_EQ(fields[8], "SIFT");
+  EXPECT_EQ(columns[20], "off_map");
+  EXPECT_EQ(fields[20], "") << "unknown";
+  EXPECT_EQ(fields[21], "NOT_SURE_YET");
 }
 
 /// What a pose is off by on the earth, not only in relation to a map that may be wrong itself.

@@ -10,6 +10,7 @@
 #include "visual_localization/geo/trajectory.h"
 #include "visual_localization/localization/metric_pose.h"
 #include "visual_localization/localization/query_image.h"
+#include "visual_localization/localization/reason.h"
 #include "visual_localization/localization/state.h"
 #include "visual_localization/localization/tracker.h"
 
@@ -41,6 +42,10 @@ struct Estimate {
   PoseEstimate pose;
   TrackerEstimate tracked;                ///< what the tracker believes, and the best match
   Evidence evidence;                      ///< what verification says about it
+  std::optional<double> threshold;        ///< the least probability that confirms; nothing where thresholds decide
+  PlaceBelief belief;                     ///< where else the robot may be
+  int unconfirmed = 0;                    ///< see StateAssessor::unconfirmed
+  Why why;                                ///< the state is what it is
   PoseSource source = PoseSource::kNone;  ///< what `pose` rests on
   std::optional<MetricPose> metric;       ///< solved from landmarks in this image
   std::size_t images_since_metric = 0;    ///< 0 when this image has one

@@ -124,6 +124,8 @@ class Localizer {
   void learnSession(const TrackerEstimate& tracked);
   void bringTracker(const TrackerEstimate& tracked, const MetricPose& metric);
   void choosePose(Estimate& estimate, const std::optional<PredictedPose>& predicted);
+  void explainLast(const std::optional<PredictedPose>& predicted, bool is_late);
+  bool isTurned(const PredictedPose& predicted);
   PoseEstimate poseOf(const MetricPose& metric) const;
   PoseEstimate poseOf(const TrackerEstimate& tracked, LocalizationState state);
   bool isRecognised(const TrackerEstimate& tracked) const;
@@ -148,8 +150,9 @@ class Localizer {
   std::unique_ptr<SessionChoice> sessions_;
   std::unique_ptr<ImageLikelihood> likelihood_;
   std::unique_ptr<PoseVerifier> verifier_;
-  std::vector<Neighbour> neighbours_;  ///< of the last estimate
-  std::optional<Estimate> last_;       ///< of the last image, while it would come out the same again
+  std::vector<Neighbour> neighbours_;          ///< of the last estimate
+  std::optional<Estimate> last_;               ///< of the last image, while it would come out the same again
+  std::optional<PlaceBelief::Place> left_at_;  ///< the end of the map that the robot passed since it was confirmed
   Repeats repeats_;
   double geometry_ms_ = 0.0;  ///< of the last image, without the extraction that it brought about
 };

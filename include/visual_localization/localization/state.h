@@ -64,6 +64,7 @@ struct Evidence {
   std::optional<double> probability = {};
   /// The position is known too badly to claim it, however probable it is.
   bool vague = false;
+  bool unverified = false;  ///< it would confirm the estimate, were there not landmarks that do not
 };
 
 /// Whether the last estimates follow one motion. A robot moves steadily between a few images; an estimate that jumps
@@ -110,6 +111,9 @@ class StateAssessor {
   /// Whether the last images look more like another position.
   bool isDoubtful() const;
   double motionResidual_m() const { return motion_.residual_m(); }
+  /// Images since the last certain position, without those that are blind or see the map; at most
+  /// StateConfig::off_map_images.
+  int unconfirmed() const { return unconfirmed_; }
 
  private:
   bool confirms(const TrackerEstimate& estimate, const Evidence& evidence) const;
@@ -122,7 +126,7 @@ class StateAssessor {
   std::vector<char> confirmations_;  ///< of the last images, newest at the back
   std::vector<double> place_ratios_;
   MotionConsistency motion_{kMotionLength};
-  int unconfirmed_ = 0;  ///< images since the last certain position, without those that are blind or see the map
+  int unconfirmed_ = 0;
   bool ever_confirmed_ = false;  ///< since the last reset
   std::optional<Eigen::Vector2d> last_position_m_;
 };
