@@ -28,14 +28,14 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    const vl::LocalizerConfig config;  // the defaults; doc/parameters.md explains each field
+    const vl::LocalizerConfig config;                       // the defaults; doc/parameters.md explains each field
     vl::Localizer localizer(vl::loadMap(argv[1]), config);  // starts anywhere in the map
     for (int i = 2; i < argc; ++i) {
       const std::int64_t stamp_ns = std::int64_t{1'000'000'000} * (i - 2);  // one image a second
       const vl::Estimate estimate = localizer.process(stamp_ns, readGrey(argv[i]));
       std::cout << argv[i] << ": " << toString(estimate.state) << ", east " << estimate.pose.position_m.x()
-                << " m, north " << estimate.pose.position_m.y() << " m, yaw " << estimate.pose.yaw_rad << " rad: " << describe(estimate.why)
-                << "\n";
+                << " m, north " << estimate.pose.position_m.y() << " m, yaw " << estimate.pose.yaw_rad
+                << " rad: " << describe(estimate.why) << "\n";
     }
   } catch (const std::exception& error) {
     std::cerr << "localize_image: " << error.what() << "\n";

@@ -33,7 +33,10 @@ except ImportError:
 
 COLUMNS = ['stamp', 'east_m', 'north_m', 'yaw_rad', 'latitude_deg', 'longitude_deg', 'state', 'similarity', 'features',
            'comparisons', 'extract_ms', 'match_ms', 'update_ms', 'source', 'inliers', 'reprojection_px', 'sigma_m',
-           'sigma_yaw_rad', 'swept', 'true_latitude_deg', 'true_longitude_deg', 'error_m']
+           'sigma_yaw_rad', 'swept', 'true_latitude_deg', 'true_longitude_deg', 'error_m', 'probability', 'off_map', 'reason',
+           'best_image', 'matches', 'features_kept', 'threshold', 'unconfirmed', 'rival_image', 'rival_east_m',
+           'rival_north_m', 'rival_probability', 'reason_figure', 'reason_east_m', 'reason_north_m', 'mean_grey',
+           'latency_ms', 'explanation']
 FEATURES = {LocalizationStatus.SIFT: 'SIFT', LocalizationStatus.GLOBAL: 'GLOBAL'}
 SAME_STAMP_S = 0.05  # a truth this near to an image belongs to it
 
@@ -187,6 +190,19 @@ def collect(recorder: Recorder, expected: int, start_deadline_s: float, silence_
     time.sleep(0.5)  # pose and fix of the last image may still be on their way
 
 
+def reason_of(status: LocalizationStatus) -> Dict[str, object]:
+    """The columns that say why; what is NaN stays out."""
+    reason, has_rival = status.reason, status.rival_image >= 0
+    cells = {'probability': status.probability, 'off_map': status.off_map, 'reason': reason.name,
+             'best_image': status.best_image, 'matches': status.best_matches, 'features_kept': status.features_kept,
+             'threshold': status.min_probability, 'unconfirmed': status.unconfirmed,
+             'rival_image': status.rival_image if has_rival else math.nan, 'rival_east_m': status.rival_x,
+             'rival_north_m': status.rival_y, 'rival_probability': status.rival_probability,
+             'reason_figure': reason.figure, 'reason_east_m': reason.x, 'reason_north_m': reason.y,
+             'mean_grey': status.mean_grey, 'latency_ms': status.latency_ms, 'explanation': reason.sentence}
+    return {name: value for name, value in cells.items() if value == value}
+
+
 def row(stamp: rospy.Time, recorder: Recorder, truth: Truth) -> Dict[str, object]:
     """One image's row; what is not known stays empty."""
     status, pose, fix = recorder.statuses[stamp], recorder.poses.get(stamp), recorder.fixes.get(stamp)
@@ -197,6 +213,7 @@ def row(stamp: rospy.Time, recorder: Recorder, truth: Truth) -> Dict[str, object
               'sigma_m': math.hypot(status.sigma_position, status.map_sigma_position),
               'sigma_yaw_rad': math.hypot(status.sigma_heading, status.map_sigma_heading),
               'swept': status.swept}
+    result.update(reason_of(status))
     exact = truth.at(stamp.to_sec())
     if exact:
         result['true_latitude_deg'], result['true_longitude_deg'] = exact

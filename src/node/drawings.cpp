@@ -7,7 +7,9 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
@@ -121,7 +123,7 @@ cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, cons
 namespace {
 
 constexpr int kWidth = 640;
-constexpr int kHeader = 70;
+constexpr int kHeader = 96;
 constexpr int kRowHeight = 48;
 constexpr int kBand = 32;
 constexpr int kMargin = 18;
@@ -134,6 +136,7 @@ const cv::Scalar kFaint(120, 112, 108);
 const cv::Scalar kLabel(190, 184, 180);
 const cv::Scalar kBrightColour(250, 250, 250);
 const cv::Scalar kCurve(235, 190, 110);
+const cv::Scalar kBad(90, 150, 255);
 
 using Statuses = std::deque<LocalizationStatus>;
 using Figure = std::function<double(const LocalizationStatus&)>;
@@ -142,7 +145,10 @@ using Figure = std::function<double(const LocalizationStatus&)>;
 struct Row {
   std::string label;
   std::string value;
-  Figure figure;  ///< what the curve shows
+  Figure figure;                    ///< what the curve shows
+  bool bad = false;                 ///< the value
+  std::optional<double> most = {};  ///< of the scale; nothing: the largest value shown
+  std::optional<double> mark = {};  ///< a threshold
 };
 
 std::string format(const char* pattern, double number) {
@@ -183,17 +189,25 @@ std::string sigmaText(const LocalizationStatus& status) {
   return format("%.2f m, ", status.sigma_position) + format("%.1f deg", toDegrees(status.sigma_heading));
 }
 
+/// Unknown probabilities have no figure.
+std::string shareText(double probability) { return std::isfinite(probability) ? format("%.2f", probability) : "-"; }
+
 std::vector<Row> rowsOf(const LocalizationStatus& now) {
+  constexpr double kLargeSigma_m = 5.0;
+  constexpr double kLongLatency_ms = 500.0;
+  const std::optional<double> threshold =
+      std::isfinite(now.min_probability) ? std::optional(now.min_probability) : std::nullopt;
   std::vector<Row> rows{
+      {"probability here", shareText(now.probability), [](const auto& s) { return s.probability; },
+       now.probability < now.min_probability, 1.0, threshold},
+      {"off the map", shareText(now.off_map), [](const auto& s) { return s.off_map; }, now.off_map > 0.5, 1.0},
       {"inliers", inliersText(now), [](const auto& s) { return static_cast<double>(s.inliers); }},
-      {"sigma", sigmaText(now), [](const auto& s) { return s.sigma_position; }},
+      {"sigma", sigmaText(now), [](const auto& s) { return s.sigma_position; }, now.sigma_position > kLargeSigma_m},
       {"similarity", format("%.2f", now.best_similarity), [](const auto& s) { return s.best_similarity; }},
-      {"place ratio", format("%.3f", now.place_ratio), [](const auto& s) { return s.place_ratio; }},
       {"images compared", std::to_string(now.comparisons),
        [](const auto& s) { return static_cast<double>(s.comparisons); }},
-      {"cloud x, y", format("%.1f, ", now.sigma_x) + format("%.1f m", now.sigma_y),
-       [](const auto& s) { return std::hypot(s.sigma_x, s.sigma_y); }},
-      {"latency", latencyText(now.latency_ms), [](const auto& s) { return std::max(0.0, s.latency_ms); }},
+      {"latency", latencyText(now.latency_ms), [](const auto& s) { return std::max(0.0, s.latency_ms); },
+       now.latency_ms > kLongLatency_ms},
   };
   const bool answers_an_image = now.best_image >= 0;
   if (!answers_an_image) {
@@ -204,32 +218,49 @@ std::vector<Row> rowsOf(const LocalizationStatus& now) {
 
 void drawHeader(cv::Mat& canvas, const LocalizationStatus& now) {
   cv::rectangle(canvas, {0, 0, kWidth, kHeader}, colourOfState(now.state), cv::FILLED);
-  write(canvas, now.state_name, kMargin, 48, 1.25, kBrightColour, Align::kLeft, 3);
+  write(canvas, now.state_name, kMargin, 43, 1.25, kBrightColour, Align::kLeft, 3);
   const std::string lost =
       std::to_string(now.images_dropped) + " dropped, " + std::to_string(now.images_refused) + " refused";
-  write(canvas, "image " + std::to_string(now.images_processed), kCurveRight, 31, 0.65, kBrightColour, Align::kRight);
-  write(canvas, lost, kCurveRight, 56, 0.55, kBrightColour, Align::kRight);
+  write(canvas, "image " + std::to_string(now.images_processed), kCurveRight, 27, 0.65, kBrightColour, Align::kRight);
+  const bool bad = now.images_dropped + now.images_refused > 0;
+  write(canvas, lost, kCurveRight, 50, 0.55, bad ? kBad : kBrightColour, Align::kRight);
+  constexpr std::size_t kLine = 76;  // characters that fit
+  int y = 71;
+  for (const std::string& line : inLines(now.reason.sentence, kLine)) {
+    write(canvas, line, kMargin, y, 0.45, kBrightColour);
+    y += 18;
+  }
 }
 
-void drawCurve(cv::Mat& canvas, const Statuses& statuses, const Figure& figure, int top, int bottom) {
-  double largest = 0.0;
-  for (const auto& status : statuses) largest = std::max(largest, figure(status));
-  cv::line(canvas, {kCurveLeft, bottom}, {kCurveRight, bottom}, kFaint, 2);
-  if (!(largest > 0.0) || !std::isfinite(largest)) return;
-  std::vector<cv::Point> points;
-  for (std::size_t i = 0; i < statuses.size(); ++i) {
-    const double share = std::clamp(figure(statuses[i]) / largest, 0.0, 1.0);
-    const double height = std::isfinite(share) ? share * (bottom - top) : 0.0;
-    points.emplace_back(columnOf(i, statuses.size()), bottom - cvRound(height));
+void drawCurve(cv::Mat& canvas, const Statuses& statuses, const Row& row, int top, int bottom) {
+  double largest = row.most.value_or(0.0);
+  if (!row.most) {
+    for (const auto& status : statuses) {
+      const double value = row.figure(status);
+      if (std::isfinite(value)) largest = std::max(largest, value);
+    }
   }
-  cv::polylines(canvas, points, false, kCurve, 2, cv::LINE_AA);
-  cv::circle(canvas, points.back(), 4, kBrightColour, cv::FILLED, cv::LINE_AA);
+  cv::line(canvas, {kCurveLeft, bottom}, {kCurveRight, bottom}, kFaint, 2);
+  if (!(largest > 0.0)) return;
+  write(canvas, format("%.3g", largest), kCurveRight, top + 4, 0.35, kFaint, Align::kRight);
+  const auto heightOf = [&](double value) {
+    return bottom - cvRound(std::clamp(value / largest, 0.0, 1.0) * (bottom - top));
+  };
+  if (row.mark) cv::line(canvas, {kCurveLeft, heightOf(*row.mark)}, {kCurveRight, heightOf(*row.mark)}, kFaint, 1);
+  std::optional<cv::Point> before;  // no line across what is unknown
+  for (std::size_t i = 0; i < statuses.size(); ++i) {
+    const double value = row.figure(statuses[i]);
+    const cv::Point point(columnOf(i, statuses.size()), std::isfinite(value) ? heightOf(value) : bottom);
+    if (before && std::isfinite(value)) cv::line(canvas, *before, point, kCurve, 2, cv::LINE_AA);
+    before = std::isfinite(value) ? std::optional(point) : std::nullopt;
+  }
+  if (before) cv::circle(canvas, *before, 4, kBrightColour, cv::FILLED, cv::LINE_AA);
 }
 
 void drawRow(cv::Mat& canvas, const Statuses& statuses, const Row& row, int top) {
   write(canvas, row.label, kMargin, top + 33, 0.65, kLabel);
-  write(canvas, row.value, kValueRight, top + 33, 0.8, kBrightColour, Align::kRight, 2);
-  drawCurve(canvas, statuses, row.figure, top + 9, top + kRowHeight - 8);
+  write(canvas, row.value, kValueRight, top + 33, 0.8, row.bad ? kBad : kBrightColour, Align::kRight, 2);
+  drawCurve(canvas, statuses, row, top + 9, top + kRowHeight - 8);
 }
 
 void drawBand(cv::Mat& canvas, const Statuses& statuses, int top) {
@@ -247,6 +278,18 @@ void drawBand(cv::Mat& canvas, const Statuses& statuses, int top) {
 
 }  // namespace
 
+std::vector<std::string> inLines(std::string text, std::size_t most) {
+  std::vector<std::string> lines;
+  while (text.size() > most) {
+    const std::size_t space = text.rfind(' ', most);
+    const bool found = space != std::string::npos && space > 0;
+    lines.push_back(text.substr(0, found ? space : most));
+    text.erase(0, found ? space + 1 : most);
+  }
+  lines.push_back(std::move(text));
+  return lines;
+}
+
 cv::Scalar colourOfState(std::uint8_t state) {
   switch (state) {
     case LocalizationStatus::TRACKING:
@@ -262,6 +305,15 @@ cv::Scalar colourOfState(std::uint8_t state) {
     default:
       return {80, 80, 80};
   }
+}
+
+cv::Mat greyedOut(const cv::Mat& canvas, const std::string& reason) {
+  cv::Mat grey;
+  cv::cvtColor(canvas, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(grey, grey, cv::COLOR_GRAY2BGR);
+  grey *= 0.4;
+  write(grey, reason, kMargin, grey.rows / 2, 0.8, kBrightColour, Align::kLeft, 2);
+  return grey;
 }
 
 void Dashboard::add(const LocalizationStatus& status) {

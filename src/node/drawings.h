@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <deque>
 #include <mutex>
+#include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
 #include <visual_localization/LocalizationStatus.h>
@@ -25,8 +27,11 @@ cv::Mat drawMatches(const cv::Mat& grey, const LocalFeatures& sift, const Traini
 /// Beside the training image that shares most landmarks: green those that agree with the pose, red those that do not.
 cv::Mat drawLandmarks(const cv::Mat& grey, const MatchedLandmarks& matched, const TrainingMap& map);
 
-/// The status as a picture for people: the state in colour, the figures that explain it, and their history over the
-/// last images. Thread-safe.
+/// A picture that is out of date: dark and without colour, with the reason across it.
+cv::Mat greyedOut(const cv::Mat& canvas, const std::string& reason);
+
+/// The status as a picture for people: the state in colour and why it holds, the figures that explain it, and their
+/// history over the last images. Thread-safe.
 class Dashboard {
  public:
   static constexpr std::size_t kShown = 120;
@@ -39,6 +44,9 @@ class Dashboard {
   mutable std::mutex mutex_;
   std::deque<LocalizationStatus> statuses_;  ///< newest at the back
 };
+
+/// Lines of at most `most` bytes, broken at spaces; a longer word is broken too.
+std::vector<std::string> inLines(std::string text, std::size_t most);
 
 /// BGR; the same in the plots of scripts/.
 cv::Scalar colourOfState(std::uint8_t state);

@@ -65,6 +65,20 @@ void addPose(const Estimate& estimate, diagnostic_updater::DiagnosticStatusWrapp
               toDegrees(estimate.metric->mapSigmaYaw_rad()));
 }
 
+void addReason(const Estimate& estimate, diagnostic_updater::DiagnosticStatusWrapper& status) {
+  status.add("Reason", textOf(estimate.why.reason).name);
+  status.add("Advice", textOf(estimate.why.reason).advice);
+  status.add("Unconfirmed images", estimate.unconfirmed);
+  if (!estimate.threshold) return;
+  status.addf("Probability around the pose, least that confirms", "%.3f, %.3f", *estimate.evidence.probability,
+              *estimate.threshold);
+  status.addf("Probability off the map", "%.3f", estimate.belief.off_map);
+  const std::optional<PlaceBelief::Place>& rival = estimate.belief.rival;
+  if (!rival) return;
+  status.addf("Best other place: training image, x, y (m), probability", "%zu, %.1f, %.1f, %.3f", rival->training_image,
+              rival->position_m.x(), rival->position_m.y(), rival->probability);
+}
+
 double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
@@ -119,9 +133,11 @@ std::optional<double> LocalizerDiagnostics::silence_s() {
   return silence > image_timeout_s_ ? std::optional<double>(silence) : std::nullopt;
 }
 
-void LocalizerDiagnostics::stateIs(LocalizationState state) {
+void LocalizerDiagnostics::stateIs(LocalizationState state, const Why& why) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (estimate_) estimate_->state = state;
+  if (!estimate_) return;
+  estimate_->state = state;
+  estimate_->why = why;
 }
 
 void LocalizerDiagnostics::transformMissing(const std::string& reason) {
@@ -159,19 +175,20 @@ void LocalizerDiagnostics::reportState(Wrapper& status) {
   const LocalizationState state = estimate_         ? estimate_->state
                                   : map_images_ > 0 ? LocalizationState::kInitializing
                                                     : LocalizationState::kNoMap;
+  const std::string why = estimate_ ? ": " + describe(estimate_->why) : "";
   status.summary(state == LocalizationState::kTracking ? DiagnosticStatus::OK : DiagnosticStatus::WARN,
-                 toString(state));
+                 toString(state) + why);
   if (!estimate_) return;
+  addReason(*estimate_, status);
   addPose(*estimate_, status);
   status.add("Best similarity", estimate_->tracked.best.similarity);
   status.add("Matched features", estimate_->tracked.best.matches);
   status.addf("Median scale ratio", "%.2f", estimate_->tracked.best.scale);
   status.add("Features kept", estimate_->image.features_kept);
-  status.addf("Place ratio", "%.3f", estimate_->evidence.place_ratio);
+  if (!estimate_->threshold) status.addf("Place ratio", "%.3f", estimate_->evidence.place_ratio);
   status.addf("Motion residual (m)", "%.2f", estimate_->motion_residual_m);
   status.add("Training images compared", estimate_->comparisons);
   status.add("Training images compared by the map sweep", estimate_->swept);
-  status.addf("Cloud sigma x, y (m)", "%.2f, %.2f", estimate_->tracked.spread_m.x(), estimate_->tracked.spread_m.y());
   status.addf("Extract, match, update (ms)", "%.1f, %.1f, %.1f", estimate_->image.extract_ms, estimate_->image.match_ms,
               estimate_->update_ms);
 }

@@ -66,7 +66,7 @@ class LocalizerDiagnostics {
   /// Nothing while shorter than the timeout.
   std::optional<double> silence_s();
   /// Without an image.
-  void stateIs(LocalizationState state);
+  void stateIs(LocalizationState state, const Why& why);
   /// Empty when the transform was broadcast.
   void transformMissing(const std::string& reason);
   void mapLoaded(const std::string& path, std::size_t images);

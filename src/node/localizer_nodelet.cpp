@@ -245,7 +245,8 @@ void LocalizerNodelet::configure(const NodeParameters& parameters, const Paramet
 
 void LocalizerNodelet::onTimer(const ros::WallTimerEvent&) {
   guarded(log_, "state", [this] {
-    if (!localizer_->hasMap()) publisher_->publishState(LocalizationState::kNoMap, worker_->counts());
+    if (!localizer_->hasMap())
+      publisher_->publishState(LocalizationState::kNoMap, {StateReason::kNoMap}, worker_->counts());
     watchCamera();
   });
   guarded(log_, "diagnostics", [this] { diagnostics_->publish(); });
@@ -261,8 +262,9 @@ void LocalizerNodelet::watchCamera() {
   if (!camera_silent_) return;
   const auto state = localizer_->doubt();
   if (!state) return;
-  diagnostics_->stateIs(*state);
-  publisher_->publishState(*state, worker_->counts());
+  const Why why{StateReason::kCameraSilent, *silence_s};
+  diagnostics_->stateIs(*state, why);
+  publisher_->publishState(*state, why, worker_->counts());
 }
 
 std::size_t LocalizerNodelet::useMap(const std::string& path) {

@@ -238,6 +238,8 @@ LocalizerPublisher::LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHan
   constexpr bool kLatched = true;
   pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kMessagesQueued);
   metric_pose_ = private_node.advertise<geometry_msgs::PoseWithCovarianceStamped>("metric_pose", kMessagesQueued);
+  odometry_ = private_node.advertise<nav_msgs::Odometry>("odometry", kMessagesQueued);
+  drive_markers_topic_ = private_node.advertise<visualization_msgs::MarkerArray>("drive_markers", kMessagesQueued);
   fix_ = private_node.advertise<sensor_msgs::NavSatFix>("fix", kMessagesQueued);
   path_ = private_node.advertise<nav_msgs::Path>("path", kMessagesQueued);
   camera_marker_ = private_node.advertise<visualization_msgs::Marker>("camera_marker", kMessagesQueued);
@@ -253,20 +255,48 @@ LocalizerPublisher::LocalizerPublisher(const ros::NodeHandle& node, ros::NodeHan
 
 void LocalizerPublisher::publishMap(const TrainingMap& map) {
   transform_.forgetPose();
-  map_path_.publish(toPath(map, config_.global_frame_id));
-  map_markers_.publish(toMarkers(map, config_.global_frame_id));
+  const std::lock_guard<std::mutex> lock(shown_mutex_);
+  map_path_message_ = toPath(map, config_.global_frame_id);
+  map_markers_message_ = toMarkers(map, config_.global_frame_id);
+  publishMap();
 }
 
-void LocalizerPublisher::publishState(LocalizationState state, const ImageCounts& counts) {
+void LocalizerPublisher::publishMap() {
+  map_path_.publish(map_path_message_);
+  map_markers_.publish(map_markers_message_);
+}
+
+void LocalizerPublisher::publishState(LocalizationState state, const Why& why, const ImageCounts& counts) {
   Estimate nothing;
   nothing.state = state;
+  nothing.why = why;
   publishStatus(toStatus(nothing, headerOf(config_.global_frame_id, ros::Time::now())), -1.0, counts);
+  const std_msgs::Header header = headerOf(config_.global_frame_id, ros::Time::now());
+  const std::lock_guard<std::mutex> lock(shown_mutex_);
+  drive_markers_.stateIs(state, why);
+  publishDriveMarkers(header);
+  if (last_matches_.empty() || matches_.getNumSubscribers() == 0) return;
+  const cv::Mat grey = greyedOut(std::exchange(last_matches_, {}), describe(why));
+  matches_.publish(cv_bridge::CvImage(header, sensor_msgs::image_encodings::BGR8, grey).toImageMsg());
+}
+
+/// What the node alone knows comes in where nothing better is known.
+Why LocalizerPublisher::whyOf(const Estimate& estimate, double latency_ms, const ImageCounts& counts) {
+  constexpr double kAhead_ms = -1000.0;  // the clock of a played bag lags behind the stamps by a few milliseconds
+  constexpr std::uint64_t kMany = 5;
+  const std::uint64_t dropped = counts.dropped - std::exchange(dropped_, counts.dropped);
+  if (estimate.why.reason != StateReason::kNotSureYet) return estimate.why;
+  if (dropped >= kMany) return {StateReason::kImagesDropped, static_cast<double>(dropped)};
+  if (latency_ms < kAhead_ms) return {StateReason::kClocksDiffer, -1e-3 * latency_ms};
+  return estimate.why;
 }
 
 void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts& counts) {
   const double latency_ms = latencyOf(image);
-  const Estimate& estimate = image.result.estimate;
-  if (map_.lock() != image.result.map) {
+  Estimate estimate = image.result.estimate;
+  estimate.why = whyOf(estimate, latency_ms, counts);
+  const bool is_other_map = map_.lock() != image.result.map;
+  if (is_other_map) {
     transform_.forgetPose();
     drive_.clear();
   }
@@ -275,6 +305,12 @@ void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts&
   if (!estimate.frozen) {
     publishPose(estimate, header);
     publishDrive(image, header);
+  }
+  {
+    const std::lock_guard<std::mutex> lock(shown_mutex_);
+    if (is_other_map) drive_markers_.clear();
+    drive_markers_.add(estimate);
+    publishDriveMarkers(header);
   }
   publishParticles(image.result.particles, header);
   publishStatus(toStatus(estimate, header), latency_ms, counts);
@@ -286,7 +322,10 @@ void LocalizerPublisher::publish(const LocalizedImage& image, const ImageCounts&
 
 void LocalizerPublisher::publishPose(const Estimate& estimate, const std_msgs::Header& header) {
   pose_.publish(toPose(estimate, header));
-  if (const auto metric_pose = toMetricPose(estimate, header)) metric_pose_.publish(*metric_pose);
+  if (const auto metric_pose = toMetricPose(estimate, header)) {
+    metric_pose_.publish(*metric_pose);
+    odometry_.publish(toOdometry(*metric_pose, config_.base_frame_id));
+  }
   fix_.publish(toFix(estimate, headerOf(config_.base_frame_id, header.stamp)));
 }
 
@@ -299,9 +338,18 @@ void LocalizerPublisher::publishDrive(const LocalizedImage& image, const std_msg
   }
 }
 
+/// rviz forgets everything then, and does not ask again for what is latched.
 void LocalizerPublisher::timeWentBack() {
   transform_.forget();
   drive_.clear();
+  const std::lock_guard<std::mutex> lock(shown_mutex_);
+  drive_markers_.clear();
+  publishMap();
+}
+
+/// The caller holds the mutex.
+void LocalizerPublisher::publishDriveMarkers(const std_msgs::Header& header) {
+  if (drive_markers_topic_.getNumSubscribers() > 0) drive_markers_topic_.publish(drive_markers_.toMarkers(header));
 }
 
 void LocalizerPublisher::publishTransform(const Estimate& estimate, const ros::Time& stamp) {
@@ -344,6 +392,8 @@ void LocalizerPublisher::publishMatches(const LocalizedImage& image) {
       result.landmarks.landmarks.empty()
           ? drawMatches(image.grey, result.local, *result.map, result.estimate.tracked.best_image, result.match)
           : drawLandmarks(image.grey, result.landmarks, *result.map);
+  const std::lock_guard<std::mutex> lock(shown_mutex_);
+  last_matches_ = canvas;
   matches_.publish(cv_bridge::CvImage(image.header, sensor_msgs::image_encodings::BGR8, canvas).toImageMsg());
 }
 

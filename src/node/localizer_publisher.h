@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -20,6 +21,7 @@
 #include <visual_localization/LocalizationStatus.h>
 
 #include "node/drawings.h"
+#include "node/drive_markers.h"
 #include "node/image_worker.h"
 #include "node/late_odometry.h"
 #include "node/localizer_diagnostics.h"
@@ -121,8 +123,8 @@ class LocalizerPublisher : public ImageOutput {
                      LocalizerDiagnostics& diagnostics, ThrottledLog& log);
 
   void publishMap(const TrainingMap& map);
-  /// Without an image; stamped with the present.
-  void publishState(LocalizationState state, const ImageCounts& counts);
+  /// Without an image; stamped with the present. A silent camera's last matches turn grey.
+  void publishState(LocalizationState state, const Why& why, const ImageCounts& counts);
   /// From any thread.
   void configure(const NodeParameters& parameters) { transform_.configure(parameters); }
 
@@ -133,12 +135,15 @@ class LocalizerPublisher : public ImageOutput {
 
  private:
   void publishPose(const Estimate& estimate, const std_msgs::Header& header);
+  void publishMap();
+  void publishDriveMarkers(const std_msgs::Header& header);
   void publishDrive(const LocalizedImage& image, const std_msgs::Header& header);
   void publishTransform(const Estimate& estimate, const ros::Time& stamp);
   void publishParticles(const std::vector<Particle>& particles, const std_msgs::Header& header);
   void publishStatus(LocalizationStatus status, double latency_ms, const ImageCounts& counts);
   void publishDashboard(const LocalizationStatus& status);
   void publishMatches(const LocalizedImage& image);
+  Why whyOf(const Estimate& estimate, double latency_ms, const ImageCounts& counts);
 
   const NodeConfig config_;
   LocalizerDiagnostics& diagnostics_;
@@ -146,12 +151,15 @@ class LocalizerPublisher : public ImageOutput {
   TransformPublisher transform_;
   std::weak_ptr<const TrainingMap> map_;  ///< of the last image
   DrivenPath drive_;
+  std::uint64_t dropped_ = 0;  ///< images, until the last one
   image_transport::ImageTransport image_transport_;
   ros::Publisher pose_;
   ros::Publisher metric_pose_;
   ros::Publisher fix_;
   ros::Publisher path_;
   ros::Publisher camera_marker_;
+  ros::Publisher drive_markers_topic_;
+  ros::Publisher odometry_;
   ros::Publisher particles_;
   ros::Publisher particle_cloud_;
   ros::Publisher swarm_;
@@ -159,6 +167,12 @@ class LocalizerPublisher : public ImageOutput {
   ros::Publisher map_path_;
   ros::Publisher map_markers_;
   image_transport::Publisher matches_;
+  std::mutex shown_mutex_;  ///< of all that follows, until the next comment: images and silence have threads of their own
+  cv::Mat last_matches_;    ///< as published; empty once they are grey
+  DriveMarkers drive_markers_;
+  nav_msgs::Path map_path_message_;
+  visualization_msgs::MarkerArray map_markers_message_;
+  // Thread-safe, as publishers are.
   Dashboard dashboard_;
   image_transport::Publisher dashboard_image_;
 };

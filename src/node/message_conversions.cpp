@@ -86,13 +86,17 @@ std::uint32_t count(std::size_t number) {
   return static_cast<std::uint32_t>(number < kMax ? number : kMax);
 }
 
-/// Sigmas stay 0 in a status that answers no image.
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// Unknown in a status that answers no image.
 void addSource(const Estimate& estimate, LocalizationStatus& message) {
   message.source = static_cast<std::uint8_t>(estimate.source);
   message.source_name = toString(estimate.source);
   message.images_since_metric = count(estimate.images_since_metric);
   message.focal_scale = estimate.focal_scale;
+  message.sigma_position = message.sigma_heading = message.mean_grey = kUnknown;
   if (message.best_image < 0) return;
+  message.mean_grey = estimate.image.statistics.mean_grey;
   message.sigma_position = estimate.sigma_m();
   message.sigma_heading = estimate.sigmaYaw_rad();
   if (!estimate.metric) return;
@@ -102,7 +106,32 @@ void addSource(const Estimate& estimate, LocalizationStatus& message) {
   message.map_sigma_heading = estimate.metric->mapSigmaYaw_rad();
 }
 
+void addBelief(const Estimate& estimate, LocalizationStatus& message) {
+  message.reason = toMessage(estimate.why);
+  message.probability = estimate.evidence.probability.value_or(kUnknown);
+  message.min_probability = estimate.threshold.value_or(kUnknown);
+  message.off_map = estimate.belief.off_map;
+  const std::optional<PlaceBelief::Place>& rival = estimate.belief.rival;
+  message.rival_image = rival ? static_cast<std::int64_t>(rival->training_image) : -1;
+  message.rival_x = rival ? rival->position_m.x() : kUnknown;
+  message.rival_y = rival ? rival->position_m.y() : kUnknown;
+  message.rival_probability = rival ? rival->probability : kUnknown;
+  message.unconfirmed = static_cast<std::uint32_t>(estimate.unconfirmed);
+}
+
 }  // namespace
+
+Reason toMessage(const Why& why) {
+  Reason message;
+  message.value = static_cast<std::uint8_t>(why.reason);
+  message.name = textOf(why.reason).name;
+  message.sentence = describe(why);
+  message.advice = textOf(why.reason).advice;
+  message.figure = why.figure;
+  message.x = why.position_m.x();
+  message.y = why.position_m.y();
+  return message;
+}
 
 geometry_msgs::Quaternion quaternionFromYaw(double yaw_rad) {
   geometry_msgs::Quaternion rotation;
@@ -139,6 +168,17 @@ std::optional<geometry_msgs::PoseWithCovarianceStamped> toMetricPose(const Estim
   geometry_msgs::PoseWithCovarianceStamped message;
   message.header = header;
   message.pose = withCovariance(*estimate.metric, invertible(estimate.metric->covariance));
+  return message;
+}
+
+nav_msgs::Odometry toOdometry(const geometry_msgs::PoseWithCovarianceStamped& metric_pose,
+                              const std::string& base_frame_id) {
+  constexpr double kUnknownTwist = 1e6;
+  nav_msgs::Odometry message;
+  message.header = metric_pose.header;
+  message.child_frame_id = base_frame_id;
+  message.pose = metric_pose.pose;
+  for (std::size_t axis = 0; axis < kRow; ++axis) message.twist.covariance[axis * kRow + axis] = kUnknownTwist;
   return message;
 }
 
@@ -187,6 +227,7 @@ LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& he
   message.match_ms = estimate.image.match_ms;
   message.update_ms = estimate.update_ms;
   addSource(estimate, message);
+  addBelief(estimate, message);
   return message;
 }
 

@@ -1,16 +1,19 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <geometry_msgs/Quaternion.h>
+#include <nav_msgs/Odometry.h>
 #include <sensor_msgs/NavSatFix.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
 #include <visual_localization/FromLL.h>
 #include <visual_localization/LocalizationStatus.h>
+#include <visual_localization/Reason.h>
 #include <visual_localization/Swarm.h>
 #include <visual_localization/ToLL.h>
 
@@ -37,8 +40,14 @@ geometry_msgs::PoseWithCovarianceStamped toPose(const Estimate& estimate, const 
 std::optional<geometry_msgs::PoseWithCovarianceStamped> toMetricPose(const Estimate& estimate,
                                                                      const std_msgs::Header& header);
 
+/// The same for those who take odometry. The twist is unknown: its variances are 1e6.
+nav_msgs::Odometry toOdometry(const geometry_msgs::PoseWithCovarianceStamped& metric_pose,
+                              const std::string& base_frame_id);
+
 /// No altitude, and no fix while the position is unknown or lost. `header`: frame of the robot, as for a GPS receiver.
 sensor_msgs::NavSatFix toFix(const Estimate& estimate, const std_msgs::Header& header);
+
+Reason toMessage(const Why& why);
 
 /// But for latency and counts of images, which only the node knows.
 LocalizationStatus toStatus(const Estimate& estimate, const std_msgs::Header& header);

@@ -13,7 +13,8 @@ LocalizationStatus statusOf(std::uint8_t state, double similarity = 0.2) {
   status.state_name = "STATE";
   status.best_image = 3;
   status.best_similarity = similarity;
-  status.place_ratio = 1.0;
+  status.probability = 0.99;
+  status.min_probability = 0.97;
   status.latency_ms = 20.0;
   return status;
 }
@@ -71,8 +72,41 @@ TEST(Dashboard, ShowsWhatThePoseRestsOn) {
   status.inliers = 120;
   metric.add(status);
   const cv::Mat first = place.draw();
-  const cv::Rect row(0, first.rows / 6, first.cols / 2, first.rows / 6);  // below the header
+  const cv::Rect row(0, first.rows / 6, first.cols / 2, first.rows / 3);  // below the header
   EXPECT_GT(cv::norm(first(row), metric.draw()(row)), 0.0);
+}
+
+TEST(Dashboard, SaysWhyAndShowsAProbabilityThatIsTooSmallAsBad) {
+  LocalizationStatus status = statusOf(LocalizationStatus::UNCERTAIN);
+  Dashboard plain;
+  plain.add(status);
+  status.reason.sentence = "Another place of the map looks as much like the images, at x = 80 m, y = 3 m (0.45)";
+  Dashboard explained;
+  explained.add(status);
+  const cv::Mat without = plain.draw();
+  const cv::Mat with = explained.draw();
+  EXPECT_GT(cv::norm(without(topOf(without)), with(topOf(with))), 0.0);
+  status.probability = 0.5;
+  Dashboard doubtful;
+  doubtful.add(status);
+  const cv::Mat picture = doubtful.draw();
+  const cv::Rect row(0, 100, picture.cols / 2, 48);  // the first below the header
+  const auto reddish = [&row](const cv::Mat& canvas) {
+    cv::Mat same;
+    cv::inRange(canvas(row), cv::Scalar(80, 140, 245), cv::Scalar(100, 160, 255), same);
+    return cv::countNonZero(same);
+  };
+  EXPECT_EQ(reddish(with), 0);
+  EXPECT_GT(reddish(picture), 0);
+}
+
+TEST(Dashboard, AnOldPictureIsGreyAndSaysWhy) {
+  const cv::Mat colour(200, 400, CV_8UC3, cv::Scalar(250, 100, 20));
+  const cv::Mat plain = greyedOut(colour, "");
+  const cv::Vec3b pixel = plain.at<cv::Vec3b>(10, 10);
+  EXPECT_EQ(pixel[0], pixel[2]);
+  EXPECT_LT(pixel[0], 100);
+  EXPECT_GT(cv::norm(plain, greyedOut(colour, "No image comes")), 0.0);
 }
 
 TEST(Dashboard, StatesDifferInColour) {
@@ -98,7 +132,7 @@ TEST(Dashboard, ShowsOddFiguresWithoutFailing) {
   for (const double odd :
        {-1.0, 0.0, 1e300, -1e300, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
     status.sigma_position = status.sigma_heading = odd;
-    status.latency_ms = status.sigma_x = status.best_similarity = status.place_ratio = odd;
+    status.latency_ms = status.probability = status.best_similarity = status.min_probability = status.off_map = odd;
     status.comparisons = std::numeric_limits<std::uint32_t>::max();
     dashboard.add(status);
     EXPECT_NO_THROW(dashboard.draw());

@@ -213,7 +213,11 @@ TEST(MessageConversions, StatusWithoutComparisonHasNoBestImage) {
   const auto message = toStatus(Estimate{}, header());
   EXPECT_EQ(message.best_image, -1);
   EXPECT_EQ(message.source_name, "NONE");
-  EXPECT_EQ(message.sigma_position, 0.0);
+  for (const double unknown : {message.sigma_position, message.sigma_heading, message.mean_grey, message.probability,
+                               message.min_probability, message.off_map, message.rival_x, message.rival_probability}) {
+    EXPECT_TRUE(std::isnan(unknown));
+  }
+  EXPECT_EQ(message.rival_image, -1);
 }
 
 TEST(MessageConversions, StatusTellsTheImageFromTheMapInAMetricPose) {
@@ -239,6 +243,54 @@ TEST(MessageConversions, StatusOfAPlaceHasTheWholeSigmaAndNoneOfTheMap) {
   EXPECT_NEAR(message.sigma_heading, 0.2, 1e-12);
   EXPECT_EQ(message.map_sigma_position, 0.0);
   EXPECT_EQ(message.images_since_metric, 4U);
+}
+
+TEST(MessageConversions, OdometryIsTheMetricPoseWithoutAVelocity) {
+  const auto pose = toMetricPose(metricEstimate(), header());
+  ASSERT_TRUE(pose);
+  const nav_msgs::Odometry odometry = toOdometry(*pose, "base_link");
+  EXPECT_EQ(odometry.header.frame_id, pose->header.frame_id);
+  EXPECT_EQ(odometry.child_frame_id, "base_link");
+  EXPECT_EQ(odometry.pose.covariance, pose->pose.covariance);
+  EXPECT_EQ(odometry.twist.covariance[0], 1e6);
+  EXPECT_EQ(odometry.twist.covariance[35], 1e6);
+}
+
+TEST(MessageConversions, StatusSaysWhy) {
+  Estimate estimate = someEstimate();
+  estimate.evidence.probability = 0.5;
+  estimate.threshold = 0.97;
+  estimate.belief.off_map = 0.1;
+  estimate.belief.rival = PlaceBelief::Place{9, {80.0, 3.0}, 0.25};
+  estimate.unconfirmed = 4;
+  estimate.why = {StateReason::kPlacesAlike, 0.25, {80.0, 3.0}};
+  const auto message = toStatus(estimate, header());
+  EXPECT_EQ(message.reason.value, Reason::PLACES_ALIKE);
+  EXPECT_EQ(message.reason.name, "PLACES_ALIKE");
+  EXPECT_EQ(message.reason.sentence, describe(estimate.why));
+  EXPECT_EQ(message.reason.advice, textOf(StateReason::kPlacesAlike).advice);
+  EXPECT_EQ(message.reason.x, 80.0);
+  EXPECT_EQ(message.probability, 0.5);
+  EXPECT_EQ(message.min_probability, 0.97);
+  EXPECT_EQ(message.off_map, 0.1);
+  EXPECT_EQ(message.rival_image, 9);
+  EXPECT_EQ(message.rival_y, 3.0);
+  EXPECT_EQ(message.rival_probability, 0.25);
+  EXPECT_EQ(message.unconfirmed, 4U);
+}
+
+/// By the definition that travels with each bag.
+TEST(MessageConversions, EachReasonIsAConstantOfTheMessage) {
+  const std::string definition = ros::message_traits::definition<Reason>();
+  std::size_t constants = 0;
+  for (std::size_t i = 0; i < kReasons; ++i) {
+    const std::string name = textOf(static_cast<StateReason>(i)).name;
+    EXPECT_NE(definition.find("uint8 " + name + " = " + std::to_string(i) + " "), std::string::npos) << name;
+  }
+  for (std::size_t at = definition.find(" = "); at != std::string::npos; at = definition.find(" = ", at + 1)) {
+    ++constants;
+  }
+  EXPECT_EQ(constants, kReasons);
 }
 
 TEST(MessageConversions, StatesAndKindsHaveTheNumbersOfTheMessages) {
