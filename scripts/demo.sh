@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds a map from one sample session and localises the other sample drive against it: nodelet, roscore, rosbag play.
+# Builds a map from one sample session and localises the other sample drive against it: nodelet, roscore, played bag.
 set -euo pipefail
 repo=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 readonly repo
@@ -11,10 +11,10 @@ usage() {
   cat <<'USAGE'
 Usage: demo.sh [--output DIR] [--rate FACTOR] [--map-bag BAG] [--bag BAG] [--tracker NAME] [--features NAME]
   --output DIR     folder for map, track, plot and logs (default: build/demo in the repository)
-  --rate FACTOR    speed of playing over speed of recording (default: 6)
+  --rate FACTOR    speed of playing over speed of recording, at most: it waits for the localizer (default: 6)
   --map-bag BAG    session to build the map from (default: the sunny sample)
   --bag BAG        drive to localise (default: the cloudy sample)
-  --tracker NAME   dpso (default), dpso_multi, pf_gaussian, pf_linear, bayes
+  --tracker NAME   bayes (default), dpso, dpso_multi, pf_gaussian, pf_linear
   --features NAME  sift (default), global, hybrid
 Exit code 0 when the drive was localised and every image of its bag is accounted for.
 USAGE
@@ -94,7 +94,7 @@ start_localizer() {
 }
 
 localize() {
-  step "Localise $(basename "$bag") at $rate times its speed"
+  step "Localise $(basename "$bag") at up to $rate times its speed"
   start_master
   start_localizer
   rm -f "$output/ready" "$output/track.csv" "$output/track.json"
@@ -104,16 +104,16 @@ localize() {
   wait_for 60 "the localizer" test -e "$output/ready"
 
   # Only the images are played: the localizer shall see nothing else.
-  rosbag play "$bag" --quiet --clock --rate "$rate" --wait-for-subscribers --topics "$image_topic/compressed" \
-    >"$output/play.log" 2>&1 &
+  python3 "$repo/scripts/play_drive.py" --bag "$bag" --rate "$rate" --image-topic "$image_topic" \
+    --topics "$image_topic/compressed" >"$output/play.log" 2>&1 &
   local player=$!
   started+=("$player")
-  wait "$player" || fail "rosbag play failed: $output/play.log"
+  wait "$player" || fail "the drive could not be played: $output/play.log"
   wait "$recorder" || fail "nothing was recorded; see $output/localizer.log"
 }
 
 main() {
-  local output=$repo/build/demo rate=6 tracker=dpso features=sift
+  local output=$repo/build/demo rate=6 tracker=bayes features=sift
   local map_bag=$repo/test/data/rounds/campus_sunny_1.bag bag=$repo/test/data/rounds/campus_cloudy_1.bag
   while (($#)); do
     case $1 in
