@@ -132,15 +132,12 @@ def wait_until(condition: Callable[[], bool], deadline_s: float) -> bool:
 def publishers_of(bag: rosbag.Bag, topics: List[str]) -> Dict[str, rospy.Publisher]:
     """One for each topic; all of the bag when none is named. Latched where the recorded one was."""
     latched = {one.topic for one in bag._get_connections() if one.header.get('latching') in ('1', b'1')}
-    result = {}
-    for topic, _, _ in bag.read_messages(topics or None, raw=True):
-        result.setdefault(topic, None)
-        if len(result) == len(topics or bag.get_type_and_topic_info().topics):
-            break
-    for topic, raw, _ in bag.read_messages(list(result), raw=True):
-        if result[topic] is None:
+    count = len(bag.get_type_and_topic_info(topics or None).topics)
+    result: Dict[str, rospy.Publisher] = {}
+    for topic, raw, _ in bag.read_messages(topics or None, raw=True):
+        if topic not in result:
             result[topic] = rospy.Publisher(topic, raw[4], queue_size=100, latch=topic in latched)
-        if all(result.values()):
+        if len(result) == count:
             break
     return result
 

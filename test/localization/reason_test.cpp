@@ -170,19 +170,6 @@ TEST_F(ReasonOfADrive, IsTheCameraThatRepeatsItself) {
   EXPECT_EQ(repeated.why.figure, 2.0);
 }
 
-TEST_F(ReasonOfADrive, IsTheEndOfTheMap) {
-  drive(0, 60);
-  Estimate estimate;
-  for (int x_m = 60; x_m < 90; ++x_m) {
-    image_->best = std::max(0.0, 0.5 - 0.04 * (x_m - 59));
-    estimate = see(x_m < 62 ? 59.0 : -1000.0);
-  }
-  EXPECT_NE(estimate.state, LocalizationState::kTracking);
-  EXPECT_GT(estimate.belief.off_map, 0.5);
-  EXPECT_EQ(estimate.why.reason, StateReason::kMapEnds) << describe(estimate.why);
-  EXPECT_NEAR(estimate.why.position_m.x(), 59.0, 1.0);
-}
-
 TEST_F(ReasonOfADrive, ByGlobalFeaturesNoProbabilityIsKnown) {
   LocalizerConfig config = config_;
   config.features = "global";

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Every launch file can be read with its arguments, and build_map.launch builds maps and ends."""
+import itertools
 import os
 import pathlib
 import socket
@@ -7,6 +8,8 @@ import subprocess
 import sys
 import tempfile
 import unittest
+
+import rosbag
 
 import localizer_fixture as fixture
 
@@ -71,6 +74,21 @@ class LaunchFilesTest(unittest.TestCase):
             self.assertIn('campus_sunny_1', run.stdout)
             self.assertNotIn('has died', run.stdout)
             self.assertEqual(sorted(os.listdir(folder)), ['round.map', 'round.png'])
+
+    def test_a_replay_ends_with_its_drive_and_without_an_error(self):
+        with tempfile.TemporaryDirectory() as folder:
+            short = '%s/short.bag' % folder
+            with rosbag.Bag(BAG) as whole, rosbag.Bag(short, 'w') as part:
+                images = whole.read_messages(['/stereo/left/image_raw/compressed', '/gps/fix'])
+                for topic, message, stamp in itertools.islice(images, 150):
+                    part.write(topic, message, stamp)
+            built = self.build(folder, 'bag:=%s' % short)
+            self.assertEqual(built.returncode, 0, built.stdout)
+            run = roslaunch('-p', str(free_port()), str(LAUNCH / 'replay.launch'), 'bag:=%s' % short,
+                            'map:=%s/round.map' % folder, 'rate:=20', 'rviz:=false')
+            self.assertEqual(run.returncode, 0, run.stdout)
+            self.assertNotIn('has died', run.stdout)
+            self.assertNotIn('play_drive:', run.stdout)
 
     def test_a_failure_is_said(self):
         with tempfile.TemporaryDirectory() as folder:
