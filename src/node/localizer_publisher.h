@@ -167,8 +167,9 @@ class LocalizerPublisher : public ImageOutput {
   ros::Publisher map_path_;
   ros::Publisher map_markers_;
   image_transport::Publisher matches_;
-  std::mutex shown_mutex_;  ///< of all that follows, until the next comment: images and silence have threads of their own
-  cv::Mat last_matches_;    ///< as published; empty once they are grey
+  std::mutex
+      shown_mutex_;       ///< of all that follows, until the next comment: images and silence have threads of their own
+  cv::Mat last_matches_;  ///< as published; empty once they are grey
   DriveMarkers drive_markers_;
   nav_msgs::Path map_path_message_;
   visualization_msgs::MarkerArray map_markers_message_;

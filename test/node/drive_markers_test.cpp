@@ -1,10 +1,11 @@
+#include "node/drive_markers.h"
+
 #include <algorithm>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "node/drawings.h"
-#include "node/drive_markers.h"
 #include "test/node/map_header.h"
 
 namespace visual_localization {
