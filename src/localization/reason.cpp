@@ -47,6 +47,8 @@ constexpr std::array<ReasonText, kReasons> kTexts{{
     {"CLOCKS_DIFFER", "The stamps of the images lie in the future: the clocks differ", "s ahead",
      "set the clocks of the machines by one another (chrony, NTP)"},
     {"NO_MAP", "No map is loaded", "", "load one: map:=/absolute/path, or the service load_map"},
+    {"VAGUE", "The place is known, but its position too badly to act on", "m, one sigma",
+     "look at the expected error of the map (map_info); record this stretch again"},
 }};
 
 constexpr double kLikely = 0.5;
@@ -75,7 +77,7 @@ Why byProbability(const Estimate& estimate, const Circumstances& circumstances) 
     return follows ? Why{StateReason::kWeakMatches, static_cast<double>(best.matches)}
                    : Why{StateReason::kNotMapped, belief.off_map};
   }
-  if (estimate.evidence.vague) return {StateReason::kNotSureYet, probability};
+  if (estimate.evidence.vague) return {StateReason::kVague, estimate.sigma_m()};
   if (belief.rival && belief.rival->probability >= kLikely * (1.0 - probability)) {
     return {StateReason::kPlacesAlike, belief.rival->probability, belief.rival->position_m};
   }

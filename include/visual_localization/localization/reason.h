@@ -35,8 +35,9 @@ enum class StateReason : std::uint8_t {
   kCameraSilent = 17,
   kClocksDiffer = 18,
   kNoMap = 19,
+  kVague = 20,
 };
-inline constexpr std::size_t kReasons = 20;
+inline constexpr std::size_t kReasons = 21;
 
 /// A reason in words.
 struct ReasonText {
