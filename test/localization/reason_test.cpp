@@ -112,6 +112,15 @@ TEST(Explain, TheFirstCauseThatHoldsCounts) {
   EXPECT_EQ(reasonOf(estimate, circumstances), StateReason::kLandmarks);
 }
 
+TEST(Explain, APositionThatIsHardlyKnownSaysSo) {
+  Estimate vague = lostEstimate(0.999, 0.0, 0.999);
+  vague.evidence.vague = true;
+  vague.pose.covariance_m2 = 900.0 * Eigen::Matrix2d::Identity();
+  const Why why = explain(vague, {}, {});
+  EXPECT_EQ(why.reason, StateReason::kVague);
+  EXPECT_EQ(why.figure, 30.0);
+}
+
 TEST(Explain, ByThresholdsEachTestHasItsReason) {
   Estimate estimate = lostEstimate(0.0, 0.0, 0.0);
   estimate.evidence.probability.reset();
