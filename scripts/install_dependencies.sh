@@ -16,10 +16,10 @@ libceres-dev: adjustment of landmarks and poses
 libnanoflann-dev: search for the training images near a position
 libgeographiclib-dev: GPS positions to metres
 libcli11-dev: command lines of the programs
-libboost-dev: polygons; bags
+libboost-dev: polygons; bags; HTML pages
 libjpeg-dev libpng-dev libturbojpeg0-dev: previews, masks, compressed images
 libyaml-cpp-dev: configuration files
-nlohmann-json3-dev: GeoJSON export of maps
+nlohmann-json3-dev: GeoJSON export of maps, HTML pages
 libhwy-dev: vectorised SIFT and comparison of descriptors
 libgtest-dev libgmock-dev: tests
 libbenchmark-dev: benchmarks'
@@ -64,6 +64,8 @@ file dpkg-dev: the libraries that a Debian package needs'
 readonly MODELS='
 python3-torch: export of learned features
 python3-onnx: the tiny model of the tests'
+readonly BROWSER='
+chromium chromium-driver python3-selenium: tests of the HTML pages'
 readonly RVIZ='
 rviz xvfb: rviz and a virtual display
 python3-tk: the window of plot_status.py'
@@ -76,7 +78,7 @@ readonly -A DEBIAN_11=(
 usage() {
   cat <<'USAGE'
 Usage: install_dependencies.sh [--with-lint] [--with-rviz] [--with-clang] [--with-packaging]
-                               [--with-models] [--core-only | --run-only] [--list] [--log FILE]
+                               [--with-models] [--with-browser] [--core-only | --run-only] [--list] [--log FILE]
 Installs with apt what is missing; does nothing when everything is there. Needs root or sudo only to install.
 Before it installs, it prints what is missing, what for, and the command for root.
   --with-lint       also clang-format, clang-tidy and shellcheck
@@ -84,6 +86,7 @@ Before it installs, it prints what is missing, what for, and the command for roo
   --with-clang      also clang with its sanitizers and libFuzzer
   --with-packaging  also what build_deb.sh needs
   --with-models     also what export_features.py and its test need (0.2 GB)
+  --with-browser    also Chromium, in which the HTML pages are tested (0.3 GB)
   --core-only       only what the library without ROS needs
   --run-only        only what the built package runs, beside the libraries that it is linked with
   --list            print the packages, one a line, and install nothing
@@ -185,6 +188,7 @@ main() {
       --with-rviz) extra+=("$RVIZ") ;;
       --with-packaging) extra+=("$PACKAGING") ;;
       --with-models) extra+=("$MODELS") ;;
+      --with-browser) extra+=("$BROWSER") ;;
       --core-only) tables=("$CORE") ;;
       --run-only) tables=("$ROS_RUN" "$PLOTS") ;;
       --list) list=true ;;

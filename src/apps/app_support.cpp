@@ -37,6 +37,8 @@ void requireNoInput(const std::string& option, const std::string& output, const 
   }
 }
 
+std::string endingOf(const std::string& path) { return upperCase(fs::path(path).extension().string()); }
+
 std::string humanSize(double bytes) {
   static const std::array<const char*, 4> units{"B", "kB", "MB", "GB"};
   std::size_t unit = 0;

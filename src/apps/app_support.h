@@ -20,6 +20,9 @@ void warn(const std::string& text);
 /// Throws UsageError, naming the option, when the file to write is one of the files to read.
 void requireNoInput(const std::string& option, const std::string& output, const std::vector<std::string>& inputs);
 
+/// In capital letters: ".HTML" of "page.html"; empty without any.
+std::string endingOf(const std::string& path);
+
 /// "1.2 kB", "3.4 MB".
 std::string humanSize(double bytes);
 

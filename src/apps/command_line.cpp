@@ -1,7 +1,6 @@
 #include "apps/command_line.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cstdio>
 #include <cstdlib>
@@ -44,12 +43,12 @@ std::optional<Shard> shardOf(const std::string& text) {
   return count.ec == std::errc() && count.ptr == end && possible ? std::optional<Shard>(shard) : std::nullopt;
 }
 
-/// For plot_map.py.
+bool isHtml(const std::string& path) { return endingOf(path) == ".HTML"; }
+
+/// For plot_map.py, or a page.
 bool isPicture(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending == ".png" || ending == ".svg" || ending == ".pdf";
+  const std::string ending = endingOf(path);
+  return ending == ".PNG" || ending == ".SVG" || ending == ".PDF" || isHtml(path);
 }
 
 CLI::Validator must(bool (*allowed)(const std::string&), const std::string& requirement) {
@@ -111,8 +110,8 @@ void declareOptions(CLI::App& app, MapBuilderOptions& options) {
   app.add_flag("--self-calibrate", options.self_calibrate,
                "Without a calibration find the focal length by the images (parameter 'geometry/self_calibration')");
   app.add_option("--plot", options.plot,
-                 "Draw fixes, path and landmarks of each session into this PNG, SVG or PDF, by the ending")
-      ->check(must(isPicture, "end in .png, .svg or .pdf"));
+                 "Draw fixes, path and landmarks of each session into this PNG, SVG, PDF or HTML page, by the ending")
+      ->check(must(isPicture, "end in .png, .svg, .pdf or .html"));
 }
 
 CLI::App& declareCommand(CLI::App& app, MapEditOptions& options, const char* name, const char* what) {
@@ -127,6 +126,16 @@ CLI::Option* declareUsage(CLI::App& command, MapEditOptions& options, const char
       ->take_all()
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void declareCut(CLI::App& command, MapEditOptions& options) {
+  CLI::Option_group& area = *command.add_option_group("area");
+  auto* polygon = area.add_option("--polygon", options.polygon, "GeoJSON file with a Polygon or several");
+  area.add_option("--box", options.box_m, "WEST SOUTH EAST NORTH in metres of the map's frame, as map_info shows them")
+      ->expected(4);
+  area.require_option(1);
+  command.add_flag("--metres", options.metres, "The polygon is [east, north] in metres of the map's frame")
+      ->needs(polygon);
 }
 
 void declareOptions(CLI::App& app, MapEditOptions& options) {
@@ -144,9 +153,7 @@ void declareOptions(CLI::App& app, MapEditOptions& options) {
   merge.add_option("maps", options.maps, "Map files; they stay as they are")->required()->expected(2, kMostMaps);
   declareThreads(merge, options.build.threads);
   declare("remove", "Leaves out a session").add_option("--session", options.session, "Its name")->required();
-  declare("cut", "Keeps what is inside polygons")
-      .add_option("--polygon", options.polygon, "GeoJSON file with a Polygon or several")
-      ->required();
+  declareCut(declare("cut", "Keeps what is inside polygons or a box"), options);
   declare("thin", "Leaves out images that are close to the one before")
       .add_option("--spacing", options.spacing_m, "Metres between images of a session")
       ->required()
@@ -168,6 +175,8 @@ void declareOptions(CLI::App& app, MapInfoOptions& options) {
       ->capture_default_str();
   app.add_option("--export-geojson", options.geojson, "Write paths, weak stretches and images as GeoJSON (WGS84)");
   app.add_option("--export-csv", options.csv, "Write one line per image");
+  app.add_option("--report", options.report, "Write a page to look at the map in a browser, HTML")
+      ->check(must(isHtml, "end in .html"));
 }
 
 void declareOptions(CLI::App& app, LocalizeOptions& options) {
@@ -202,6 +211,8 @@ void declareOptions(CLI::App& app, LocalizeOptions& options) {
   app.add_option("--extend", options.extend,
                  "Write the map with this drive as a new session, by its verified poses: it needs no fixes");
   app.add_option("--usage", options.usage, "Write which training images and landmarks the poses rest on, CSV");
+  app.add_option("--report", options.report, "Write a page to look at the drive and the map in a browser, HTML")
+      ->check(must(isHtml, "end in .html"));
 }
 
 void declareOptions(CLI::App& app, EvaluateOptions& options) {

@@ -40,6 +40,8 @@ struct MapEditOptions {
   MapBuilderOptions build;  ///< of "add"; its threads are of "merge", too
   std::string session;
   std::string polygon;
+  bool metres = false;        ///< the polygon is in the map's frame
+  std::vector<double> box_m;  ///< west, south, east, north; empty: a polygon
   double spacing_m = 0.0;
   std::vector<std::string> usage;
   std::size_t images_per_place = 4;
@@ -52,6 +54,7 @@ struct MapInfoOptions {
   std::size_t few_features = SurveyConfig().few_features;
   std::string geojson;
   std::string csv;
+  std::string report;
 };
 
 struct LocalizeOptions {
@@ -72,6 +75,7 @@ struct LocalizeOptions {
   std::string usage;
   std::string extend;
   std::string odom_topic;
+  std::string report;
   std::optional<std::int64_t> particles;
   std::optional<std::int64_t> seed;
   std::optional<std::int64_t> map_cache_mb;

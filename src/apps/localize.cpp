@@ -13,6 +13,7 @@
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/command_line.h"
+#include "apps/drive_report.h"
 #include "apps/track_header.h"
 #include "bag/recorded_mount.h"
 #include "base/files.h"
@@ -185,11 +186,12 @@ void print(const ErrorStatistics& errors) {
 }
 
 /// Nothing when it cannot be used: that does not end the run, and the first reason is kept.
-std::optional<Estimate> localizeImage(const BagImage& image, std::size_t index, Localizer& localizer,
+std::optional<Estimate> localizeImage(const BagImage& image, std::size_t index, Localizer& localizer, cv::Mat& grey,
                                       std::string& reason) {
   std::string refusal;
   try {
-    return localizer.process(image.stamp_ns, image.decode());
+    grey = image.decode();
+    return localizer.process(image.stamp_ns, grey);
   } catch (const ImageError& error) {
     refusal = error.what();
   } catch (const std::invalid_argument& error) {
@@ -315,28 +317,37 @@ struct DriveResult {
   MapUsage usage;
   std::vector<Fix> verified;  ///< poses
 
-  void add(const Estimate& estimate, const Localizer& localizer, const std::optional<Trajectory>& truth) {
+  std::optional<DriveReport> report;
+
+  void add(const Estimate& estimate, const Localizer& localizer, const cv::Mat& grey,
+           const std::optional<Trajectory>& truth) {
     track += trackCsvRow(estimate);
     totals.add(estimate);
     if (estimate.source == PoseSource::kMetric) usage.add(localizer.map(), localizer.lastLandmarks());
     if (estimate.evidence.verified.value_or(false)) verified.push_back(toFix(estimate));
     const auto true_point = truth ? truth->at(estimate.stamp_ns) : std::nullopt;
     if (true_point) errors_m.push_back((estimate.pose.position_m - true_point->position_m).norm());
+    std::optional<Eigen::Vector2d> true_m;
+    if (true_point) true_m = true_point->position_m;
+    if (report) report->add(estimate, localizer, grey, true_m);
   }
 };
 
 DriveResult localizeDrive(const BagImages& images, const std::vector<std::size_t>& order,
-                          const std::optional<Trajectory>& truth, OdometryFeed odometry, Localizer& localizer) {
+                          const std::optional<Trajectory>& truth, OdometryFeed odometry, Localizer& localizer,
+                          std::optional<DriveReport> report) {
   DriveResult result;
+  result.report = std::move(report);
+  cv::Mat grey;
   ProgressBar progress("localize");
   for (std::size_t step = 0; step < order.size(); ++step) {
     progress.show(step, order.size());
     const bool follows = step > 0 && order[step] == order[step - 1] + 1;
     const BagImage image = images.read(order[step]);
     odometry.feed(image.stamp_ns, follows, localizer);
-    const std::optional<Estimate> estimate = localizeImage(image, order[step], localizer, result.first_refusal);
+    const std::optional<Estimate> estimate = localizeImage(image, order[step], localizer, grey, result.first_refusal);
     if (estimate) {
-      result.add(*estimate, localizer, truth);
+      result.add(*estimate, localizer, grey, truth);
     } else {
       ++result.totals.unusable;
     }
@@ -363,6 +374,7 @@ void requireOutputs(const LocalizeOptions& options, const LocalizerConfig& confi
     inputs.push_back(output);
   }
   if (!options.usage.empty()) requireNoInput("--usage", options.usage, inputs);
+  if (!options.report.empty()) requireNoInput("--report", options.report, inputs);
   requireExtension(options, config, inputs);
 }
 
@@ -373,6 +385,12 @@ void run(const LocalizeOptions& options) {
   PartialFile header(options.output + kHeaderSuffix);
   std::optional<PartialFile> usage_file;
   if (!options.usage.empty()) usage_file.emplace(options.usage);
+  std::optional<PartialFile> report_file;
+  std::optional<DriveReport> report;
+  if (!options.report.empty()) {
+    report_file.emplace(options.report);
+    report.emplace(options.bag, options.image_topic);
+  }
   const auto warn_of_map = [](const std::string& reason) { warn("localize: " + reason); };
   const std::shared_ptr<const TrainingMap> map = loadMap(options.map, config.node.mapLoading(warn_of_map));
   Localizer localizer(map, config.localizer);
@@ -384,7 +402,8 @@ void run(const LocalizeOptions& options) {
   std::optional<Trajectory> truth;
   if (!options.truth_topic.empty()) truth = trueTrajectory(bag, options.truth_topic, localizer.map().frame());
 
-  DriveResult drive = localizeDrive(images, order, truth, odometryOf(options, config.node, bag), localizer);
+  DriveResult drive =
+      localizeDrive(images, order, truth, odometryOf(options, config.node, bag), localizer, std::move(report));
   if (drive.totals.images == 0) {
     throw BagError(options.bag + ": no usable image on " + images.topic() + ": " + drive.first_refusal);
   }
@@ -394,6 +413,8 @@ void run(const LocalizeOptions& options) {
   header.commit();
   if (usage_file) usage_file->write(drive.usage.toCsv());
   if (usage_file) usage_file->commit();
+  if (report_file) report_file->write(drive.report->page(options.map, *map));
+  if (report_file) report_file->commit();
   print(drive, truth.has_value());
   if (!options.extend.empty()) extend(options, localizer, std::move(drive.verified), drive.usage);
 }

@@ -3,11 +3,15 @@
 #include <chrono>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/map_export.h"
+#include "apps/report_page.h"
 #include "base/files.h"
 #include "visual_localization/map/map_file.h"
 
@@ -29,10 +33,25 @@ void requireOutputs(const MapBuilderOptions& options) {
   if (!options.plot.empty()) requireWritable(options.plot);
 }
 
+/// As map_info --report, with what became of the fixes.
+std::string pageOf(const std::string& path, const TrainingMap& map, const std::vector<PlottedSession>& sessions) {
+  constexpr std::size_t kMostImages = 2000;
+  MapFindings findings;
+  findings.survey = survey(map, findings.config);
+  findings.landmarks = landmarkSurvey(map, kMostImages);
+  findings.errors = expectedErrors(map, kMostImages);
+  nlohmann::json page_map = pageMap(path, map);
+  addFindings(path, map, findings, page_map);
+  addBuild(sessions, map.frame(), page_map);
+  return reportPage({{"map", std::move(page_map)}});
+}
+
 /// The map is written whatever becomes of its plot.
 void draw(const MapBuilderOptions& options, std::vector<PlottedSession>& sessions, const LocalFrame& frame) {
   try {
-    addMap(*loadMap(options.output), sessions);
+    const auto map = loadMap(options.output);
+    if (endingOf(options.plot) == ".HTML") return writeFile(options.plot, pageOf(options.output, *map, sessions));
+    addMap(*map, sessions);
     drawMapPlot(options.plot, sessions, frame);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(error.what() + ("; the map is written without a plot: " + options.output));

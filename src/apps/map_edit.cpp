@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/command_line.h"
@@ -104,16 +106,29 @@ void select(const MapEditOptions& options, const std::vector<std::string>& input
   std::cout << oneLine(options.map) << ": " << describe(*map) << '\n';
 }
 
-std::vector<bool> inside(const TrainingMap& map, const Region& region) {
+template <class Contains>
+std::vector<bool> inside(const TrainingMap& map, Contains contains) {
   std::vector<bool> keep(map.size());
-  for (std::size_t i = 0; i < map.size(); ++i) keep[i] = region.contains(map.frame().toGeodetic(map.position_m(i)));
+  for (std::size_t i = 0; i < map.size(); ++i) keep[i] = contains(map.position_m(i));
   return keep;
 }
 
-void cut(const MapEditOptions& options) {
+void cutBox(const MapEditOptions& options) {
+  const Eigen::AlignedBox2d box(Eigen::Vector2d(options.box_m[0], options.box_m[1]),
+                                Eigen::Vector2d(options.box_m[2], options.box_m[3]));
+  if (box.isEmpty()) throw UsageError("--box: must be WEST SOUTH EAST NORTH, with WEST <= EAST and SOUTH <= NORTH");
+  select(options, {}, [&](const TrainingMap& map) {
+    return inside(map, [&](const Eigen::Vector2d& position_m) { return box.contains(position_m); });
+  });
+}
+
+void cutPolygon(const MapEditOptions& options) {
+  const RegionFrame frame = options.metres ? RegionFrame::kMap : RegionFrame::kEarth;
   const auto region = readWith<RegionError>(
-      options.polygon, [](const std::string& text) { return std::make_unique<const Region>(text); });
-  select(options, {options.polygon}, [&](const TrainingMap& map) { return inside(map, *region); });
+      options.polygon, [frame](const std::string& text) { return std::make_unique<const Region>(text, frame); });
+  select(options, {options.polygon}, [&](const TrainingMap& map) {
+    return inside(map, [&](const Eigen::Vector2d& position_m) { return region->contains(position_m, map.frame()); });
+  });
 }
 
 void summarise(const MapEditOptions& options) {
@@ -131,7 +146,7 @@ void editMap(const MapEditOptions& options) {
   if (options.command == "remove") {
     select(options, {}, [&](const TrainingMap& map) { return withoutSession(map, options.session); });
   }
-  if (options.command == "cut") cut(options);
+  if (options.command == "cut") options.box_m.empty() ? cutPolygon(options) : cutBox(options);
   if (options.command == "thin") {
     select(options, {}, [&](const TrainingMap& map) { return spaced(map, options.spacing_m); });
   }

@@ -2,10 +2,14 @@
 #include <iostream>
 #include <limits>
 #include <string>
+#include <utility>
+
+#include <nlohmann/json.hpp>
 
 #include "apps/app_support.h"
 #include "apps/command_line.h"
 #include "apps/map_export.h"
+#include "apps/report_page.h"
 #include "base/files.h"
 #include "visual_localization/map/map_file.h"
 
@@ -41,9 +45,16 @@ void exportFile(const std::string& path, const TrainingMap& map, const MapFindin
   file.commit();
 }
 
+std::string mapPage(const std::string& path, const TrainingMap& map, const MapFindings& findings) {
+  nlohmann::json page_map = pageMap(path, map);
+  addFindings(path, map, findings, page_map);
+  return reportPage({{"map", std::move(page_map)}});
+}
+
 void showMap(const MapInfoOptions& options) {
   if (!options.geojson.empty()) requireNoInput("--export-geojson", options.geojson, {options.map});
   if (!options.csv.empty()) requireNoInput("--export-csv", options.csv, {options.map});
+  if (!options.report.empty()) requireNoInput("--report", options.report, {options.map});
   if (options.check) checkMap(options.map);
   const auto map = loadMap(options.map);
   MapFindings findings;
@@ -56,6 +67,7 @@ void showMap(const MapInfoOptions& options) {
   if (options.check) std::cout << "\ncheck:       ok\n";
   exportFile(options.geojson, *map, findings, writeGeoJson);
   exportFile(options.csv, *map, findings, writeCsv);
+  if (!options.report.empty()) writeFile(options.report, mapPage(options.map, *map, findings));
 }
 
 }  // namespace

@@ -117,6 +117,26 @@ class MapEditTest(ProgramTest):
                            encoding='utf-8')
         self.refuse(1, 'cut', '--map', MAP, '--polygon', polygon, words=(f'{MAP}: no image would be left',))
 
+    def test_what_is_cut_is_inside_the_box_in_metres(self):
+        rows = self.images(MAP)
+        middle = sorted(float(row['east_m']) for row in rows)[len(rows) // 2]
+        expected = [row for row in rows if float(row['east_m']) >= middle and float(row['north_m']) <= 0]
+        self.assertGreater(len(expected), 10)
+        self.edit('cut', '--map', MAP, '--box', middle, -1000, 1000, 0)
+        self.assertEqual(self.images(self.output), expected)
+        self.output.unlink()
+        polygon = self.folder / 'box.geojson'
+        ring = [[middle, -1000], [1000, -1000], [1000, 0], [middle, 0], [middle, -1000]]
+        polygon.write_text(json.dumps({'type': 'Polygon', 'coordinates': [ring]}), encoding='utf-8')
+        self.edit('cut', '--map', MAP, '--polygon', polygon, '--metres')
+        self.assertEqual(self.images(self.output), expected)
+        self.output.unlink()
+        self.refuse(2, 'cut', '--map', MAP, '--box', 10, 0, -10, 5, words=('--box: must be WEST SOUTH EAST NORTH',))
+        self.refuse(2, 'cut', '--map', MAP, '--box', 1, 2, 3, words=('--box',))
+        self.refuse(2, 'cut', '--map', MAP, '--box', 0, 0, 1, 1, '--polygon', polygon, words=('--polygon',))
+        self.refuse(2, 'cut', '--map', MAP, '--box', 0, 0, 1, 1, '--metres', words=('--metres',))
+        self.refuse(2, 'cut', '--map', MAP, words=('--polygon', '--box'))
+
     def test_a_thinned_map_has_the_spacing(self):
         self.edit('thin', '--map', MAP, '--spacing', 10)
         rows = self.images(self.output)

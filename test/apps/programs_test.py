@@ -135,8 +135,8 @@ class ProgramsTest(ProgramTest):
         for extra, words in ((('--threads', '0'), ('--threads', '0 not in range', '1024')),
                              (('--threads', 'all'), ('--threads', 'all not in range', '1024')),
                              (('--min-spacing', '-1'), ('--min-spacing', '-1', '[0, 1000]')),
-                             (('--plot', 'plot.txt'), ('--plot', 'plot.txt', '.png, .svg or .pdf')),
-                             (('--plot', 'png'), ('--plot', "'png'", '.png, .svg or .pdf'))):
+                             (('--plot', 'plot.txt'), ('--plot', 'plot.txt', '.png, .svg, .pdf or .html')),
+                             (('--plot', 'png'), ('--plot', "'png'", '.png, .svg, .pdf or .html'))):
             with self.subTest(extra=extra):
                 self.assert_refused(run('map_builder', '--bag', DRIVE, '--output', output, *extra), 2, *words)
         self.assert_refused(run('map_info', MAP, '--few-features', '-1'), 2, '--few-features', '-1', '1000000')

@@ -44,6 +44,21 @@ TEST(Region, MayBeACollectionWithOtherThings) {
   EXPECT_TRUE(region.contains({48.05, 9.05, 0.0}));
 }
 
+TEST(Region, MayBeInMetresOfTheMap) {
+  const LocalFrame frame({48.5, 9.05, 0.0});
+  const std::string square = polygon("[[-10, 0], [200, 0], [200, 100], [-10, 100], [-10, 0]]");
+  const Region region(square, RegionFrame::kMap);
+  EXPECT_TRUE(region.contains({199.0, 50.0}, frame));
+  EXPECT_FALSE(region.contains({50.0, -1.0}, frame));
+  EXPECT_TRUE(Region(polygon(kSquare)).contains({0.0, 0.0}, LocalFrame({48.05, 9.05, 0.0})));
+  EXPECT_THAT(refusal(square), HasSubstr("longitude in [-180, 180]"));
+  const auto inMetres = [](const std::string& text) {
+    return test::refusalOf<RegionError>([&] { const Region refused(text, RegionFrame::kMap); });
+  };
+  EXPECT_THAT(inMetres(polygon(R"([["9", 48], [9.1, 48], [9.1, 48.1], ["9", 48]])")), HasSubstr("[east, north]"));
+  EXPECT_THAT(inMetres(polygon("[[0, 2e7], [9, 0], [9, 1], [0, 2e7]]")), HasSubstr("[-10000000, 10000000] metres"));
+}
+
 TEST(Region, RefusesWhatIsNoArea) {
   EXPECT_THAT(refusal(""), HasSubstr("no JSON"));
   EXPECT_THAT(refusal("[1, 2]"), HasSubstr("an object was expected"));
