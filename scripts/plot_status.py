@@ -22,7 +22,7 @@ import numpy as np
 COLOURS = {'NO_MAP': '#505050', 'INITIALIZING': '#7f7f7f', 'TRACKING': '#2ca02c', 'UNCERTAIN': '#ff7f0e',
            'RECOVERING': '#d62728', 'OFF_MAP': '#9467bd'}
 SOURCES = {'METRIC': '#2166ac', 'PLACE': '#92c5de', 'NONE': '#dddddd'}
-FIGURES = ('inliers', 'sigma_position', 'best_similarity', 'place_ratio', 'comparisons', 'sigma_x', 'sigma_y',
+FIGURES = ('inliers', 'sigma_position', 'best_similarity', 'probability', 'min_probability', 'off_map', 'comparisons',
            'extract_ms', 'match_ms', 'update_ms', 'latency_ms')
 BLUE, ORANGE, GREEN, GREY = '#1f77b4', '#e08214', '#4d9221', '#404040'
 
@@ -91,8 +91,8 @@ class Plot:
         import matplotlib.pyplot as plt  # after the backend has been chosen
         plt.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False,
                              'axes.edgecolor': '#909090', 'axes.titlelocation': 'left', 'axes.titlesize': 9})
-        self.figure, axes = plt.subplots(9, 1, sharex=True, figsize=(10, 10.6),
-                                         gridspec_kw={'height_ratios': [.35, .2, 1, 1, 1, 1, 1, 1, 1], 'hspace': .4,
+        self.figure, axes = plt.subplots(8, 1, sharex=True, figsize=(10, 9.5),
+                                         gridspec_kw={'height_ratios': [.35, .2, 1, 1, 1, 1, 1, 1], 'hspace': .4,
                                                       'left': .055, 'right': .985, 'top': .94, 'bottom': .05})
         self._state_band, self._source_band, self._panels = axes[0], axes[1], axes[2:]
         self._title = title
@@ -152,12 +152,17 @@ class Plot:
 
     def _draw_panels(self, columns: Dict[str, np.ndarray]) -> None:
         seconds = columns['seconds']
-        inliers, certainty, similarity, place, comparisons, sigma, times = self._panels
+        probability, inliers, certainty, similarity, comparisons, times = self._panels
 
         def line(axes, name: str, colour: str, label: Optional[str] = None) -> None:
             marker = '.' if seconds.size < 2 else None
             axes.plot(seconds, columns[name], color=colour, linewidth=1.2, label=label, marker=marker)
 
+        line(probability, 'probability', BLUE, 'around the pose')
+        line(probability, 'off_map', ORANGE, 'off the map')
+        line(probability, 'min_probability', GREY, 'least that confirms')
+        probability.set_title('probability')
+        probability.set_ylim(-.02, 1.02)
         line(inliers, 'inliers', BLUE)
         inliers.set_title('landmarks that agree with the pose: 0 where it is not metric')
         line(certainty, 'sigma_position', BLUE)
@@ -166,25 +171,19 @@ class Plot:
             certainty.set_yscale('log')
         line(similarity, 'best_similarity', BLUE)
         similarity.set_title('similarity of the best training image')
-        line(place, 'place_ratio', BLUE)
-        place.set_title('place ratio: the whole image here over the best anywhere')
         line(comparisons, 'comparisons', BLUE)
         comparisons.set_title('training images compared')
-        line(sigma, 'sigma_x', BLUE, 'x')
-        line(sigma, 'sigma_y', ORANGE, 'y')
-        sigma.set_title('sigma of the cloud [m]')
         stages = [columns[name] for name in ('extract_ms', 'match_ms', 'update_ms')]
         times.stackplot(seconds, *stages, labels=('extract', 'match', 'update'), colors=(BLUE, ORANGE, GREEN), alpha=.7)
         line(times, 'latency_ms', GREY, 'latency')
         times.set_title('time per image [ms]')
-        for axes in (inliers, similarity, comparisons, sigma, times):
+        for axes in (inliers, similarity, comparisons, times):
             axes.set_ylim(bottom=0)
         # Single outliers must not press the rest flat.
-        place.set_ylim(min(.95, self._quantile(columns['place_ratio'], .05, 1.0)) - .005, 1.005)
         longest = np.fmax(columns['latency_ms'], sum(stages))
         top = min(self._quantile(longest, 1.0, 1.0), 3 * self._quantile(longest, .95, 1.0))
         times.set_ylim(top=1.05 * max(1.0, top))
-        for axes in (sigma, times):
+        for axes in (probability, times):
             axes.legend(loc='lower right', bbox_to_anchor=(1, 1), ncol=4, frameon=False, borderaxespad=.1,
                         handlelength=1.2, columnspacing=1.2)
 

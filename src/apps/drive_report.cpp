@@ -48,7 +48,7 @@ void DriveReport::add(const Estimate& estimate, const Localizer& localizer, cons
   put("true_north", pageNumber(truth_m ? truth_m->y() : kUnknown, 3));
   put("state", toString(estimate.state));
   put("source", toString(estimate.source));
-  put("sigma", pageNumber(estimate.sigma_m(), 3));
+  put("sigma", pageNumber(largerSigma(pose.covariance_m2), 3));  // the map's own included, as in a track
   put("probability", pageNumber(estimate.evidence.probability.value_or(kUnknown), 4));
   put("off_map", pageNumber(estimate.belief.off_map, 4));
   put("unconfirmed", estimate.unconfirmed);

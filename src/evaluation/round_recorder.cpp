@@ -10,6 +10,7 @@
 
 #include "base/files.h"
 #include "base/time.h"
+#include "features/image_size.h"
 #include "ros/message_readers.h"
 #include "visual_localization/camera/mask.h"
 #include "visual_localization/features/front_end.h"
@@ -180,10 +181,10 @@ std::shared_ptr<const Drive> recordDrive(const std::string& path, const RoundSpe
   const BagReader bag(path);
   const Truth truth = truthOf(bag, recording, map.trajectory);
   const std::optional<CameraModel> camera = for_poses ? cameraOf(bag, recording) : std::nullopt;
-  const cv::Size usual_size = bag.images(recording.image_topic).usualSize();
+  const cv::Size size = halvedTo(map.max_megapixels, bag.images(recording.image_topic).usualSize());
   std::unique_ptr<LocalFeatureKind> kind = map.local.chosen().clone();
   kind->adopt(map.model);
-  DriveRecorder recorder(std::move(kind), front_end, recording.pruning, usual_size, for_poses);
+  DriveRecorder recorder(std::move(kind), front_end, recording.pruning, size, for_poses);
   forEachImage(bag, recording.image_topic,
                [&](std::int64_t stamp_ns, const cv::Mat& grey) { recorder.add(stamp_ns, grey, truth(stamp_ns)); });
   auto drive = std::make_shared<Drive>(recorder.finish());

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
 
 #include <opencv2/core.hpp>
+
+#include "visual_localization/features/local_features.h"
 
 namespace visual_localization {
 
@@ -26,6 +29,15 @@ inline std::optional<std::string> whyTooLarge(std::uint64_t width, std::uint64_t
 /// The same of a size that is not negative.
 inline std::optional<std::string> whyTooLarge(const cv::Size& size) {
   return whyTooLarge(static_cast<std::uint64_t>(size.width), static_cast<std::uint64_t>(size.height));
+}
+
+/// Half of both sides, as often as it takes; 0: as recorded.
+inline cv::Size halvedTo(double max_megapixels, cv::Size size) {
+  const auto isTooLarge = [&] { return max_megapixels > 0.0 && size.area() > 1e6 * max_megapixels; };
+  while (isTooLarge() && std::min(size.width, size.height) >= 2 * kSmallestImageSide_px) {
+    size = (size + cv::Size(1, 1)) / 2;
+  }
+  return size;
 }
 
 }  // namespace visual_localization

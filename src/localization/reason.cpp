@@ -77,7 +77,7 @@ Why byProbability(const Estimate& estimate, const Circumstances& circumstances) 
     return follows ? Why{StateReason::kWeakMatches, static_cast<double>(best.matches)}
                    : Why{StateReason::kNotMapped, belief.off_map};
   }
-  if (estimate.evidence.vague) return {StateReason::kVague, estimate.sigma_m()};
+  if (estimate.evidence.vague) return {StateReason::kVague, largerSigma(estimate.pose.covariance_m2)};
   if (belief.rival && belief.rival->probability >= kLikely * (1.0 - probability)) {
     return {StateReason::kPlacesAlike, belief.rival->probability, belief.rival->position_m};
   }

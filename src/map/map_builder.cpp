@@ -44,14 +44,6 @@ cv::Size requireBounded(const std::string& session, cv::Size size) {
   return size;
 }
 
-/// Half of both sides, as often as it takes; 0: as recorded.
-cv::Size halvedTo(double max_megapixels, cv::Size size) {
-  const auto isTooLarge = [&] { return max_megapixels > 0.0 && size.area() > 1e6 * max_megapixels; };
-  while (isTooLarge() && std::min(size.width, size.height) >= 2 * kSmallestImageSide_px)
-    size = (size + cv::Size(1, 1)) / 2;
-  return size;
-}
-
 /// The unpruned features of the images that tell what is noise in image `i`.
 std::vector<std::shared_ptr<const LocalFeatures>> neighboursOf(std::size_t i, const PruningNeighbours& neighbours,
                                                                const TrainingMap& unpruned) {

@@ -119,14 +119,14 @@ class MapEditTest(ProgramTest):
 
     def test_what_is_cut_is_inside_the_box_in_metres(self):
         rows = self.images(MAP)
-        middle = sorted(float(row['east_m']) for row in rows)[len(rows) // 2]
-        expected = [row for row in rows if float(row['east_m']) >= middle and float(row['north_m']) <= 0]
+        middle, top = (sorted(float(row[axis]) for row in rows)[len(rows) // 2] for axis in ('east_m', 'north_m'))
+        expected = [row for row in rows if float(row['east_m']) >= middle and float(row['north_m']) <= top]
         self.assertGreater(len(expected), 10)
-        self.edit('cut', '--map', MAP, '--box', middle, -1000, 1000, 0)
+        self.edit('cut', '--map', MAP, '--box', middle, -1000, 1000, top)
         self.assertEqual(self.images(self.output), expected)
         self.output.unlink()
         polygon = self.folder / 'box.geojson'
-        ring = [[middle, -1000], [1000, -1000], [1000, 0], [middle, 0], [middle, -1000]]
+        ring = [[middle, -1000], [1000, -1000], [1000, top], [middle, top], [middle, -1000]]
         polygon.write_text(json.dumps({'type': 'Polygon', 'coordinates': [ring]}), encoding='utf-8')
         self.edit('cut', '--map', MAP, '--polygon', polygon, '--metres')
         self.assertEqual(self.images(self.output), expected)

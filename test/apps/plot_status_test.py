@@ -21,13 +21,15 @@ TOPIC = '/localizer/status'
 # From its definition, so that no built workspace is needed.
 Status = genpy.dynamic.generate_dynamic(TYPE, '\n'.join((
     (MESSAGES / 'LocalizationStatus.msg').read_text(encoding='utf-8'), 80 * '=', 'MSG: std_msgs/Header',
-    Header._full_text)))[TYPE]
+    Header._full_text, 80 * '=', 'MSG: visual_localization/Reason',
+    (MESSAGES / 'Reason.msg').read_text(encoding='utf-8'))))[TYPE]
 
 
 def status_at(seconds: float, state: str = 'TRACKING', **figures: float):
     """A plausible status."""
-    status = Status(state=getattr(Status, state), state_name=state, best_image=7, best_similarity=.2, place_ratio=.99,
-                    source_name='METRIC', inliers=50, sigma_position=.04, comparisons=20, sigma_x=1.5, sigma_y=.8, extract_ms=9.0, match_ms=4.0, update_ms=.3, latency_ms=15.0)
+    status = Status(state=getattr(Status, state), state_name=state, best_image=7, best_similarity=.2, probability=.998,
+                    min_probability=.97, off_map=.001, source_name='METRIC', inliers=50, sigma_position=.04,
+                    comparisons=20, extract_ms=9.0, match_ms=4.0, update_ms=.3, latency_ms=15.0)
     status.header.stamp = rospy.Time.from_sec(seconds)
     for name, figure in figures.items():
         setattr(status, name, figure)

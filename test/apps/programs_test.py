@@ -73,7 +73,7 @@ class ProgramsTest(ProgramTest):
         self.assertEqual(header['map_crc32'], f'"{zlib.crc32(MAP.read_bytes()):08x}"')
         self.assertEqual(header['seed'], '7')
         self.assertEqual(header['  state/min_probability'], '"0.97"')
-        self.assertIn('320x240', header['camera'])
+        self.assertIn('320 x 240', header['camera'])
         share = 100 * sum(row['state'] == 'TRACKING' for row in rows) / len(rows)
         self.assertIn(f'TRACKING {share:.1f} %: ALONG_THE_WAY {share:.1f} %\n', self.output)
         self.assertEqual(rows[0]['reason'], 'NOT_SURE_YET')
