@@ -274,7 +274,7 @@ def draw(drives: List[Drive], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('config', type=Path, help='pairs of recordings, config/evaluation/claims.yaml')
+    parser.add_argument('config', type=Path, help='pairs of recordings, config/claims.yaml')
     parser.add_argument('output', type=Path, help='folder for maps, tracks and tables')
     parser.add_argument('--data', type=Path, default=Path(os.environ.get('VISUAL_LOCALIZATION_DATA', '.')),
                         help='folder of the recordings (default: VISUAL_LOCALIZATION_DATA)')

@@ -80,7 +80,7 @@ struct SessionImages {
 constexpr double kFarthestSession_m = 1e5;
 /// A session spans at least this: a receiver that always reports the same point is stuck.
 constexpr double kSmallestSession_m = 0.1;
-/// A robot that does not come as far as this in kStandingTime_s stands.
+/// A robot that in kStandingTime_s comes neither as far as this nor half as far as its session usually does stands.
 constexpr double kStandingReach_m = 0.5;
 constexpr double kStandingTime_s = 10.0;
 
@@ -128,7 +128,7 @@ class MapBuilder {
   /// as before.
   void beginSession(const std::string& name, const std::vector<Fix>& fixes, const SessionCamera& camera = {});
   /// True when the image at `stamp_ns` has a position, is far enough from the last one, and does not come from a robot
-  /// that has stood there (within kStandingReach_m) for longer than kStandingTime_s: only then is it worth decoding and
+  /// that has stood there (see kStandingReach_m) for longer than kStandingTime_s: only then is it worth decoding and
   /// giving to addImage. `recorded`: its size in pixels, if that is known; addImage would leave out an image of another
   /// shape. Counts the reasons otherwise.
   bool wants(std::int64_t stamp_ns, cv::Size recorded = {});
