@@ -3,10 +3,12 @@
 dropped.
 
 Begins when the localizer has its map and listens, and when the node of --window is up. Time (/clock) stands while it
-waits. At the end it waits until the window is closed, then ends the nodes of --end.
+waits. At the end it waits until the window is closed, then ends the nodes of --end, and the roslaunch that began it.
 """
 import argparse
 import math
+import os
+import signal
 import sys
 import threading
 import time
@@ -179,6 +181,10 @@ def end(args: argparse.Namespace) -> None:
         print(f'play_drive: the drive has ended; close the window of {args.window} to end', flush=True)
         wait_until(lambda: gone(args.window), math.inf)
     rosnode.kill_nodes([node for node in args.end if not gone(node)])
+    # roslaunch with a master of its own would go on without any node.
+    launch = os.getppid()
+    if 'roslaunch' in Path(f'/proc/{launch}/cmdline').read_text(encoding='utf-8', errors='replace'):
+        os.kill(launch, signal.SIGINT)
 
 
 def positive(text: str) -> float:
