@@ -185,10 +185,8 @@ class Runner:
                 count = max(topics[t].message_count for t in (pair['image_topic'], pair['image_topic'] + '/compressed')
                             if t in topics)
                 extra = ['--kidnap-at', (start + count // 4) % count, '--kidnap-to', (start + count * 3 // 4) % count]
-            partial = track.with_suffix('.partial')
             run(self.programs / 'localize', '--map', self.map_path(pair, case), '--bag', bag,
-                '--seed', 1, '--start-index', start, '--output', partial, *self.common(pair), *extra)
-            partial.rename(track)
+                '--seed', 1, '--start-index', start, '--output', track, *self.common(pair), *extra)
         truth = None if pair['elsewhere'] else fixes_of(pair['drive'], pair['truth_topic'])
         return Drive(pair['name'], case, start, pair['wrong'], list(read_track(track, truth)))
 
