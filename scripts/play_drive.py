@@ -3,7 +3,7 @@
 dropped.
 
 Begins when the localizer has its map and listens, and when the node of --window is up. Time (/clock) stands while it
-waits. At the end it waits until the window is closed, then ends the nodes of --end, and the roslaunch that began it.
+waits. At the end it waits until the window is closed, then ends the nodes of --end.
 """
 import argparse
 import math
@@ -181,10 +181,8 @@ def end(args: argparse.Namespace) -> None:
         print(f'play_drive: the drive has ended; close the window of {args.window} to end', flush=True)
         wait_until(lambda: gone(args.window), math.inf)
     rosnode.kill_nodes([node for node in args.end if not gone(node)])
-    # roslaunch with a master of its own would go on without any node.
-    launch = os.getppid()
-    if 'roslaunch' in Path(f'/proc/{launch}/cmdline').read_text(encoding='utf-8', errors='replace'):
-        os.kill(launch, signal.SIGINT)
+    if args.end_launch:
+        os.kill(os.getppid(), signal.SIGINT)
 
 
 def positive(text: str) -> float:
@@ -204,6 +202,8 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--localizer', default='/localizer', help='name of the node (default: %(default)s)')
     parser.add_argument('--window', default='', metavar='NODE', help='begin when it is up, stay until it is closed')
     parser.add_argument('--end', nargs='+', default=[], metavar='NODE', help='nodes to end then')
+    parser.add_argument('--end-launch', action='store_true',
+                        help='end the roslaunch that started this: one with a master of its own goes on without nodes')
     parser.add_argument('--deadline', type=positive, default=120.0, help='seconds to wait for each (default: 120)')
     return parser.parse_args(rospy.myargv()[1:])
 

@@ -24,6 +24,10 @@ constexpr double kMostExplained = 0.5;
 constexpr double kResected_px = 3.0;  ///< from the projection of a landmark that a pose explains
 constexpr int kResections = 5;
 
+bool isMost(const std::vector<bool>& images) {
+  return 2 * static_cast<std::size_t>(std::count(images.begin(), images.end(), true)) > images.size();
+}
+
 }  // namespace
 
 Eigen::Vector3d Reconstruction::antennaInMap_m(const CameraPose& camera, std::size_t image) const {
@@ -118,16 +122,13 @@ std::vector<bool> Reconstruction::lostImages() const {
   return lost;
 }
 
-bool Reconstruction::mostAreLost() const {
-  const std::vector<bool> lost = lostImages();
-  return 2 * static_cast<std::size_t>(std::count(lost.begin(), lost.end(), true)) > lost.size();
-}
+bool Reconstruction::mostAreLost() const { return isMost(lostImages()); }
 
 /// By the landmarks of the other images: these must be the most.
 void Reconstruction::resect(double gate_px, std::size_t max_views) {
-  for (int round = 0; round < kResections && !mostAreLost(); ++round) {
+  for (int round = 0; round < kResections; ++round) {
     const std::vector<bool> lost = lostImages();
-    if (std::none_of(lost.begin(), lost.end(), [](bool is_lost) { return is_lost; })) return;
+    if (isMost(lost) || std::find(lost.begin(), lost.end(), true) == lost.end()) return;
     triangulateWithout(lost, gate_px, max_views);
     const std::vector<std::vector<LandmarkMatch>> matches = landmarksOf(lost);
     for (std::size_t i = 0; i < images_.size(); ++i) {

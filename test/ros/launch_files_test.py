@@ -31,7 +31,7 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def roslaunch(*arguments, timeout_s=900 * fixture.SLOWNESS):
+def roslaunch(*arguments, timeout_s=400 * fixture.SLOWNESS):
     return subprocess.run(['roslaunch', *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           universal_newlines=True, timeout=timeout_s)
 

@@ -56,7 +56,7 @@ struct Why {
   Eigen::Vector2d position_m = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< in `map`
 };
 
-/// "The map ends here, at x = 12.3 m, y = -4.0 m (probability 0.91)".
+/// "The robot is beyond an end of the map, at x = 12.30 m, y = -4 m (probability off the map: 0.91)".
 std::string describe(const Why& why);
 
 /// What a filter over the places of a map says after an image. All probabilities are of everything that is possible,

@@ -134,10 +134,10 @@ class MapBuilder {
   bool wants(std::int64_t stamp_ns, cv::Size recorded = {});
   /// `grey`: 8-bit, one channel; an empty one counts as unusable. The map's images have the size of the first
   /// session's, halved until they have no more than max_megapixels: its SessionCamera::image_size, without which its
-  /// first image decides. Others are resized to it, and
-  /// counted where their session has another size. Where SessionCamera::image_size is given, images of another aspect
-  /// ratio are left out: no calibration holds for them. Throws CameraError when the session's camera or mask is for
-  /// images of another shape, and std::runtime_error when the map's images would be too large.
+  /// first image decides. Others are resized to it, and counted where their session has another size. Where
+  /// SessionCamera::image_size is given, images of another aspect ratio are left out: no calibration holds for them.
+  /// Throws CameraError when the session's camera or mask is for images of another shape, and std::runtime_error when
+  /// the map's images would be too large.
   void addImage(std::int64_t stamp_ns, const cv::Mat& grey);
   /// Adjusts, prunes and indexes. Ends the builder, as save() does. Throws std::runtime_error when no image was kept.
   std::shared_ptr<const TrainingMap> build(const Progress& progress = {});
