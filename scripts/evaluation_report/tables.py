@@ -70,7 +70,7 @@ CLAIMS = (Measure('right_share', 'right [%]', 1, 100),
           Measure('wrong_claims', 'wrong of these [%]', 2, 100),
           Measure('comparisons_per_image', 'comparisons per image', 1),
           Measure('steps_to_localise', 'images until localised', 1))
-ERROR = MAIN[0]
+ERROR, COMPARISONS = MAIN[:2]
 NOTHING = '–'
 
 
@@ -153,15 +153,15 @@ def group_tables(results: Results, papers: Papers, measures: Sequence[Measure]) 
 
 
 def grid_of(outcomes: Dict[str, Outcome], row_title: str, rows: Dict[str, Dict[str, str]], columns: List[str],
-            column: Optional[PaperColumn]) -> str:
-    """A table of mean errors over two settings; rows and columns name the method in each cell."""
+            column: Optional[PaperColumn], measure: Measure = ERROR) -> str:
+    """A table of a measure over two settings; rows and columns name the method in each cell."""
     lines = []
     for title, methods in rows.items():
         cells = [outcomes.get(methods.get(name, '')) for name in columns]
         if column:
-            texts = [column.cell(cell.group, cell.method, ERROR) if cell else NOTHING for cell in cells]
+            texts = [column.cell(cell.group, cell.method, measure) if cell else NOTHING for cell in cells]
         else:
-            texts = [ours(cell, ERROR._replace(spread=None)) if cell else NOTHING for cell in cells]
+            texts = [ours(cell, measure._replace(spread=None)) if cell else NOTHING for cell in cells]
         lines.append([title, *texts])
     return markdown([row_title, *columns], lines)
 
@@ -209,6 +209,8 @@ def motion_tables(results: Results, papers: Papers) -> str:
         theirs = grid_of(outcomes, 'σ_acc', rows, titles, column)
         if column.sources():
             text += f'### Mean error [m], {title}, papers\n\n' + theirs + column.sources() + '\n'
+        text += (f'### Comparisons per image, {title}, ours\n\n'
+                 + grid_of(outcomes, 'σ_acc', rows, titles, None, COMPARISONS) + '\n')
     return text
 
 
