@@ -200,7 +200,8 @@ std::optional<MetricPose> Localizer::poseNearPrediction(std::int64_t stamp_ns) {
   geometry_ms_ = 0.0;
   if (!isMetric()) return std::nullopt;
   const Stopwatch stopwatch;
-  verifier_->startImage(stamp_ns, *image_->unprunedLocal(), *camera_, mount_);
+  const bool mapped = posterior().offMap() < config_.state.min_probability;
+  verifier_->startImage(stamp_ns, *image_->unprunedLocal(), *camera_, mount_, mapped);
   std::optional<MetricPose> pose = verifier_->nearPrediction();
   geometry_ms_ = stopwatch.elapsed_ms();
   return pose;

@@ -110,7 +110,8 @@ void PoseVerifier::reset() {
 }
 
 void PoseVerifier::startImage(std::int64_t stamp_ns, const LocalFeatures& features, const CameraModel& camera,
-                              const SensorMount& mount) {
+                              const SensorMount& mount, bool mapped) {
+  mapped_ = mapped;
   predictor_.startImage(stamp_ns);
   focal_.startImage();
   moving_.add(std::exchange(moving_gain_, 0.0));
@@ -292,7 +293,7 @@ bool PoseVerifier::isClear(const MetricPose& pose) const {
 
 /// What landmarks say about calibration, plants and sessions counts even where their pose does not.
 std::optional<MetricPose> PoseVerifier::commit(const Solution& solution, bool accepted) {
-  focal_.add(solution.focal_scale, solution.focal_sigma);
+  if (mapped_ || accepted) focal_.add(solution.focal_scale, solution.focal_sigma);
   moving_gain_ = solution.moving_gain;
   if (const auto& trial = solution.trial) {
     sessions_.learn(trial->training_image, trial->inliers, trial->tried_image, trial->tried_inliers);

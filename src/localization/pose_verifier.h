@@ -110,9 +110,10 @@ class PoseVerifier {
   /// Another camera, or another calibration of it.
   void resetCamera() { focal_.reset(); }
   /// The next image. Its features, not pruned, must live until the one after it.
-  /// `mount`: where the robot carries the camera.
+  /// `mount`: where the robot carries the camera. `mapped`: whether the robot may be in the map; beyond it, landmarks
+  /// that agree by chance say nothing about the calibration.
   void startImage(std::int64_t stamp_ns, const LocalFeatures& features, const CameraModel& camera,
-                  const SensorMount& mount = {});
+                  const SensorMount& mount = {}, bool mapped = true);
 
   /// The pose of the image if it is where the motion leads; nothing when too few landmarks agree there.
   std::optional<MetricPose> nearPrediction();
@@ -185,6 +186,7 @@ class PoseVerifier {
   KeypointRays rays_;  ///< of the features
   double focal_px_ = 0.0;
   SensorMount mount_;
+  bool mapped_ = true;
   std::vector<Compared> compared_;
   MatchedLandmarks matched_;
   LocalFeatures landmarks_;  ///< of a training image: its features that show one

@@ -62,6 +62,21 @@ TEST_F(PoseVerifierTest, ComparesEachTrainingImageOnce) {
   EXPECT_EQ(std::unique(compared.begin(), compared.end()), compared.end());
 }
 
+TEST_F(PoseVerifierTest, LearnsNothingAboutTheCalibrationWhereItIsNotInTheMap) {
+  Intrinsics wrong = street_.camera().intrinsics();
+  wrong.fx *= 1.05;
+  wrong.fy *= 1.05;
+  const CameraModel camera(wrong);
+  for (const bool mapped : {false, true}) {
+    for (std::size_t i = 10; i < 30; ++i) {
+      const LocalFeatures features = street_.seenFrom(street_.trueNear(i, kBeside_m));
+      verifier_.startImage(static_cast<std::int64_t>(i) * kSecond_ns, features, camera, {}, mapped);
+      verifier_.nearOneOf({i});
+    }
+    EXPECT_EQ(verifier_.focal().contradicts(), mapped);
+  }
+}
+
 // A street's landmarks tell the focal length of each image to about 1 %.
 TEST_F(PoseVerifierTest, RefusesACalibrationThatTheImagesContradict) {
   for (const double scale : {0.95, 1.05, 2.0}) {
