@@ -8,7 +8,7 @@ from .figures import Figures
 from .files import written_whole
 from .papers import Papers
 from .tables import (claims_tables, escape, filtered_tables, pose_tables, relative_tables, reliability_table,
-                      result_tables, tracking_tables, trust_tables)
+                      result_tables, swarm_speed_table, tracking_tables, trust_tables)
 
 # What somebody wrote into a report by hand stays when it is written again.
 DISCUSSION = re.compile(r'^## Discussion\n.*?(?=^## |\Z)', re.DOTALL | re.MULTILINE)
@@ -43,7 +43,8 @@ def report_text(results: Results, papers: Papers, figures: List[Tuple[str, str]]
                           ('Not wrong, % (images), by the probability around the estimate', reliability_table(results)),
                           ('Poses: recall within position and heading', pose_tables(results)),
                           ('Poses in relation to the map', relative_tables(results)),
-                          ('Poses behind a filter', filtered_tables(results))):
+                          ('Poses behind a filter', filtered_tables(results)),
+                          ('Speed of the swarm and of the robot', swarm_speed_table(results))):
         text += f'\n## {title}\n\n{tables}' if tables else ''
     text += f'\n{discussion.rstrip()}\n' if discussion else ''
     if figures:

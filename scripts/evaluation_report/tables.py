@@ -1,5 +1,8 @@
 """The report's tables, in Markdown: ours beside the papers'."""
+import math
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Set
+
+import numpy as np
 
 from .data import Group, Number, Outcome, Results, plain
 from .experiments import (CHANGING, CONSTANT, HYBRID, GridPoint, by_illumination, grid_point, group_title,
@@ -264,6 +267,23 @@ def claims_tables(results: Results) -> str:
     if not any('right' in part or 'wrong' in part for part in [rounds, *bags]):
         return ''
     return group_tables(results, Papers(None), CLAIMS)
+
+
+def swarm_speed_table(results: Results) -> str:
+    """Speed of the swarm (EMA) beside the robot's in the runs of traces.csv, which the papers expect to follow it."""
+    rows = []
+    for (train, test), runs in results.traces.items():
+        for method, series in runs.items():
+            pairs = [(swarm, robot) for swarm, robot in zip(series.columns.get('swarm_mps', []),
+                                                            series.columns.get('robot_mps', []))
+                     if math.isfinite(swarm) and math.isfinite(robot)]
+            if len(pairs) < 2:
+                continue
+            swarm, robot = np.array(pairs).T
+            varies = swarm.std() > 0 and robot.std() > 0
+            rows.append([escape(f'{train} → {test}'), escape(method), f'{swarm.mean():.2f}', f'{robot.mean():.2f}',
+                         f'{np.corrcoef(swarm, robot)[0, 1]:.2f}' if varies else NOTHING])
+    return markdown(['map → drive', 'method', 'swarm [m/s]', 'robot [m/s]', 'correlation'], rows) if rows else ''
 
 
 def reliability_table(results: Results) -> str:
