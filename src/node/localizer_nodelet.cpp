@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <exception>
+#include <filesystem>
 #include <thread>
 #include <utility>
 
@@ -268,7 +269,8 @@ void LocalizerNodelet::watchCamera() {
 }
 
 std::size_t LocalizerNodelet::useMap(const std::string& path) {
-  const std::string file = mapFileBelow(parameters_.node.map_directory, path);
+  const std::string below = mapFileBelow(parameters_.node.map_directory, path);
+  const std::string file = below.empty() ? below : std::filesystem::absolute(below).string();
   const auto map = loadMap(file, parameters_.node.mapLoading([name = getName()](const std::string& reason) {
     ROS_WARN_STREAM_NAMED(name, "Map " << oneLine(reason, kLongestLine));  // the map may outlive the nodelet
   }));

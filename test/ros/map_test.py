@@ -49,6 +49,7 @@ class MapTest(unittest.TestCase):
         self.assertFalse(answer.success)
         self.assertIn('map', answer.message)
         self.assertFalse(self.load_map('/does/not/exist.map').success)
+        self.assertIn('/nowhere/campus.map', self.load_map('nowhere/campus.map').message, 'where it looked')
         self.assertEqual(self.from_ll(48.5, 9.0).message, 'no map is loaded')
         self.assertEqual(self.to_ll(Point(1.0, 2.0, 0.0)).message, 'no map is loaded')
         self.check_images_without_a_map_are_counted()
