@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "apps/app_support.h"
+#include "apps/config_values.h"
 #include "apps/session_clock.h"
 #include "bag/recorded_mount.h"
 #include "base/files.h"
@@ -185,26 +186,8 @@ ParameterValues valuesOf(const MapBuilderOptions& options) {
 }  // namespace
 
 MapBuilderConfig readConfig(const MapBuilderOptions& options) {
-  MapBuilderConfig config;
-  const ParameterValues defaults = visual_localization::valuesOf(config);
-  ParameterValues of_file;
-  if (!options.config.empty()) {
-    try {
-      of_file = parameters::readYaml(options.config);
-      if (!options.preset.empty()) of_file["preset"] = options.preset;
-      assignParameters(config, mapBuilderValues(of_file, defaults));
-    } catch (const ParameterError& error) {
-      throw ParameterError(options.config + ": " + error.what());
-    }
-  }
-  try {
-    ParameterValues given = valuesOf(options);
-    given.insert(of_file.begin(), of_file.end());
-    assignParameters(config, mapBuilderValues(given, defaults));
-  } catch (const ParameterError& error) {
-    throw UsageError(error.what());
-  }
-  return config;
+  return joinedConfig<MapBuilderConfig>(
+      options.config, options.preset, [&options] { return valuesOf(options); }, mapBuilderValues);
 }
 
 void requireDifferent(const std::string& what, const std::vector<std::string>& files) {

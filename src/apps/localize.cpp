@@ -13,6 +13,7 @@
 #include "apps/app_support.h"
 #include "apps/bag_sessions.h"
 #include "apps/command_line.h"
+#include "apps/config_values.h"
 #include "apps/drive_report.h"
 #include "apps/track_header.h"
 #include "bag/recorded_mount.h"
@@ -83,22 +84,9 @@ ParameterValues valuesOf(const LocalizeOptions& options) {
 /// The file is the node's: parameters of the node alone are checked, but not used. The number of particles is the
 /// user's under a preset too: the papers try several.
 NodeParameters configOf(const LocalizeOptions& options) {
-  NodeParameters config;
-  const ParameterValues defaults = visual_localization::valuesOf(config);
-  ParameterValues of_file;
-  if (!options.config.empty()) {
-    try {
-      of_file = parameters::readYaml(options.config);
-      if (!options.preset.empty()) of_file["preset"] = options.preset;
-      assignParameters(config, localizerValues(of_file, defaults));
-    } catch (const ParameterError& error) {
-      throw ParameterError(options.config + ": " + error.what());
-    }
-  }
+  auto config = joinedConfig<NodeParameters>(
+      options.config, options.preset, [&options] { return valuesOf(options); }, localizerValues);
   try {
-    ParameterValues given = valuesOf(options);
-    given.insert(of_file.begin(), of_file.end());
-    assignParameters(config, localizerValues(given, defaults));
     if (options.particles) {
       assignParameters(config, {{trackerKind(config.localizer.tracker).particles, *options.particles}});
     }

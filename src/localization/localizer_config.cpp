@@ -56,8 +56,6 @@ void LocalizerConfig::declare(ParameterVisitor& visitor) {
        "which images of the map may look like this one: by VLAD of the local features, where the map has it, "
        "or by global features"},
       proposals, {"vlad", "global"});
-  visitor.renamed("max_proposal_images", "sweep_images");
-  visitor.renamed("state/place_check_images", "sweep_images");
   match.declare(visitor);
   similarity.declare(visitor);
   hybrid.declare(visitor);

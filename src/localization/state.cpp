@@ -97,7 +97,6 @@ void StateConfig::declare(ParameterVisitor& visitor) {
        "this number of repetitions of an image to the last bit, over a second, ends TRACKING; 0: never, for a "
        "simulated camera without noise"},
       frozen_images, 0, 100000);
-  visitor.renamed("state/max_course_residual", "state/max_motion_residual");
 }
 
 void StateAssessor::reset() { *this = StateAssessor(config_); }

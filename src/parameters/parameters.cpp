@@ -109,10 +109,6 @@ class Assigner : public ParameterVisitor {
     if (write_) field = *wanted;
   }
 
-  void renamed(const std::string& old_name, const std::string& name) override {
-    if (values_.count(old_name) != 0) throw ParameterError("parameter '" + old_name + "' is renamed to '" + name + "'");
-  }
-
   void refuseUnknown() const {
     for (const auto& [name, value] : values_) {
       if (known_.count(name) != 0) continue;

@@ -29,7 +29,6 @@ struct Engine {
     visitor.text({"name", "", "what it is called", true}, name);
     visitor.require(!turbo || cylinders >= 2, "engine/turbo", "true", "false with one cylinder");
     visitor.atMost("engine/cylinders", cylinders, "engine/power", power_w);
-    visitor.renamed("engine/horses", "engine/power");
   }
 };
 
@@ -146,10 +145,6 @@ TEST(Parameters, ConstraintsAcrossFieldsNameBothValues) {
             "parameter 'engine/cylinders' = 4 is not allowed: must not exceed 'engine/power' = 3");
   EXPECT_EQ(refusalOfValues({{"engine/cylinders", std::int64_t{1}}, {"engine/turbo", true}}),
             "parameter 'engine/turbo' = true is not allowed: must be false with one cylinder");
-}
-
-TEST(Parameters, ARenamedParameterIsRefusedWithItsNewName) {
-  EXPECT_EQ(refusalOfValues({{"engine/horses", 3.0}}), "parameter 'engine/horses' is renamed to 'engine/power'");
 }
 
 TEST(Parameters, SeveralDocumentsAreRefused) {

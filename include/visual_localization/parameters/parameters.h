@@ -38,8 +38,6 @@ class ParameterVisitor {
   /// Any other constraint: unless it `holds`, `value` of `name` is not allowed, and must be `allowed`.
   virtual void require(bool /*holds*/, const std::string& /*name*/, const std::string& /*value*/,
                        const std::string& /*allowed*/) {}
-  /// `old_name` is refused with the name that the parameter has now.
-  virtual void renamed(const std::string& /*old_name*/, const std::string& /*name*/) {}
 };
 
 /// A parameter as a file or a parameter server delivers it.
@@ -59,7 +57,7 @@ namespace parameters {
 /// Presents every field of one configuration to a visitor.
 using Declaration = std::function<void(ParameterVisitor&)>;
 
-/// Sets the fields that `values` names. Throws ParameterError at the first value that is unknown, renamed, of the
+/// Sets the fields that `values` names. Throws ParameterError at the first value that is unknown, of the
 /// wrong type or out of range, before any field has changed.
 void assign(const Declaration& declare, const ParameterValues& values);
 
