@@ -270,7 +270,7 @@ def claims_tables(results: Results) -> str:
 
 
 def swarm_speed_table(results: Results) -> str:
-    """Speed of the swarm (EMA) beside the robot's in the runs of traces.csv, which the papers expect to follow it."""
+    """Speed of the swarm (EMA) and of the robot in the runs of traces.csv; the papers expect them to agree."""
     rows = []
     for (train, test), runs in results.traces.items():
         for method, series in runs.items():

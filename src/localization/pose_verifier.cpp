@@ -291,7 +291,8 @@ bool PoseVerifier::isClear(const MetricPose& pose) const {
   return inliersTogether(pose) >= static_cast<std::size_t>(config_.min_inliers_tracking);
 }
 
-/// What landmarks say about calibration, plants and sessions counts even where their pose does not.
+/// What landmarks say about plants and sessions counts even where their pose does not; about the calibration, in the
+/// map alone.
 std::optional<MetricPose> PoseVerifier::commit(const Solution& solution, bool accepted) {
   if (mapped_ || accepted) focal_.add(solution.focal_scale, solution.focal_sigma);
   moving_gain_ = solution.moving_gain;

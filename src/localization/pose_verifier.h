@@ -110,8 +110,8 @@ class PoseVerifier {
   /// Another camera, or another calibration of it.
   void resetCamera() { focal_.reset(); }
   /// The next image. Its features, not pruned, must live until the one after it.
-  /// `mount`: where the robot carries the camera. `mapped`: whether the robot may be in the map; beyond it, landmarks
-  /// that agree by chance say nothing about the calibration.
+  /// `mount`: where the robot carries the camera. `mapped`: whether the robot may be in the map; elsewhere only the
+  /// landmarks of an accepted pose say anything about the calibration.
   void startImage(std::int64_t stamp_ns, const LocalFeatures& features, const CameraModel& camera,
                   const SensorMount& mount = {}, bool mapped = true);
 

@@ -36,8 +36,7 @@ void process(Localizer& localizer, std::int64_t stamp_s, const cv::Mat& grey, do
   least_ms = std::min(least_ms, watch.elapsed_ms());
 }
 
-// Of the quickest of some images, in turn: what else the machine does slows both. Neighbours of neighbours would take
-// thousands of times as long.
+// By the quickest of some images, in turn: what else the machine does slows both.
 TEST(OneSpot, ManyImagesThereTakeNoLongerThanAlongAWay) {
   constexpr std::size_t kImages = 50'000;
   const auto spot = mapOfSteps(kImages, 1e-7);
