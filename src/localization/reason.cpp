@@ -65,18 +65,14 @@ bool matchesWeakly(const Score& best, FeatureKind features, const StateConfig& c
   return best.similarity < config.min_similarity || best.matches < static_cast<std::size_t>(config.min_matches);
 }
 
-/// After so few images nothing is known.
-bool isFirst(const Estimate& estimate, const Circumstances& circumstances) {
-  constexpr std::size_t kFirst = 3;
-  return estimate.state == LocalizationState::kInitializing && circumstances.unconfirmed < kFirst;
-}
-
 Why byProbability(const Estimate& estimate, const Circumstances& circumstances) {
+  constexpr std::size_t kFirst = 3;  // images, of which nothing is known
   const PlaceBelief& belief = estimate.belief;
   const Score& best = estimate.tracked.best;
   const double probability = *estimate.evidence.probability;
-  const bool first = isFirst(estimate, circumstances);
+  const bool first = estimate.state == LocalizationState::kInitializing && circumstances.unconfirmed < kFirst;
   if (!first && belief.off_map >= kLikely) {
+    if (circumstances.left_at) return {StateReason::kMapEnds, belief.off_map, circumstances.left_at->position_m};
     const bool follows = belief.followed >= kLikely;
     return follows ? Why{StateReason::kWeakMatches, static_cast<double>(best.matches)}
                    : Why{StateReason::kNotMapped, belief.off_map};
@@ -132,10 +128,6 @@ Why explain(const Estimate& estimate, const StateConfig& config, const Circumsta
   if (evidence.blind) return {StateReason::kFewFeatures, static_cast<double>(estimate.image.features_kept)};
   const double stretch = estimate.image.statistics.stretch;
   if (std::abs(stretch - 1.0) > kStretched) return {StateReason::kOtherShape, stretch};
-  // Before the lens: landmarks far behind an end ask for another one.
-  if (circumstances.left_at && estimate.belief.off_map >= kLikely && !isFirst(estimate, circumstances)) {
-    return {StateReason::kMapEnds, estimate.belief.off_map, circumstances.left_at->position_m};
-  }
   if (estimate.other_lens) return {StateReason::kOtherLens, estimate.focal_scale};
   if (circumstances.turned) return {StateReason::kOtherDirection};
   return evidence.probability ? byProbability(estimate, circumstances) : byThresholds(estimate, config, circumstances);
